@@ -1,0 +1,3 @@
+#include "bindings.hpp"
+
+void bind_dynamics(pybind11::module_&) {}

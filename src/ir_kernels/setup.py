@@ -1,0 +1,112 @@
+"""Builds the compiled core twice: for this machine, and for any x86-64; or not at all, and says so."""
+
+import copy
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from glob import glob
+
+from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
+
+PACKAGE = "ir_kernels"
+X86 = platform.machine().lower() in ("x86_64", "amd64")
+WARNINGS = ["-Wall", "-Wextra", "-Wno-psabi"]
+# No -ffast-math: NaN checks and the order of additions are part of what is promised.
+OPTIMISE = ["-O3", "-std=c++17", "-fvisibility=hidden", "-g0", "-fno-math-errno", "-fno-trapping-math"]
+SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-omit-frame-pointer"]
+# What GCC may use on its own under -march=native, as preprocessor name -> name of __builtin_cpu_supports.
+FEATURES = {
+    "__POPCNT__": "popcnt", "__SSE3__": "sse3", "__SSSE3__": "ssse3", "__SSE4_1__": "sse4.1", "__SSE4_2__": "sse4.2",
+    "__SSE4A__": "sse4a", "__AVX__": "avx", "__FMA__": "fma", "__FMA4__": "fma4", "__XOP__": "xop", "__BMI__": "bmi",
+    "__BMI2__": "bmi2", "__AVX2__": "avx2", "__AVX512F__": "avx512f", "__AVX512DQ__": "avx512dq",
+    "__AVX512CD__": "avx512cd", "__AVX512BW__": "avx512bw", "__AVX512VL__": "avx512vl",
+    "__AVX512IFMA__": "avx512ifma", "__AVX512VBMI__": "avx512vbmi", "__AVX512VBMI2__": "avx512vbmi2",
+    "__AVX512VNNI__": "avx512vnni", "__AVX512BITALG__": "avx512bitalg", "__AVX512VPOPCNTDQ__": "avx512vpopcntdq",
+}  # fmt: skip
+
+
+def extensions() -> list[Extension]:
+    try:
+        import pybind11
+
+        include = [pybind11.get_include()]
+    except ImportError:
+        include = []  # the distribution's pybind11-dev, found by the compiler on its own
+    variants = ("_baseline",) if os.environ.get("IR_KERNELS_PORTABLE") else ("_baseline", "_native")
+    return [
+        Extension(
+            f"{PACKAGE}.{name}",
+            sorted(glob("cpp/*.cpp")),
+            include_dirs=[*include, "cpp"],
+            depends=[*glob("cpp/*.hpp"), "setup.py"],
+            define_macros=[("IR_MODULE", name)],
+            language="c++",
+            optional=True,
+        )
+        for name in variants
+    ]
+
+
+def native_features(compiler: str) -> list[str]:
+    """What `-march=native` switches on here: the loader compares it with the processor it finds itself on."""
+    command = [compiler, "-march=native", "-dM", "-E", "-x", "c++", os.devnull]
+    macros = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    defined = {line.split()[1] for line in macros.splitlines()}
+    return [feature for macro, feature in FEATURES.items() if macro in defined]
+
+
+class BuildBothVariants(build_ext):
+    """The variants are built side by side; a compiler that is missing or fails leaves the NumPy reference."""
+
+    def finalize_options(self):
+        super().finalize_options()
+        self.parallel = self.parallel or 2
+
+    def run(self):
+        super().run()
+        if not any(os.path.exists(self.get_ext_fullpath(e.name)) for e in self.extensions):
+            print(
+                f"{PACKAGE}: no C++ compiler with pybind11 was found: nothing compiled, the (slow) NumPy reference "
+                "will be used. Install g++ and pybind11 and install again.",
+                file=sys.stderr,
+            )
+
+    def build_extension(self, ext):
+        compiler = self.compiler.compiler_so[0]
+        native = ext.name.endswith("_native")
+        features = native_features(compiler) if X86 and shutil.which(compiler) else []
+        ext.extra_compile_args = [*OPTIMISE, *WARNINGS]
+        if native:
+            ext.extra_compile_args += ["-march=native"]
+        elif X86:
+            ext.extra_compile_args += ["-march=x86-64", "-mtune=generic"]
+        if os.environ.get("IR_KERNELS_SANITIZE"):
+            ext.extra_compile_args += SANITIZE
+            ext.extra_link_args += SANITIZE
+        ext.define_macros = [*ext.define_macros, ("IR_NATIVE_FEATURES", f'"{",".join(features)}"')]
+        ext.extra_link_args += ["-Wl,--strip-all"] if sys.platform == "linux" else []
+        own = copy.copy(self)  # its own folder for objects: both variants compile the same files
+        own.build_temp = os.path.join(self.build_temp, ext.name)
+        super(BuildBothVariants, own).build_extension(ext)
+
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+    ],
+    ext_modules=extensions(),
+    cmdclass={"build_ext": BuildBothVariants},
+    install_requires=["numpy"],
+    python_requires=">=3.10",
+    zip_safe=False,
+    description="Compiled core: kinematics, exact distances, certified motion, dynamics, inverse kinematics.",
+    license="Apache-2.0",
+)
