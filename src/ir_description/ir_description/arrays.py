@@ -1,0 +1,92 @@
+"""Arrays that are checked once and then read-only.
+
+Every value type of this package passes its arrays through here: float64, the agreed shape, finite, not
+writable.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ir_description.errors import InvalidValueError
+
+Array = npt.NDArray[np.float64]
+
+ROTATION_TOLERANCE = 1e-9
+"""Largest entry of R R^T - 1 that still counts as a rotation."""
+
+
+def frozen(value: Any, shape: tuple[int | None, ...], name: str) -> Array:
+    """Return a read-only float64 copy of that shape (None: any length), refusing NaN and infinity."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(f"{name} must be an array of numbers") from error
+    if array.ndim != len(shape) or any(
+        want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
+    ):
+        wanted = tuple("N" if s is None else s for s in shape)
+        raise InvalidValueError(f"{name} has shape {array.shape}, must be {wanted}")
+    if not np.isfinite(array).all():
+        raise InvalidValueError(f"{name} has entries that are not finite")
+    array.setflags(write=False)
+    return array
+
+
+def frozen_pose(value: Any, name: str) -> Array:
+    """Return a read-only (4, 4) rigid motion, refusing what is not one."""
+    pose = frozen(value, (4, 4), name)
+    rotation = pose[:3, :3]
+    if (
+        np.abs(rotation @ rotation.T - np.eye(3)).max() > ROTATION_TOLERANCE
+        or np.linalg.det(rotation) < 0.0
+        or np.abs(pose[3] - (0.0, 0.0, 0.0, 1.0)).max() > 0.0
+    ):
+        raise InvalidValueError(f"{name} is not a pose: its rotation must be orthonormal and right-handed")
+    return pose
+
+
+def frozen_inertia(value: Any, name: str) -> Array:
+    """Return a read-only (3, 3) inertia [kg m^2], refusing what no body can have.
+
+    A body's inertia is symmetric and positive definite, and its principal moments satisfy the triangle
+    inequality (each is at most the sum of the other two).
+    """
+    inertia = frozen(value, (3, 3), name)
+    if np.abs(inertia - inertia.T).max() > 1e-12 * max(1.0, float(np.abs(inertia).max())):
+        raise InvalidValueError(f"{name} is not symmetric")
+    moments = np.linalg.eigvalsh(inertia)
+    if moments[0] <= 0.0:
+        raise InvalidValueError(f"{name} has a principal moment of {moments[0]:.4g} kg m^2, must be above 0")
+    if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+        raise InvalidValueError(
+            f"{name} breaks the triangle inequality: principal moment {moments[2]:.4g} kg m^2 is above "
+            f"{moments[0] + moments[1]:.4g} kg m^2, the sum of the other two"
+        )
+    return inertia
+
+
+def in_range(value: float, low: float, high: float, unit: str, name: str, *, open_low: bool = False) -> float:
+    """Return value as a float, refusing NaN and what lies outside [low, high] (or (low, high])."""
+    number = float(value)
+    if not (low < number <= high if open_low else low <= number <= high):
+        left = "(" if open_low else "["
+        raise InvalidValueError(
+            f"{name} is {number:g} {unit}, must be in {left}{low:g}, {high:g}] {unit}".strip()
+        )
+    return number
+
+
+def solid_box_inertia(mass: float, size: Any) -> Array:
+    """Return the inertia (3, 3) [kg m^2] of a solid box about its centre: mass [kg], full size (3,) [m]."""
+    x, y, z = frozen(size, (3,), "size") ** 2
+    return frozen(np.diag([y + z, x + z, x + y]) * (mass / 12.0), (3, 3), "inertia")
+
+
+def transformed(pose: Array, points: Array) -> Array:
+    """Return the points (N, 3) or (3,) moved by a pose (4, 4)."""
+    moved: Array = points @ pose[:3, :3].T + pose[:3, 3]
+    return moved

@@ -1,0 +1,131 @@
+"""The power side of a controller as data: modes, transitions, DC link, PLC bits, Tables I and II."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ir_description.arrays import in_range
+from ir_description.errors import InvalidValueError, UnknownNameError
+
+
+@dataclass(frozen=True)
+class PowerMode:
+    """One energy mode of the controller.
+
+    controller_watts [W] without drives, tool and holding torque. time_to_pause [s] into the mode and
+    regular_time_to_operate [s] back to motors on; minimum_stay [s] between them; time_min_pause [s] below
+    which the mode is not worth entering; pe_mode_id is PROFIenergy's number.
+    """
+
+    name: str
+    pe_mode_id: int
+    controller_watts: float
+    time_to_pause: float
+    regular_time_to_operate: float
+    minimum_stay: float
+    time_min_pause: float
+
+    def __post_init__(self) -> None:
+        in_range(self.controller_watts, 0.0, 1e5, "W", f"controller_watts of {self.name}")
+        for field in ("time_to_pause", "regular_time_to_operate", "minimum_stay", "time_min_pause"):
+            in_range(getattr(self, field), 0.0, 1e6, "s", f"{field} of {self.name}")
+        in_range(self.pe_mode_id, 0, 255, "", f"pe_mode_id of {self.name}")
+
+
+@dataclass(frozen=True)
+class DcLink:
+    """Bus of the drives: the supply rectifies only; what the capacitors cannot take is burnt."""
+
+    capacitance: float  # F
+    voltage: float  # V, rectified mains
+    chopper_on: float  # V
+    chopper_off: float  # V
+    brake_resistor: float  # ohm
+
+    def __post_init__(self) -> None:
+        for name, unit in (("capacitance", "F"), ("voltage", "V"), ("brake_resistor", "ohm")):
+            in_range(getattr(self, name), 0.0, 1e6, unit, name, open_low=True)
+        if not self.voltage < self.chopper_off <= self.chopper_on:
+            raise InvalidValueError(
+                f"chopper switches off at {self.chopper_off:g} V and on at {self.chopper_on:g} V, must be "
+                f"above {self.voltage:g} V and in this order"
+            )
+
+    @property
+    def capacity_energy(self) -> float:
+        """Energy [J] the capacitors take between the rectified mains and the brake chopper."""
+        return 0.5 * self.capacitance * (self.chopper_on**2 - self.voltage**2)
+
+
+@dataclass(frozen=True)
+class PlcBit:
+    """One bit of the power management's byte; `excludes` names the bits that must be 0 with it."""
+
+    bit: int
+    name: str
+    meaning: str
+    excludes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeasuredPower:
+    """A row of Table II: mains power [W] at machine home in a mode, with a payload [kg]."""
+
+    payload: float
+    mode: str
+    watts: float
+
+
+@dataclass(frozen=True)
+class EnergyShare:
+    """A row of Table I: a consumer's share [%] of the energy of a robotic line."""
+
+    consumer: str
+    percent: float
+
+
+@dataclass(frozen=True)
+class PowerData:
+    """All of a controller's power figures; tool watts belong to the tool (Load)."""
+
+    name: str
+    modes: tuple[PowerMode, ...]
+    operate_manual_pe_mode_id: int
+    drives_and_brake_release: float  # W while the motors are on
+    motors_to_brakes_in_program: float  # s
+    motors_to_brakes_in_command: float  # s
+    dc_link: DcLink
+    plc_inputs: tuple[PlcBit, ...]
+    plc_outputs: tuple[PlcBit, ...]
+    wake_on_lan_ports: tuple[int, ...]
+    table_2: tuple[MeasuredPower, ...]
+    table_1: tuple[EnergyShare, ...]
+
+    def __post_init__(self) -> None:
+        in_range(self.drives_and_brake_release, 0.0, 1e5, "W", "drives_and_brake_release")
+        names = [mode.name for mode in self.modes]
+        if len(set(names)) != len(names):
+            raise InvalidValueError("a power mode is named twice")
+        for row in self.table_2:
+            self.mode(row.mode)
+
+    @property
+    def dc_link_capacity_energy(self) -> float:
+        """Energy [J] that fits into the DC link before braking energy is burnt."""
+        return self.dc_link.capacity_energy
+
+    def mode(self, name: str) -> PowerMode:
+        """Return the mode of that name."""
+        for mode in self.modes:
+            if mode.name == name:
+                return mode
+        raise UnknownNameError("power mode", name, (mode.name for mode in self.modes))
+
+    def measured(self, payload: float, mode: str) -> float:
+        """Return Table II's watts for a payload of 0 or 155 kg in a mode."""
+        for row in self.table_2:
+            if row.payload == payload and row.mode == mode:
+                return row.watts
+        raise UnknownNameError(
+            "row of Table II", f"{payload:g} kg {mode}", (f"{r.payload:g} kg {r.mode}" for r in self.table_2)
+        )

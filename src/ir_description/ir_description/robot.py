@@ -1,0 +1,173 @@
+"""The robot as data: chain, limits, bodies, drives, torque envelope, counterbalance, capsules.
+
+Figures and their sources: data/robots/*.yaml, docs/robot_data.md. n joints, links 0..n with 0 = base_link.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_description.arrays import Array, frozen, frozen_inertia, frozen_pose, in_range
+from ir_description.capsule import Capsule
+from ir_description.errors import InvalidValueError
+
+__all__ = ["Capsule", "Counterbalance", "RobotModel"]
+
+
+@dataclass(frozen=True, eq=False)
+class Counterbalance:
+    """A gas spring between link `joint` (0-based index; pivot) and the link it carries (rod eye).
+
+    pivot (2,) and rod_eye (2,) are x, z [m] in the joint's frame at angle 0. With th the joint angle, P the
+    rod eye turned by th about +y and l = |P - pivot|: the pressure is
+    p = charge_pressure (V / (V - A (l - rod_length_at_charge)))^exponent, the force A p along the rod, and
+    its torque about the positive axis is what helps the motor.
+    """
+
+    joint: int
+    pivot: Array
+    rod_eye: Array
+    piston_area: float
+    gas_volume: float
+    charge_pressure: float
+    rod_length_at_charge: float
+    exponent: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pivot", frozen(self.pivot, (2,), "pivot"))
+        object.__setattr__(self, "rod_eye", frozen(self.rod_eye, (2,), "rod_eye"))
+        for name, high, unit in (
+            ("piston_area", 1.0, "m^2"),
+            ("gas_volume", 10.0, "m^3"),
+            ("charge_pressure", 1e9, "Pa"),
+            ("rod_length_at_charge", 10.0, "m"),
+            ("exponent", 3.0, ""),
+        ):
+            value = in_range(getattr(self, name), 0.0, high, unit, name, open_low=True)
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class RobotModel:
+    """One robot. SI, all arrays float64 and read-only.
+
+    joint_origin (n, 4, 4): pose of joint frame i, which is the frame of link i+1 at q_i = 0, in link i.
+    joint_axis (n, 3): unit axis in the joint frame; signs are KUKA's, so q is A1..A6.
+    position_min/max (n,) rad, velocity_max rad/s, acceleration_max rad/s^2 (the hard cap), jerk_max rad/s^3.
+    link_mass (n+1,) kg, link_com (n+1, 3) m in the link frame, link_inertia (n+1, 3, 3) kg m^2 about the com.
+    gear_ratio (n,), reflected_inertia kg m^2, friction_viscous Nm s/rad, friction_coulomb Nm (joint side),
+    copper_loss W/Nm^2 of MOTOR torque.
+    envelope_speed (n, K) rad/s, envelope_torque (n, K+1) Nm: the torque available is envelope_torque[:, 0]
+    below the first speed, steps down to [:, 1] there, is linear between (speed[k], torque[k+1]) and stays at
+    the last value. It bounds the total torque, rotor inertia and friction included.
+    capsules: of the links, without tool. self_pairs: names of the robot's own capsules that can touch.
+    load_self_capsules: robot capsules that every capsule of a load is checked against.
+    machine_home (n,) rad: the posture of Table II. rated_payload kg: tool and part together.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    link_names: tuple[str, ...]
+    joint_origin: Array
+    joint_axis: Array
+    position_min: Array
+    position_max: Array
+    velocity_max: Array
+    acceleration_max: Array
+    jerk_max: Array
+    link_mass: Array
+    link_com: Array
+    link_inertia: Array
+    gear_ratio: Array
+    reflected_inertia: Array
+    friction_viscous: Array
+    friction_coulomb: Array
+    copper_loss: Array
+    envelope_speed: Array
+    envelope_torque: Array
+    counterbalance: Counterbalance | None
+    capsules: tuple[Capsule, ...]
+    self_pairs: tuple[tuple[str, str], ...]
+    load_self_capsules: tuple[str, ...]
+    machine_home: Array
+    rated_payload: float
+
+    def __post_init__(self) -> None:
+        n = len(self.joint_names)
+        shapes: dict[str, tuple[int | None, ...]] = {
+            "joint_axis": (n, 3),
+            "position_min": (n,),
+            "position_max": (n,),
+            "velocity_max": (n,),
+            "acceleration_max": (n,),
+            "jerk_max": (n,),
+            "link_mass": (n + 1,),
+            "link_com": (n + 1, 3),
+            "gear_ratio": (n,),
+            "reflected_inertia": (n,),
+            "friction_viscous": (n,),
+            "friction_coulomb": (n,),
+            "copper_loss": (n,),
+            "envelope_speed": (n, None),
+            "envelope_torque": (n, None),
+            "machine_home": (n,),
+        }
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
+        origins = np.array(
+            [frozen_pose(pose, f"joint_origin {i}") for i, pose in enumerate(self.joint_origin)]
+        )
+        object.__setattr__(self, "joint_origin", frozen(origins, (n, 4, 4), "joint_origin"))
+        inertias = np.array([frozen_inertia(J, f"link_inertia {i}") for i, J in enumerate(self.link_inertia)])
+        object.__setattr__(self, "link_inertia", frozen(inertias, (n + 1, 3, 3), "link_inertia"))
+        self._check_signs()
+        self._check_envelope()
+        self._check_names(n)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    def _check_signs(self) -> None:
+        positive = ("velocity_max", "acceleration_max", "jerk_max", "link_mass", "gear_ratio")
+        for name in positive:
+            if (getattr(self, name) <= 0.0).any():
+                raise InvalidValueError(f"{name} must be above 0 everywhere")
+        for name in ("reflected_inertia", "friction_viscous", "friction_coulomb", "copper_loss"):
+            if (getattr(self, name) < 0.0).any():
+                raise InvalidValueError(f"{name} must not be negative")
+        if (self.position_min >= self.position_max).any():
+            raise InvalidValueError("position_min must be below position_max for every joint")
+        if ((self.machine_home < self.position_min) | (self.machine_home > self.position_max)).any():
+            raise InvalidValueError("machine_home lies outside the position limits")
+        if np.abs(np.linalg.norm(self.joint_axis, axis=1) - 1.0).max() > 1e-12:
+            raise InvalidValueError("joint_axis must hold unit vectors")
+        in_range(self.rated_payload, 0.0, 1e4, "kg", "rated_payload", open_low=True)
+
+    def _check_envelope(self) -> None:
+        speed, torque = self.envelope_speed, self.envelope_torque
+        if torque.shape[1] != speed.shape[1] + 1:
+            raise InvalidValueError("envelope_torque must have one column more than envelope_speed")
+        if (speed <= 0.0).any() or (np.diff(speed, axis=1) <= 0.0).any():
+            raise InvalidValueError("envelope_speed must be positive and rising")
+        if (torque <= 0.0).any() or (np.diff(torque, axis=1) > 0.0).any():
+            raise InvalidValueError("envelope_torque must be positive and must not rise with speed")
+
+    def _check_names(self, n: int) -> None:
+        if len(self.link_names) != n + 1:
+            raise InvalidValueError(f"{len(self.link_names)} link names for {n} joints, must be {n + 1}")
+        names = [capsule.name for capsule in self.capsules]
+        if len(set(names)) != len(names):
+            raise InvalidValueError("a capsule name is used twice")
+        if any(capsule.link > n for capsule in self.capsules):
+            raise InvalidValueError(f"a capsule stands on a link beyond {n}")
+        for name in (*(name for pair in self.self_pairs for name in pair), *self.load_self_capsules):
+            if name not in names:
+                raise InvalidValueError(f"self pairs name the capsule {name}, known are {', '.join(names)}")
+        if self.counterbalance is not None and not 0 <= self.counterbalance.joint < n:
+            raise InvalidValueError(
+                f"counterbalance on joint {self.counterbalance.joint}, must be in [0, {n - 1}]"
+            )

@@ -1,0 +1,137 @@
+"""YAML as a tree that knows its lines, and nothing a description has no use for.
+
+Refused: aliases and anchors (they multiply), tags, several documents, keys that are not text, duplicate
+keys, and texts beyond the limits. Scalars stay text here; `items` gives them their types.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import yaml
+
+from ir_description.errors import DescriptionFileError, shown
+
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a file may cost to read."""
+
+    characters: int = 8_000_000
+    nodes: int = 1_500_000
+    depth: int = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """One value as it was written; plain means without quotes."""
+
+    text: str
+    plain: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A key with its line and its node."""
+
+    line: int
+    node: Node
+
+
+Content: TypeAlias = "Scalar | list[Node] | dict[str, Entry]"
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A value of the document and the line (from 1) on which it starts."""
+
+    line: int
+    content: Content
+
+
+def parse_yaml(
+    text: str, source: str, error: type[DescriptionFileError], limits: Limits | None = None
+) -> Node:
+    """Return the only document of `text` as a tree; every refusal is an `error` with path and line."""
+    limits = limits or Limits()
+    if len(text) > limits.characters:
+        raise error(source, 0, f"the text has {len(text)} characters, must be at most {limits.characters}")
+    try:
+        return _Builder(text, source, error, limits).document()
+    except yaml.MarkedYAMLError as broken:
+        mark = broken.problem_mark or broken.context_mark
+        line = mark.line + 1 if mark is not None else 0
+        raise error(source, line, f"this is not YAML: {broken.problem or broken.context}") from broken
+    except yaml.reader.ReaderError as broken:
+        line = text.count("\n", 0, broken.position) + 1 if isinstance(broken.position, int) else 0
+        raise error(source, line, f"character {shown(broken.character)} is not allowed in YAML") from broken
+
+
+class _Builder:
+    """Builds the tree from the parser's events."""
+
+    def __init__(self, text: str, source: str, error: type[DescriptionFileError], limits: Limits) -> None:
+        self._events = yaml.parse(text, Loader=_LOADER)
+        self._source, self._error, self._limits = source, error, limits
+        self._nodes = 0
+
+    def document(self) -> Node:
+        next(self._events)  # start of stream
+        first = next(self._events)
+        if isinstance(first, yaml.StreamEndEvent):
+            raise self._error(self._source, 1, "the file is empty")
+        root = self._node(next(self._events), 0)
+        next(self._events)  # end of document
+        after = next(self._events)
+        if not isinstance(after, yaml.StreamEndEvent):
+            raise self._error(self._source, _line(after), "a second document starts here; one file holds one")
+        return root
+
+    def _node(self, event: yaml.Event, depth: int) -> Node:
+        line = _line(event)
+        self._nodes += 1
+        if self._nodes > self._limits.nodes:
+            raise self._error(self._source, line, f"the file has more than {self._limits.nodes} values")
+        if depth > self._limits.depth:
+            raise self._error(self._source, line, f"values are nested more than {self._limits.depth} deep")
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
+            raise self._error(
+                self._source, line, "anchors and aliases (& and *) are not allowed; write the value out"
+            )
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            raise self._error(self._source, line, f"the tag {shown(tag)} is not allowed")
+        if isinstance(event, yaml.ScalarEvent):
+            return Node(line, Scalar(event.value, not event.style))
+        if isinstance(event, yaml.SequenceStartEvent):
+            return Node(line, self._sequence(depth))
+        return Node(line, self._mapping(depth))
+
+    def _sequence(self, depth: int) -> list[Node]:
+        nodes = []
+        while not isinstance(event := next(self._events), yaml.SequenceEndEvent):
+            nodes.append(self._node(event, depth + 1))
+        return nodes
+
+    def _mapping(self, depth: int) -> dict[str, Entry]:
+        entries: dict[str, Entry] = {}
+        while not isinstance(event := next(self._events), yaml.MappingEndEvent):
+            key = self._node(event, depth + 1)
+            if not isinstance(key.content, Scalar):
+                raise self._error(self._source, key.line, "a key must be a word")
+            name = key.content.text
+            if name in entries:
+                first = entries[name].line
+                raise self._error(
+                    self._source, key.line, f"{shown(name)} stands here twice, first in line {first}"
+                )
+            entries[name] = Entry(key.line, self._node(next(self._events), depth + 1))
+        return entries
+
+
+def _line(event: yaml.Event) -> int:
+    mark = event.start_mark
+    return mark.line + 1 if mark is not None else 0
