@@ -1,0 +1,80 @@
+"""Names of nodes, topics, services, actions, joints and frames: a contract, spelled once.
+
+All names are relative, so a namespace moves a whole cell; a script outside puts a "/" before them.
+Topics and services of a node carry its name: `ir_planner/set_cell`.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+JOINT_NAMES: Final = ("joint_a1", "joint_a2", "joint_a3", "joint_a4", "joint_a5", "joint_a6")
+
+WORLD_FRAME: Final = "cell"
+BASE_FRAME: Final = "base_link"
+FLANGE_FRAME: Final = "flange"
+TOOL_FRAME: Final = "tool0"
+TCP_FRAME: Final = "tcp"
+
+PLANNER: Final = "ir_planner"
+SIM_DRIVER: Final = "ir_sim_driver"
+PROGRAM_RUNNER: Final = "ir_program_runner"
+RECORDER: Final = "ir_recorder"
+
+# of nobody in particular
+JOINT_STATES: Final = "joint_states"
+ROBOT_DESCRIPTION: Final = "robot_description"
+DIAGNOSTICS: Final = "/diagnostics"
+
+# ir_planner: services
+SET_CELL: Final = f"{PLANNER}/set_cell"
+GET_CELL: Final = f"{PLANNER}/get_cell"
+SET_EQUIPMENT: Final = f"{PLANNER}/set_equipment"
+CHECK_STATE: Final = f"{PLANNER}/check_state"
+COMPUTE_IK: Final = f"{PLANNER}/compute_ik"
+PLAN_SERVICE_MOVEMENT: Final = f"{PLANNER}/plan_service_movement"
+PLAN_REGIONAL_MOVEMENT: Final = f"{PLANNER}/plan_regional_movement"
+PLAN_TRAJECTORY: Final = f"{PLANNER}/plan_trajectory"
+PLAN_PROGRAM: Final = f"{PLANNER}/plan_program"
+OPTIMIZE_TRAJECTORY: Final = f"{PLANNER}/optimize_trajectory"
+EVALUATE_TRAJECTORY: Final = f"{PLANNER}/evaluate_trajectory"
+GET_TRAJECTORY: Final = f"{PLANNER}/get_trajectory"
+GET_PROGRAM: Final = f"{PLANNER}/get_program"
+PLAN_STANDBY: Final = f"{PLANNER}/plan_standby"
+EXPORT_PROGRAM: Final = f"{PLANNER}/export_program"
+# action and topics
+PLAN: Final = f"{PLANNER}/plan"
+PLANNED_TRAJECTORY: Final = f"{PLANNER}/planned_trajectory"
+PLANNER_MARKERS: Final = f"{PLANNER}/markers"
+
+# ir_sim_driver: services
+SET_PLC_INPUT: Final = f"{SIM_DRIVER}/set_plc_input"
+START_PAUSE: Final = f"{SIM_DRIVER}/start_pause"
+END_PAUSE: Final = f"{SIM_DRIVER}/end_pause"
+QUERY_MODES: Final = f"{SIM_DRIVER}/query_modes"
+RECOVER: Final = f"{SIM_DRIVER}/recover"
+SET_LOAD: Final = f"{SIM_DRIVER}/set_load"
+# actions and topics
+EXECUTE_TRAJECTORY: Final = f"{SIM_DRIVER}/execute_trajectory"
+FOLLOW_JOINT_TRAJECTORY: Final = f"{SIM_DRIVER}/follow_joint_trajectory"
+COMMANDED_TRAJECTORY: Final = f"{SIM_DRIVER}/joint_trajectory"
+PLC_INPUTS: Final = f"{SIM_DRIVER}/plc_inputs"
+PLC_OUTPUTS: Final = f"{SIM_DRIVER}/plc_outputs"
+SPEED_SCALING: Final = f"{SIM_DRIVER}/speed_scaling"
+POWER_STATE: Final = f"{SIM_DRIVER}/power_state"
+CONTROLLER_STATE: Final = f"{SIM_DRIVER}/controller_state"
+ROBOT_MARKERS: Final = f"{SIM_DRIVER}/robot_markers"
+
+# ir_program_runner: action and topics
+RUN_PROGRAM: Final = f"{PROGRAM_RUNNER}/run_program"
+SIGNALS: Final = f"{PROGRAM_RUNNER}/signals"
+MACHINE_SIGNALS: Final = f"{PROGRAM_RUNNER}/machine_signals"
+PROGRAM_STATE: Final = f"{PROGRAM_RUNNER}/program_state"
+
+# ir_recorder: services
+START_RECORDING: Final = f"{RECORDER}/start"
+STOP_RECORDING: Final = f"{RECORDER}/stop"
+
+# load texts: names of the cell's loads joined by LOAD_SEPARATOR, or nothing attached
+LOAD_SEPARATOR: Final = "+"
+NO_LOAD: Final = "none"

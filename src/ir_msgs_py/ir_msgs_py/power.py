@@ -1,0 +1,106 @@
+"""Power modes of the robot, in the terms of PROFIenergy, and the reading of the mains meter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from ir_msgs_py.checks import FloatArray, at_least, finite, read_only, set_field
+from ir_msgs_py.errors import InvalidValueError
+
+
+class Mode(IntEnum):
+    """Modes and the transitions between them; numbers of ir_msgs/PowerMode."""
+
+    STAND_ON_MOTORS = 0
+    MOVING = 1
+    STAND_ON_BRAKES = 2
+    BUS_POWER_OFF = 3
+    HIBERNATION = 4
+    TO_BRAKES = 10
+    FROM_BRAKES = 11
+    TO_BUS_POWER_OFF = 12
+    FROM_BUS_POWER_OFF = 13
+    TO_HIBERNATION = 14
+    FROM_HIBERNATION = 15
+    EMERGENCY_STOP = 20
+
+
+# modes that a pause can be spent in, shallow to deep; the names that people type
+REST_MODES = ("STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PowerMode:
+    """One mode with its power [W], times [s] and energies [J]; break_even may be infinite: it never pays.
+
+    power: at the mains with the present tool. time_min_pause: shortest pause for which it may be entered.
+    time_to_pause, regular_time_to_operate: transition in and out. time_min_length_of_stay: in the mode
+    itself. energy_to_pause, energy_to_operate: of the transitions. break_even: pause from which the mode
+    saves energy against the next shallower one.
+    """
+
+    mode: Mode
+    name: str = ""
+    pe_mode_id: int = 0
+    power: float = 0.0
+    time_min_pause: float = 0.0
+    time_to_pause: float = 0.0
+    regular_time_to_operate: float = 0.0
+    time_min_length_of_stay: float = 0.0
+    energy_to_pause: float = 0.0
+    energy_to_operate: float = 0.0
+    break_even: float = 0.0
+
+    def __post_init__(self) -> None:
+        set_field(self, "mode", checked_mode(self.mode))
+        set_field(self, "name", self.name or self.mode.name)
+        if not 0 <= self.pe_mode_id <= 0xFF:
+            raise InvalidValueError(f"pe_mode_id is {self.pe_mode_id}: it must be in 0 .. 255")
+        for name in ("time_min_pause", "time_to_pause", "regular_time_to_operate", "time_min_length_of_stay"):
+            set_field(self, name, at_least(getattr(self, name), 0.0, f"{name} of {self.name}", "s"))
+        for name in ("power", "energy_to_pause", "energy_to_operate"):
+            set_field(self, name, finite(getattr(self, name), f"{name} of {self.name}"))
+        if np.isnan(self.break_even):
+            raise InvalidValueError(f"break_even of {self.name} is nan: it must be a number")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PowerState:
+    """What the mains meter reads; stamp_ns: node clock [ns].
+
+    time_to_target [s], 0 when the target mode is reached; power [W]: mean since the last reading; energy
+    [J] since the meter started; base_power [W] of controller, drives and tool; bus_voltage [V];
+    burnt_power [W]; joint_power (n,) [W] at the DC bus; joint_torque (n,) [Nm] of the motor at the joint.
+    """
+
+    stamp_ns: int
+    mode: Mode
+    target_mode: Mode
+    time_to_target: float = 0.0
+    power: float = 0.0
+    energy: float = 0.0
+    base_power: float = 0.0
+    bus_voltage: float = 0.0
+    burnt_power: float = 0.0
+    joint_power: FloatArray = field(default_factory=lambda: np.zeros(0))
+    joint_torque: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        set_field(self, "mode", checked_mode(self.mode))
+        set_field(self, "target_mode", checked_mode(self.target_mode))
+        for name in ("time_to_target", "power", "energy", "base_power", "bus_voltage", "burnt_power"):
+            set_field(self, name, finite(getattr(self, name), name))
+        set_field(self, "joint_power", read_only(self.joint_power, "joint_power", (None,)))
+        set_field(self, "joint_torque", read_only(self.joint_torque, "joint_torque", (None,)))
+
+
+def checked_mode(number: int) -> Mode:
+    """Return the mode of the number; an unknown one lists the known."""
+    try:
+        return Mode(number)
+    except ValueError as error:
+        known = ", ".join(f"{mode.value} {mode.name}" for mode in Mode)
+        raise InvalidValueError(f"power mode is {number}: known are {known}") from error

@@ -1,0 +1,205 @@
+"""What a plan costs, how near it comes to its limits and how it came about: values mirrored by messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from ir_msgs_py.checks import FloatArray, at_least, finite, not_nan, one_of, read_only, set_field
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.power import REST_MODES
+from ir_msgs_py.trajectory import JointTrajectory
+
+
+class PairKind(StrEnum):
+    """Two kinds of collision."""
+
+    ENVIRONMENT = "environment"
+    SELF = "self"
+
+
+class MovementKind(StrEnum):
+    """What a step of a program is."""
+
+    SERVICE_EXIT = "service_exit"
+    SERVICE_ENTRY = "service_entry"
+    REGIONAL = "regional"
+    PAUSE = "pause"
+
+
+def _zeros(shape: int) -> FloatArray:
+    return np.zeros(shape)
+
+
+@dataclass(frozen=True, eq=False)
+class DistancePair:
+    """Two bodies, their signed distance [m] (negative: penetration) and closest points (3,) [m, frame cell].
+
+    allowed_contact: the pair has a safety distance of its own here.
+    """
+
+    kind: str
+    body_a: str
+    body_b: str
+    distance: float
+    point_a: FloatArray
+    point_b: FloatArray
+    allowed_contact: bool = False
+
+    def __post_init__(self) -> None:
+        set_field(self, "kind", PairKind(one_of(self.kind, list(PairKind), "kind of pair")))
+        set_field(
+            self, "distance", finite(self.distance, f"distance of {self.body_a} and {self.body_b}", "m")
+        )
+        set_field(self, "point_a", read_only(self.point_a, "point_a", (3,)))
+        set_field(self, "point_b", read_only(self.point_b, "point_b", (3,)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrajectoryReport:
+    """What a trajectory costs and how near it comes to its limits.
+
+    duration [s]; movement_cost: W of eq. (9), not joules; energy at the mains, joint_energy (n,) at the DC
+    bus (signed), base_energy of controller, drives and tool, burnt_energy in the brake resistor [J];
+    peak_power [W]; min_clearance [m] over all pairs without an allowed contact (inf: no pair), closest:
+    that pair at closest_time [s]; *_ratio (n,): largest used share of each joint's limit; path_length of
+    the tcp [m]; certified: clearance and limits proved for every instant; contacts: pairs that were
+    allowed their own safety distance.
+    """
+
+    duration: float = 0.0
+    movement_cost: float = 0.0
+    energy: float = 0.0
+    joint_energy: FloatArray = field(default_factory=lambda: _zeros(0))
+    base_energy: float = 0.0
+    burnt_energy: float = 0.0
+    peak_power: float = 0.0
+    min_clearance: float = float("inf")
+    closest: DistancePair | None = None
+    closest_time: float = 0.0
+    velocity_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
+    acceleration_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
+    jerk_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
+    torque_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
+    path_length: float = 0.0
+    certified: bool = False
+    contacts: tuple[DistancePair, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("duration", "burnt_energy", "path_length"):
+            set_field(self, name, at_least(getattr(self, name), 0.0, name))
+        for name in ("movement_cost", "energy", "base_energy", "peak_power", "closest_time"):
+            set_field(self, name, finite(getattr(self, name), name))
+        set_field(self, "min_clearance", not_nan(self.min_clearance, "min_clearance", "m"))
+        joints = np.shape(self.joint_energy)[:1] or (0,)
+        for name in ("joint_energy", "velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio"):
+            values = read_only(getattr(self, name), name, (None,))
+            if len(values) not in (0, *joints):
+                raise InvalidValueError(f"{name} has {len(values)} joints: joint_energy has {joints[0]}")
+            set_field(self, name, values)
+        set_field(self, "contacts", tuple(self.contacts))
+
+
+@dataclass(frozen=True)
+class PlanningStage:
+    """One stage of planning, for people who ask where the time went."""
+
+    name: str
+    seconds: float
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        set_field(self, "seconds", finite(self.seconds, f"seconds of stage {self.name}", "s"))
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """How many candidates were dropped for one reason."""
+
+    reason: str
+    count: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.count < 2**32:
+            raise InvalidValueError(
+                f"count of {self.reason!r} is {self.count}: it must be in 0 .. 4294967295"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class PlanningInfo:
+    """How an answer came about.
+
+    start: joint values (n,) [rad] that were used, empty where there is no start; start_names: their joints.
+    iterations: work done, in the unit of max_iterations; truncated: cut by planning_time [s].
+    """
+
+    planner_id: str = ""
+    seed: int = 0
+    start: FloatArray = field(default_factory=lambda: _zeros(0))
+    start_names: tuple[str, ...] = ()
+    iterations: int = 0
+    truncated: bool = False
+    planning_time: float = 0.0
+    stages: tuple[PlanningStage, ...] = ()
+    rejected: tuple[Rejection, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("seed", "iterations"):
+            if not 0 <= getattr(self, name) < 2**64:
+                raise InvalidValueError(f"{name} is {getattr(self, name)}: it must be in 0 .. 2^64 - 1")
+        set_field(self, "start", read_only(self.start, "start", (None,)))
+        set_field(self, "start_names", tuple(self.start_names))
+        if self.start_names and len(self.start_names) != len(self.start):
+            raise InvalidValueError(
+                f"start has {len(self.start)} values for {len(self.start_names)} joint names"
+            )
+        set_field(self, "planning_time", finite(self.planning_time, "planning_time", "s"))
+        set_field(self, "stages", tuple(self.stages))
+        set_field(self, "rejected", tuple(self.rejected))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlannedMovement:
+    """One step of a program: a movement or a pause.
+
+    kind: a MovementKind. trajectory_id: "" for a pause; trajectory: None where only the id is known.
+    duration [s]. power_mode: the mode to rest in (pauses), "" = STAND_ON_MOTORS. attach, detach: load that is
+    attached or detached when this step has ended; load: what is attached while it runs ("gripper+part",
+    "none"). wait_for: signals of the machines to wait for before; set_signals: to set after, "name=0" clears.
+    """
+
+    kind: str
+    from_station: str = ""
+    to_station: str = ""
+    trajectory_id: str = ""
+    trajectory: JointTrajectory | None = None
+    report: TrajectoryReport = field(default_factory=TrajectoryReport)
+    duration: float = 0.0
+    power_mode: str = ""
+    attach: str = ""
+    detach: str = ""
+    load: str = ""
+    wait_for: tuple[str, ...] = ()
+    set_signals: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        kind = MovementKind(one_of(self.kind, list(MovementKind), "kind of movement"))
+        set_field(self, "kind", kind)
+        set_field(self, "duration", at_least(self.duration, 0.0, "duration of the movement", "s"))
+        set_field(self, "wait_for", tuple(self.wait_for))
+        set_field(self, "set_signals", tuple(self.set_signals))
+        if self.power_mode:
+            one_of(self.power_mode, REST_MODES, "power mode of the pause")
+        if kind is MovementKind.PAUSE:
+            if self.trajectory is not None or self.trajectory_id:
+                raise InvalidValueError("a pause has no trajectory")
+        elif self.power_mode:
+            raise InvalidValueError(f"power_mode is {self.power_mode}: only a pause has one")
+
+    @property
+    def is_pause(self) -> bool:
+        """Whether the robot stands still in this step."""
+        return self.kind == MovementKind.PAUSE

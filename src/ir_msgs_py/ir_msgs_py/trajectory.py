@@ -1,0 +1,213 @@
+"""A joint trajectory as a value, and the one interpolant that everything rests on.
+
+A trajectory means the quintic Hermite polynomial through (q, qd, qdd) of its points; cubic where
+accelerations are missing, linear where velocities are too (as ros2_controllers'
+joint_trajectory_controller does). Checks, proofs, energy and the driver all evaluate this interpolant,
+after times are rounded to nanoseconds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ir_msgs_py.checks import FloatArray, IntArray, set_field
+from ir_msgs_py.errors import JointNamesError, TrajectoryError
+from ir_msgs_py.hermite import evaluate, hermite_coefficients
+
+NS_PER_S = 1_000_000_000
+_ID_LENGTH = 16
+_MAX_TIME_NS = 2**31 * NS_PER_S  # what builtin_interfaces/Duration holds
+
+
+class Samples(NamedTuple):
+    """Motion at M instants, each (M, n): rad, rad/s, rad/s^2, rad/s^3."""
+
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+    qddd: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class JointTrajectory:
+    """Points of n joints at N instants; equal when the content is, bit by bit.
+
+    joint_names: n different names.
+    times_ns: (N,) int64, time from start, strictly increasing, the first not negative [ns].
+    positions, velocities, accelerations: (N, n) [rad, rad/s, rad/s^2]; the last two may be None
+    (accelerations only together with velocities).
+
+    Raises TrajectoryError naming point k and joint j; JointNamesError for the names.
+    """
+
+    joint_names: tuple[str, ...]
+    times_ns: IntArray
+    positions: FloatArray
+    velocities: FloatArray | None = None
+    accelerations: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        names = tuple(self.joint_names)
+        if not names:
+            raise TrajectoryError("the trajectory has no joint names")
+        double = sorted({name for name in names if names.count(name) > 1})
+        if double:
+            raise JointNamesError(f"joint {double[0][:80]!r} is named more than once")
+        times = _checked_times(self.times_ns)
+        shape = (len(times), len(names))
+        if self.velocities is None and self.accelerations is not None:
+            raise TrajectoryError("accelerations are given without velocities")
+        set_field(self, "joint_names", names)
+        set_field(self, "times_ns", times)
+        set_field(self, "positions", _checked_values(self.positions, "position", shape))
+        if self.velocities is not None:
+            set_field(self, "velocities", _checked_values(self.velocities, "velocity", shape))
+        if self.accelerations is not None:
+            set_field(self, "accelerations", _checked_values(self.accelerations, "acceleration", shape))
+
+    @classmethod
+    def from_seconds(
+        cls,
+        joint_names: Sequence[str],
+        times: Any,
+        positions: Any,
+        velocities: Any | None = None,
+        accelerations: Any | None = None,
+    ) -> JointTrajectory:
+        """Round times (N,) [s] to nanoseconds; the rest as in the class."""
+        seconds = np.asarray(times, dtype=np.float64)
+        if seconds.ndim != 1:
+            raise TrajectoryError(f"times have shape {seconds.shape}: they must be (N,)")
+        for k in np.flatnonzero(~np.isfinite(seconds) | (np.abs(seconds) >= _MAX_TIME_NS / NS_PER_S)):
+            raise TrajectoryError(f"point {k}: time {seconds[k]} s is not a duration", point=int(k))
+        return cls(
+            tuple(joint_names),
+            np.rint(seconds * NS_PER_S).astype(np.int64),
+            positions,
+            velocities,
+            accelerations,
+        )
+
+    @property
+    def times(self) -> FloatArray:
+        """Times from start (N,) [s]."""
+        return self.times_ns / NS_PER_S
+
+    @property
+    def duration(self) -> float:
+        """Time from start of the last point [s]."""
+        return float(self.times_ns[-1]) / NS_PER_S
+
+    @cached_property
+    def trajectory_id(self) -> str:
+        """Hash of the exact content: sha256, the first 16 hex characters."""
+        digest = hashlib.sha256()
+        for name in self.joint_names:
+            digest.update(name.encode() + b"\0")
+        digest.update(np.ascontiguousarray(self.times_ns, dtype="<i8").tobytes())
+        for mark, values in ((b"q", self.positions), (b"v", self.velocities), (b"a", self.accelerations)):
+            if values is not None:
+                digest.update(mark + np.ascontiguousarray(values, dtype="<f8").tobytes())
+        return digest.hexdigest()[:_ID_LENGTH]
+
+    def coefficients(self) -> tuple[FloatArray, FloatArray]:
+        """Polynomials c (N-1, n, 6) and durations (N-1,) [s] of the segments.
+
+        q(t) = sum_k c[s, j, k] t^k with t from the start of segment s.
+        """
+        return self._polynomials
+
+    def sample(self, t: Any) -> Samples:
+        """Motion at times t (M,) from start [s]; the robot rests before the first point and after the last.
+
+        At a point that two segments share the later one counts.
+        """
+        instants = np.asarray(t, dtype=np.float64)
+        if instants.ndim != 1 or not np.isfinite(instants).all():
+            raise TrajectoryError("sample times must be a finite array (M,)")
+        coefficients, durations = self._polynomials
+        times = self.times
+        if len(durations) == 0:
+            rest = np.zeros((len(instants), len(self.joint_names)))
+            return Samples(np.repeat(self.positions, len(instants), axis=0), rest, rest, rest)
+        segment = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(durations) - 1)
+        local = np.clip(instants - times[segment], 0.0, durations[segment])
+        samples = Samples(*evaluate(coefficients[segment], local))
+        outside = (instants < times[0]) | (instants > times[-1])
+        for derivative in samples[1:]:
+            derivative[outside] = 0.0
+        return samples
+
+    def reordered(self, joint_names: Sequence[str]) -> JointTrajectory:
+        """Put the same motion into the expected joint order; the names must be the same set."""
+        expected = tuple(joint_names)
+        unknown = [name for name in self.joint_names if name not in expected]
+        missing = [name for name in expected if name not in self.joint_names]
+        if unknown or missing:
+            what = f"unknown joint {unknown[0][:80]!r}" if unknown else f"joint {missing[0]!r} is missing"
+            raise JointNamesError(f"{what}: expected are {', '.join(expected)}")
+        if self.joint_names == expected:
+            return self
+        order = [self.joint_names.index(name) for name in expected]
+        return JointTrajectory(
+            expected,
+            self.times_ns,
+            self.positions[:, order],
+            None if self.velocities is None else self.velocities[:, order],
+            None if self.accelerations is None else self.accelerations[:, order],
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, JointTrajectory):
+            return NotImplemented
+        return self.trajectory_id == other.trajectory_id
+
+    def __hash__(self) -> int:
+        return hash(self.trajectory_id)
+
+    @cached_property
+    def _polynomials(self) -> tuple[FloatArray, FloatArray]:
+        durations = np.diff(self.times_ns) / NS_PER_S
+        coefficients = hermite_coefficients(self.positions, self.velocities, self.accelerations, durations)
+        durations.flags.writeable = False
+        coefficients.flags.writeable = False
+        return coefficients, durations
+
+
+def _checked_times(times_ns: Any) -> IntArray:
+    given = np.asarray(times_ns)
+    if given.ndim != 1:
+        raise TrajectoryError(f"times_ns have shape {given.shape}: they must be (N,)")
+    if given.size == 0:
+        raise TrajectoryError("the trajectory has no points")
+    if not np.issubdtype(given.dtype, np.integer):
+        raise TrajectoryError(f"times_ns are {given.dtype}: they must be whole nanoseconds")
+    times: IntArray = given.astype(np.int64)
+    if times[0] < 0:
+        raise TrajectoryError(f"point 0: time {times[0] / NS_PER_S:.9f} s is negative", point=0)
+    for k in np.flatnonzero(np.diff(times) <= 0)[:1] + 1:
+        raise TrajectoryError(
+            f"point {k}: time {times[k] / NS_PER_S:.9f} s is not after {times[k - 1] / NS_PER_S:.9f} s "
+            "of the point before",
+            point=int(k),
+        )
+    times.flags.writeable = False
+    return times
+
+
+def _checked_values(values: Any, what: str, shape: tuple[int, int]) -> FloatArray:
+    array: FloatArray = np.array(values, dtype=np.float64)
+    if array.shape != shape:
+        raise TrajectoryError(
+            f"{what} values have shape {array.shape}: {shape[0]} points of {shape[1]} joints are {shape}"
+        )
+    for k, j in np.argwhere(~np.isfinite(array))[:1]:
+        raise TrajectoryError(f"point {k} joint {j} {what} is not finite", point=int(k), joint=int(j))
+    array.flags.writeable = False
+    return array
