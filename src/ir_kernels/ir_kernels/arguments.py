@@ -1,0 +1,61 @@
+"""Arrays at the door of the kernels: float64, C-contiguous, right shape, not empty, finite; the message
+names them.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_kernels.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def shaped(name: str, value: Any, *shape: int | None) -> Array:
+    """`value` as a C-contiguous float64 array of that shape (None: any length but 0); values are not
+    looked at.
+
+    Lists and integers are converted. An array that is not contiguous is refused rather than copied behind the
+    caller's back.
+    """
+    if isinstance(value, np.ndarray) and not value.flags.c_contiguous:
+        raise InputError(
+            f"{name} is not C-contiguous (strides {value.strides}): pass np.ascontiguousarray of it"
+        )
+    try:
+        raw = np.asarray(value)
+    except ValueError as error:
+        raise InputError(f"{name} is not an array of numbers: {error}") from error
+    if raw.dtype.kind not in "fiu":
+        raise InputError(f"{name} has dtype {raw.dtype}, expected float64")
+    array: Array = np.asarray(raw, dtype=np.float64)
+    wanted = tuple("N" if length is None else length for length in shape)
+    if array.ndim != len(shape) or any(
+        w is not None and w != g for w, g in zip(shape, array.shape, strict=True)
+    ):
+        raise InputError(f"{name} has shape {array.shape}, expected {wanted}")
+    if array.size == 0:
+        raise InputError(f"{name} is empty: its shape is {array.shape}")
+    return array
+
+
+def finite(name: str, array: Array) -> Array:
+    """`array`, or InputError that says where it is not finite."""
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0].tolist()
+        raise InputError(f"{name}{where} is {array[tuple(where)]}: it has to be finite")
+    return array
+
+
+def checked(name: str, value: Any, *shape: int | None) -> Array:
+    """`shaped` and `finite`."""
+    return finite(name, shaped(name, value, *shape))
+
+
+def same_length(**arrays: Array) -> None:
+    """Raise InputError when batches that belong together have different lengths."""
+    lengths = {name: len(array) for name, array in arrays.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise InputError(f"batches of different length: {told}")

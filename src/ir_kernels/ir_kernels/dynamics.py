@@ -1,0 +1,130 @@
+"""Batched dynamics of a robot with its drives: one class, arrays (N, n) in and out.
+
+tau = H qdd + C qd + g + J_r qdd + F_v qd + F_c sign(qd) - T_cb      (eq. 8)
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ir_kernels import compiled
+from ir_kernels.arguments import Array, checked, finite, same_length, shaped
+from ir_kernels.dynamics_data import STANDARD_GRAVITY, dynamics_data
+from ir_kernels.reference import dynamics as reference
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """Derivatives of a joint quantity y (torque, power): q, qd, qdd are (N,n,n), [k, i, j] = d y_i / d
+    x_j.
+    """
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+class DynamicsModel:
+    """Dynamics of `robot` (see `ir_kernels.data.Robot`) carrying `loads`, mounted at `base_pose` in the
+    world.
+
+    The world's z points up. Torques are those of the motors seen at the joint, Nm. Every method takes and
+    returns C-contiguous (N, n) float64 arrays, N >= 1, and raises InputError naming the argument that is not.
+    """
+
+    def __init__(
+        self,
+        robot: Any,
+        loads: Sequence[Any] = (),
+        base_pose: ArrayLike | None = None,
+        gravity: float = STANDARD_GRAVITY,
+        *,
+        core: Any = compiled.MODULE,
+    ) -> None:
+        pose = np.eye(4) if base_pose is None else base_pose
+        self.data = dynamics_data(robot, loads, pose, gravity)
+        self.n = self.data.n
+        self._core = None if core is None or not hasattr(core, "Dynamics") else core.Dynamics(self.data)
+
+    def _batches(self, **values: ArrayLike) -> list[Array]:
+        arrays = {name: shaped(name, value, None, self.n) for name, value in values.items()}
+        same_length(**arrays)
+        return list(arrays.values())
+
+    def _run(self, function: str, **values: ArrayLike) -> Any:
+        """Call the kernel; only when something in its answer is not finite are the arguments searched for
+        it.
+        """
+        arrays = self._batches(**values)
+        if self._core is None:
+            for name, array in zip(values, arrays, strict=True):
+                finite(name, array)
+            return getattr(reference, function)(self.data, *arrays)
+        result, all_finite = getattr(self._core, function)(*arrays)
+        if not all_finite:
+            for name, array in zip(values, arrays, strict=True):
+                finite(name, array)
+        return result
+
+    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Motor torque (N,n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
+        return np.asarray(self._run("inverse_dynamics", q=q, qd=qd, qdd=qdd))
+
+    def bias(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """C qd + g (N,n) Nm of the arm and its loads, without friction and counterbalance."""
+        return np.asarray(self._run("bias", q=q, qd=qd))
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """Torque (N,n) Nm that holds arm and loads against gravity, without the counterbalance."""
+        return np.asarray(self._run("gravity", q=q))
+
+    def counterbalance(self, q: ArrayLike) -> Array:
+        """What the counterbalance does about each joint's +axis (N,n) Nm; zero for joints without one."""
+        return np.asarray(self._run("counterbalance", q=q))
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """H (N,n,n) kg m^2 of arm and loads, without rotor inertia."""
+        return np.asarray(self._run("mass_matrix", q=q))
+
+    def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+        """Accelerations (N,n) rad/s^2 under motor torques `tau`, with H + J_r, friction and
+        counterbalance.
+        """
+        return np.asarray(self._run("forward_dynamics", q=q, qd=qd, tau=tau))
+
+    def torque_limit(self, qd: ArrayLike) -> Array:
+        """Torque (N,n) Nm available at the speeds |qd|: the envelope of gear and motor."""
+        return np.asarray(self._run("torque_limit", qd=qd))
+
+    def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> Array:
+        """Power (N,n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2; negative while
+        braking.
+        """
+        return np.asarray(self._run("axis_power", qd=qd, tau=tau))
+
+    def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Power (N,n) W each axis takes from the DC bus along a motion: `axis_power` of
+        `inverse_dynamics`.
+        """
+        return self.axis_power(qd, self.inverse_dynamics(q, qd, qdd))
+
+    def torque_gradients(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Gradients:
+        """Derivatives of `inverse_dynamics`, Nm per rad, rad/s, rad/s^2; Coulomb friction counts as
+        constant.
+        """
+        return Gradients(*self._run("torque_gradients", q=q, qd=qd, qdd=qdd))
+
+    def power_gradients(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Gradients:
+        """Derivatives of `drive_power`, W per rad, rad/s, rad/s^2."""
+        torque = self.inverse_dynamics(q, qd, qdd)
+        of = self.torque_gradients(q, qd, qdd)
+        speed = checked("qd", qd, None, self.n)
+        per_torque = (speed + 2.0 * self.data.copper_loss / self.data.gear_ratio**2 * torque)[:, :, None]
+        return Gradients(
+            per_torque * of.q,
+            per_torque * of.qd + torque[:, :, None] * np.eye(self.n),
+            per_torque * of.qdd,
+        )

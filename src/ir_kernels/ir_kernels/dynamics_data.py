@@ -1,0 +1,158 @@
+"""What the dynamics need to know of a robot: the packed, checked arrays that both builds of the kernels read.
+
+Loads are lumped into the last link here, so that a robot with its tool and part costs as much as one without.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_kernels.errors import InputError
+
+Array = NDArray[np.float64]
+STANDARD_GRAVITY = 9.80665  # m/s^2
+
+
+@dataclass(frozen=True)
+class CounterbalanceData:
+    """Gas cylinder between a pivot on the link before `joint` and an eye on the link after it (all in the
+    x-z plane).
+
+    The joint's axis is +y of its frame; pivot and eye are given in that frame at q = 0, as (x, z) in m.
+    """
+
+    joint: int
+    pivot: tuple[float, float]
+    rod_eye: tuple[float, float]
+    piston_area: float
+    gas_volume: float
+    charge_pressure: float
+    rod_length_at_charge: float
+    exponent: float
+
+
+@dataclass(frozen=True)
+class DynamicsData:
+    """Inertias, drives and gravity of an n-joint serial chain; arrays are read-only.
+
+    origin (n,4,4), axis (n,3): the joints, each in the frame of the link before. mass (n,), com (n,3),
+    inertia (n,3,3) about the centre of mass: the moving links 1..n with the loads in the last one. gravity
+    (3,): the acceleration of free fall in the frame of link 0. rotor_inertia, viscous, coulomb,
+    gear_ratio, copper_loss (n,): the drives. envelope_speed (n,K), envelope_torque (n,K+1): torque
+    available, a step down at the first speed.
+    """
+
+    origin: Array
+    axis: Array
+    mass: Array
+    com: Array
+    inertia: Array
+    gravity: Array
+    rotor_inertia: Array
+    viscous: Array
+    coulomb: Array
+    gear_ratio: Array
+    copper_loss: Array
+    envelope_speed: Array
+    envelope_torque: Array
+    counterbalance: CounterbalanceData | None
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.mass)
+
+
+def _frozen(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != shape:
+        raise InputError(f"{name} has shape {array.shape}, expected {shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} holds a value that is not finite")
+    array.setflags(write=False)
+    return array
+
+
+def lump(mass: float, com: Array, inertia: Array, loads: Sequence[Any]) -> tuple[float, Array, Array]:
+    """Mass, centre of mass and inertia about it of a link with loads bolted on (parallel axis theorem)."""
+    masses = [float(mass), *(float(load.mass) for load in loads)]
+    centres = [np.asarray(com, float), *(np.asarray(load.com, float) for load in loads)]
+    inertias = [np.asarray(inertia, float), *(np.asarray(load.inertia, float) for load in loads)]
+    for load, own in zip(loads, masses[1:], strict=True):
+        if not (np.isfinite(own) and own >= 0.0):
+            raise InputError(
+                f"load {load.name!r} has a mass of {own} kg: it has to be finite and not negative"
+            )
+    total = sum(masses)
+    if total == 0.0:
+        return 0.0, centres[0], inertias[0]
+    centre = np.asarray(sum(m * c for m, c in zip(masses, centres, strict=True)) / total)
+    lumped = np.zeros((3, 3))
+    for m, c, own_inertia in zip(masses, centres, inertias, strict=True):
+        d = c - centre
+        lumped += own_inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
+    return total, centre, lumped
+
+
+def _counterbalance(data: Any) -> CounterbalanceData | None:
+    if data is None:
+        return None
+    packed = CounterbalanceData(
+        joint=int(data.joint),
+        pivot=(float(data.pivot[0]), float(data.pivot[1])),
+        rod_eye=(float(data.rod_eye[0]), float(data.rod_eye[1])),
+        piston_area=float(data.piston_area),
+        gas_volume=float(data.gas_volume),
+        charge_pressure=float(data.charge_pressure),
+        rod_length_at_charge=float(data.rod_length_at_charge),
+        exponent=float(data.exponent),
+    )
+    longest = float(np.hypot(*packed.pivot) + np.hypot(*packed.rod_eye))
+    if packed.gas_volume - packed.piston_area * (longest - packed.rod_length_at_charge) <= 0.0:
+        raise InputError(
+            f"counterbalance: at its longest ({longest:.3f} m) the rod leaves no volume for the gas "
+            f"({packed.gas_volume} m^3 at {packed.rod_length_at_charge} m)"
+        )
+    return packed
+
+
+def dynamics_data(robot: Any, loads: Sequence[Any], base_pose: Any, gravity: float) -> DynamicsData:
+    """Pack a robot (see `ir_kernels.data.Robot`), its loads and its mounting.
+
+    `base_pose` (4,4): pose of link 0 in the world, whose z points up. `gravity` [m/s^2]. Raises InputError.
+    """
+    n = len(robot.joint_axis)
+    mass = np.array(robot.link_mass[1:], float)
+    com = np.array(robot.link_com[1:], float)
+    inertia = np.array(robot.link_inertia[1:], float)
+    if mass.shape != (n,) or (mass < 0.0).any():
+        raise InputError(f"robot.link_mass has to be {n + 1} masses in kg, none negative")
+    mass[-1], com[-1], inertia[-1] = lump(mass[-1], com[-1], inertia[-1], loads)
+    pose = _frozen("base_pose", base_pose, (4, 4))
+    knots = np.shape(robot.envelope_speed)[-1]
+    data = DynamicsData(
+        origin=_frozen("robot.joint_origin", robot.joint_origin, (n, 4, 4)),
+        axis=_frozen("robot.joint_axis", robot.joint_axis, (n, 3)),
+        mass=_frozen("robot.link_mass", mass, (n,)),
+        com=_frozen("robot.link_com", com, (n, 3)),
+        inertia=_frozen("robot.link_inertia", inertia, (n, 3, 3)),
+        gravity=_frozen("gravity", pose[:3, :3].T @ np.array([0.0, 0.0, -float(gravity)]), (3,)),
+        rotor_inertia=_frozen("robot.reflected_inertia", robot.reflected_inertia, (n,)),
+        viscous=_frozen("robot.friction_viscous", robot.friction_viscous, (n,)),
+        coulomb=_frozen("robot.friction_coulomb", robot.friction_coulomb, (n,)),
+        gear_ratio=_frozen("robot.gear_ratio", robot.gear_ratio, (n,)),
+        copper_loss=_frozen("robot.copper_loss", robot.copper_loss, (n,)),
+        envelope_speed=_frozen("robot.envelope_speed", robot.envelope_speed, (n, knots)),
+        envelope_torque=_frozen("robot.envelope_torque", robot.envelope_torque, (n, knots + 1)),
+        counterbalance=_counterbalance(robot.counterbalance),
+    )
+    if (data.gear_ratio == 0.0).any():
+        raise InputError("robot.gear_ratio holds a zero")
+    if (np.diff(data.envelope_speed, axis=1) <= 0.0).any() or (data.envelope_speed < 0.0).any():
+        raise InputError("robot.envelope_speed has to grow from speed to speed and not be negative")
+    if (data.envelope_torque <= 0.0).any():
+        raise InputError("robot.envelope_torque has to be positive")
+    return data

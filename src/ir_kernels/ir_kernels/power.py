@@ -1,0 +1,132 @@
+"""From joint torques to joules at the mains: axis power, the common DC bus, energy of a sampled trajectory.
+
+The axes of one controller share a DC bus that the supply only feeds (it rectifies). What braking axes give
+back goes to the other axes, then into the capacitor; the rest is burnt in the brake resistor.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ir_kernels import compiled
+from ir_kernels.arguments import Array, checked, finite
+from ir_kernels.errors import InputError
+from ir_kernels.reference import power as reference
+
+Regeneration = Literal["shared", "none", "fed_back"]
+REGENERATIONS: tuple[Regeneration, ...] = ("shared", "none", "fed_back")
+
+
+@dataclass(frozen=True)
+class DcBusParameters:
+    """What the bus can do with braking energy.
+
+    capacity_energy [J]: what fits into the capacitor between rest voltage and brake chopper, C (U_on^2 -
+    U_0^2) / 2. regeneration: "shared" (the surplus beyond the capacitor is burnt), "none" (every axis'
+    braking energy is burnt, nothing is shared or stored), "fed_back" (the surplus beyond the capacitor
+    returns to the mains).
+    """
+
+    capacity_energy: float
+    regeneration: Regeneration = "shared"
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.capacity_energy) and self.capacity_energy >= 0.0):
+            raise InputError(
+                f"capacity_energy is {self.capacity_energy} J: it has to be finite and not negative"
+            )
+        if self.regeneration not in REGENERATIONS:
+            raise InputError(f"regeneration is {self.regeneration!r}: known are {', '.join(REGENERATIONS)}")
+
+
+@dataclass(frozen=True)
+class DcBus:
+    """Step by step: mains (N,) W drawn for the axes, burnt (N,) W in the resistor, stored (N,) J after the
+    step.
+    """
+
+    mains: Array
+    burnt: Array
+    stored: Array
+
+
+@dataclass(frozen=True)
+class DriveEnergy:
+    """Where the drive energy of a trajectory goes, J: mains = sum(axes) + burnt + capacitor_change.
+
+    axes (n,): signed energy each axis took from the bus. peak [W]: the largest mains power of a step.
+    """
+
+    mains: float
+    axes: Array
+    burnt: float
+    capacitor_change: float
+    peak: float
+
+
+def _steps(dt: ArrayLike, N: int) -> Array:
+    steps = checked("dt", np.broadcast_to(np.asarray(dt, float), (N,)).copy() if np.ndim(dt) == 0 else dt, N)
+    if (steps <= 0.0).any():
+        raise InputError(f"dt holds {steps.min()} s: steps have to be longer than 0")
+    return steps
+
+
+def dc_bus(
+    axis_power: ArrayLike,
+    dt: ArrayLike,
+    parameters: DcBusParameters,
+    stored: float = 0.0,
+    *,
+    core: Any = compiled.MODULE,
+) -> DcBus:
+    """Run the DC bus over N steps in which the axes take constant powers `axis_power` (N,n) W.
+
+    `dt`: length of the steps, one number or (N,), s. `stored` [J]: in the capacitor (above its rest
+    voltage) before the first step. In every step, with P the signed sum of the axes:
+
+    - "shared": demand P > 0 empties the capacitor first, the mains give the rest; surplus P < 0 fills it
+    first, the
+      rest is burnt. mains >= 0.
+    - "fed_back": the same, but the rest of the surplus returns to the mains: mains < 0, burnt = 0.
+    - "none": mains = sum of the positive axes, burnt = sum of the negative ones; the capacitor stays as it
+    is.
+
+    Always mains dt = (sum of axes + burnt) dt + change of stored, and 0 <= stored <= capacity_energy. What
+    is left in the capacitor at the end is not credited to anyone. N may be 1: a driver hands `stored` on
+    from call to call. Raises InputError.
+    """
+    power = checked("axis_power", axis_power, None, None)
+    steps = _steps(dt, len(power))
+    if not 0.0 <= stored <= parameters.capacity_energy:
+        raise InputError(
+            f"stored is {stored} J: it has to be within 0 and capacity_energy {parameters.capacity_energy} J"
+        )
+    scan = reference.dc_bus if core is None or not hasattr(core, "dc_bus") else core.dc_bus
+    result = scan(power, steps, parameters.capacity_energy, parameters.regeneration, float(stored))
+    for array in result:
+        array.setflags(write=False)
+    return DcBus(*result)
+
+
+def drive_energy(
+    axis_power: ArrayLike, dt: ArrayLike, parameters: DcBusParameters, stored: float = 0.0
+) -> DriveEnergy:
+    """Drive energy of N steps with constant axis powers (N,n) W; the base load of the controller is not in
+    it.
+
+    Sample the power at the middles of the steps and the error falls with dt^2. Raises InputError.
+    """
+    power = checked("axis_power", axis_power, None, None)
+    steps = _steps(dt, len(power))
+    bus = dc_bus(power, steps, parameters, stored)
+    axes = finite("axis_power", steps @ power)
+    axes.setflags(write=False)
+    return DriveEnergy(
+        mains=float(steps @ bus.mains),
+        axes=axes,
+        burnt=float(steps @ bus.burnt),
+        capacitor_change=float(bus.stored[-1] - stored),
+        peak=float(bus.mains.max()),
+    )

@@ -1,0 +1,207 @@
+"""Inverse and forward dynamics of a serial chain, written for reading: the oracle of the compiled core.
+
+tau = H(q) qdd + h(q, qd) + J_r qdd + F_v qd + F_c sign(qd) - T_cb(q)      (eq. 8; design: gravity is part
+of h)
+
+Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980), composite bodies for H (Walker, Orin 1982).
+Arrays q, qd, qdd, tau are (N, n); rad, rad/s, rad/s^2, Nm.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ir_kernels.dynamics_data import Array, CounterbalanceData, DynamicsData
+from ir_kernels.reference.vectors import (
+    Matrix,
+    Number,
+    Vector,
+    add,
+    apply,
+    cross,
+    joint_rotation,
+    matrix,
+    scale,
+    transpose,
+    vector,
+)
+
+
+def rigid_body_torque(
+    data: DynamicsData,
+    sin: Sequence[Number],
+    cos: Sequence[Number],
+    qd: Sequence[Number],
+    qdd: Sequence[Number],
+    with_gravity: bool = True,
+) -> list[Number]:
+    """H qdd + h per joint, for any kind of number (arrays, complex steps, intervals)."""
+    zero = qd[0] * 0.0
+    spin: Vector = (zero, zero, zero)
+    spin_rate: Vector = (zero, zero, zero)
+    lift = vector(-data.gravity if with_gravity else 0.0 * data.gravity)
+    acceleration: Vector = (zero + lift[0], zero + lift[1], zero + lift[2])
+    rotations: list[Matrix] = []
+    forces: list[Vector] = []
+    moments: list[Vector] = []
+    for i in range(data.n):
+        axis, arm, com = vector(data.axis[i]), vector(data.origin[i, :3, 3]), vector(data.com[i])
+        R = joint_rotation(data.origin[i], data.axis[i], sin[i], cos[i])
+        to_link = transpose(R)
+        acceleration = add(acceleration, add(cross(spin_rate, arm), cross(spin, cross(spin, arm))))
+        acceleration = apply(to_link, acceleration)
+        carried = apply(to_link, spin)
+        relative = scale(axis, qd[i])
+        spin_rate = add(apply(to_link, spin_rate), add(scale(axis, qdd[i]), cross(carried, relative)))
+        spin = add(carried, relative)
+        of_com = add(acceleration, add(cross(spin_rate, com), cross(spin, cross(spin, com))))
+        force = scale(of_com, float(data.mass[i]))
+        inertia = matrix(data.inertia[i])
+        moment = add(apply(inertia, spin_rate), cross(spin, apply(inertia, spin)))
+        rotations.append(R)
+        forces.append(force)
+        moments.append(add(moment, cross(com, force)))
+    torque: list[Number] = [zero] * data.n
+    for i in reversed(range(data.n)):
+        axis, arm = vector(data.axis[i]), vector(data.origin[i, :3, 3])
+        torque[i] = axis[0] * moments[i][0] + axis[1] * moments[i][1] + axis[2] * moments[i][2]
+        if i > 0:
+            force = apply(rotations[i], forces[i])
+            forces[i - 1] = add(forces[i - 1], force)
+            moments[i - 1] = add(moments[i - 1], add(apply(rotations[i], moments[i]), cross(arm, force)))
+    return torque
+
+
+def counterbalance_torque(
+    data: CounterbalanceData, sin: Number, cos: Number, sqrt: Any, power: Any
+) -> Number:
+    """Torque about the joint's +axis (positive lowers the arm), for any kind of number with its sqrt and
+    power.
+    """
+    (bx, bz), (ex, ez) = data.pivot, data.rod_eye
+    px, pz = cos * ex + sin * ez, cos * ez - sin * ex
+    length = sqrt(
+        cos * (-2.0 * (bx * ex + bz * ez))
+        + sin * (-2.0 * (bx * ez - bz * ex))
+        + (bx * bx + bz * bz + ex * ex + ez * ez)
+    )  # |P - B| with |P| constant
+    volume = (length - data.rod_length_at_charge) * (-data.piston_area) + data.gas_volume
+    pressure = power(volume * (1.0 / data.gas_volume), -data.exponent) * data.charge_pressure
+    return pressure * data.piston_area * (pz * bx - px * bz) * power(length, -1.0)
+
+
+def counterbalance(data: DynamicsData, q: Array) -> Array:
+    """What the counterbalance does about each joint's +axis (N,n); zero where there is none."""
+    torque = np.zeros(q.shape, q.dtype)
+    if data.counterbalance is not None:
+        j = data.counterbalance.joint
+        torque[:, j] = counterbalance_torque(
+            data.counterbalance, np.sin(q[:, j]), np.cos(q[:, j]), np.sqrt, np.power
+        )
+    return torque
+
+
+def rigid(data: DynamicsData, q: Array, qd: Array, qdd: Array, with_gravity: bool = True) -> Array:
+    """H qdd + h (N,n), the arm alone."""
+    columns = rigid_body_torque(
+        data, list(np.sin(q).T), list(np.cos(q).T), list(qd.T), list(qdd.T), with_gravity
+    )
+    return np.stack(columns, axis=1)
+
+
+def friction(data: DynamicsData, qd: Array) -> Array:
+    """F_v qd + F_c sign(qd), zero at rest."""
+    return data.viscous * qd + data.coulomb * np.sign(qd.real)
+
+
+def inverse_dynamics(data: DynamicsData, q: Array, qd: Array, qdd: Array) -> Array:
+    """Torque of the motors, seen at the joint, with rotor inertia and friction, less the counterbalance."""
+    arm = rigid(data, q, qd, qdd)
+    return arm + data.rotor_inertia * qdd + friction(data, qd) - counterbalance(data, q)
+
+
+def gravity(data: DynamicsData, q: Array) -> Array:
+    """Torque that holds the arm against gravity, without the counterbalance."""
+    zero = np.zeros_like(q)
+    return rigid(data, q, zero, zero)
+
+
+def bias(data: DynamicsData, q: Array, qd: Array) -> Array:
+    """h = C qd + g of the arm."""
+    return rigid(data, q, qd, np.zeros_like(q))
+
+
+def mass_matrix(data: DynamicsData, q: Array) -> Array:
+    """H (N,n,n) without rotor inertia, by composite bodies in the frame of link 0."""
+    N, n = q.shape
+    R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
+    axes, origins = np.empty((n, N, 3)), np.empty((n, N, 3))
+    masses, moments, inertias = np.empty((n, N)), np.empty((n, N, 3)), np.empty((n, N, 3, 3))
+    sin, cos = np.sin(q), np.cos(q)
+    for i in range(n):
+        p = p + R @ data.origin[i, :3, 3]
+        local = joint_rotation(data.origin[i], data.axis[i], sin[:, i], cos[:, i])
+        R = R @ np.moveaxis(np.array(local), 2, 0)
+        com = p + R @ data.com[i]
+        axes[i], origins[i] = R @ data.axis[i], p
+        masses[i], moments[i] = data.mass[i], data.mass[i] * com
+        inertias[i] = R @ data.inertia[i] @ np.swapaxes(R, 1, 2) + data.mass[i] * _about_origin(com)
+    H = np.empty((N, n, n))
+    for i in reversed(range(n)):
+        if i < n - 1:  # the composite of all bodies from i outwards, about the origin of link 0
+            masses[i], moments[i] = masses[i] + masses[i + 1], moments[i] + moments[i + 1]
+            inertias[i] = inertias[i] + inertias[i + 1]
+        # momentum of the composite turning about axis i with unit speed
+        velocity = np.cross(origins[i], axes[i])
+        linear = masses[i][:, None] * velocity + np.cross(axes[i], moments[i])
+        angular = np.einsum("nij,nj->ni", inertias[i], axes[i]) + np.cross(moments[i], velocity)
+        for j in range(i + 1):
+            about_j = angular - np.cross(origins[j], linear)
+            H[:, i, j] = H[:, j, i] = np.einsum("ni,ni->n", axes[j], about_j)
+    return H
+
+
+def _about_origin(d: Array) -> Array:
+    """|d|^2 1 - d d' (N,3,3)."""
+    squared = np.einsum("ni,ni->n", d, d)[:, None, None] * np.eye(3)
+    return np.asarray(squared - d[:, :, None] * d[:, None, :])
+
+
+def forward_dynamics(data: DynamicsData, q: Array, qd: Array, tau: Array) -> Array:
+    """Accelerations under the motor torques `tau`: (H + J_r) qdd = tau - h - friction + T_cb."""
+    effort = tau - bias(data, q, qd) - friction(data, qd) + counterbalance(data, q)
+    H = mass_matrix(data, q) + np.diag(data.rotor_inertia)
+    return np.asarray(np.linalg.solve(H, effort[:, :, None])[:, :, 0])
+
+
+def torque_limit(data: DynamicsData, qd: Array) -> Array:
+    """Torque available at the speed |qd| (N,n)."""
+    limit = np.empty_like(qd)
+    for j in range(data.n):
+        speeds, torques = data.envelope_speed[j], data.envelope_torque[j]
+        speed = np.abs(qd[:, j])
+        limit[:, j] = np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
+    return limit
+
+
+def axis_power(data: DynamicsData, qd: Array, tau: Array) -> Array:
+    """Power each axis takes from the DC bus (N,n) W: mechanical plus copper losses, negative while
+    braking.
+    """
+    return tau * qd + data.copper_loss * (tau / data.gear_ratio) ** 2
+
+
+STEP = 1e-100  # of the complex steps: so small that no digit is lost
+
+
+def torque_gradients(data: DynamicsData, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+    """d tau_i / d q_j, d qd_j, d qdd_j, each (N,n,n) [i, j], by complex steps: exact to rounding."""
+    N, n = q.shape
+    of_q, of_qd = np.empty((N, n, n)), np.empty((N, n, n))
+    for j in range(n):
+        step = np.zeros((1, n), complex)
+        step[0, j] = STEP * 1j
+        of_q[:, :, j] = inverse_dynamics(data, q + step, qd, qdd).imag / STEP
+        of_qd[:, :, j] = inverse_dynamics(data, q, qd + step, qdd).imag / STEP
+    return of_q, of_qd, mass_matrix(data, q) + np.diag(data.rotor_inertia)

@@ -1,0 +1,118 @@
+"""Closed-form inverse kinematics of a 6R arm with a spherical wrist: all branches, all turns (Pieper 1968).
+
+Branch numbers 0..7: +4 where the arm reaches backwards over its base, +2 for the other elbow, +1 for the
+other wrist.
+"""
+
+from itertools import product
+
+import numpy as np
+
+from ir_kernels.arguments import Array
+from ir_kernels.data import BoolArray, IntArray
+from ir_kernels.reference.chain import axis_rotation
+from ir_kernels.wrist_geometry import WristGeometry
+
+REACH_TOLERANCE = 1e-10  # m: how far out of reach still counts as stretched
+LIMIT_TOLERANCE = 1e-10  # rad: how far beyond a limit still counts as on it
+SINGULAR_WRIST = 1e-10  # sine of the wrist angle below which only q4 +- q6 is determined
+
+
+def arm_branches(geometry: WristGeometry, centre: Array) -> tuple[Array, BoolArray]:
+    """q1, q2, q3 (N,4,3) for wrist centres (N,3) in the frame of link 0, and which exist (N,4); branches
+    00 01 10 11.
+
+    Where the arm is stretched both elbows are the same: only the first exists. On axis 1 any q1 serves: 0
+    is taken.
+    """
+    x, y, z = geometry.plane @ (centre - geometry.axis_point).T
+    N = len(centre)
+    q, exists = np.empty((N, 4, 3)), np.empty((N, 4), bool)
+    radius = np.hypot(x, y)
+    d = geometry.lateral
+    beyond = radius < abs(d) - REACH_TOLERANCE
+    forward = np.sqrt(np.maximum(radius**2 - d**2, 0.0))
+    upper, fore = abs(geometry.upper_arm), abs(geometry.forearm)
+    opening = np.angle(np.conj(geometry.upper_arm) * geometry.forearm)
+    for back in (0, 1):
+        reach = geometry.forward * (-forward if back else forward)
+        q1 = np.where(radius > 0.0, np.arctan2(y, x), 0.0) - np.arctan2(d, reach)
+        target = (z + 1j * reach) - geometry.shoulder
+        distance = np.abs(target)
+        cosine = (distance**2 - upper**2 - fore**2) / (2.0 * upper * fore)
+        stretched = (distance > upper + fore) | (distance < abs(upper - fore))
+        reachable = (distance <= upper + fore + REACH_TOLERANCE) & (
+            distance >= abs(upper - fore) - REACH_TOLERANCE
+        )
+        bend = np.where(stretched, np.where(cosine > 0.0, 0.0, np.pi), np.arccos(np.clip(cosine, -1.0, 1.0)))
+        for low in (0, 1):
+            turn = (-bend if low else bend) - opening
+            elbow = geometry.upper_arm + geometry.forearm * np.exp(1j * turn)
+            branch = 2 * back + low
+            q[:, branch, 0] = q1
+            q[:, branch, 1] = np.angle(target * np.conj(elbow))
+            q[:, branch, 2] = geometry.elbow_sign * turn
+            exists[:, branch] = reachable & ~beyond & ~(stretched & bool(low))
+    return q, exists
+
+
+def wrist_branches(
+    geometry: WristGeometry, arm: Array, hand: Array, free_q4: float
+) -> tuple[Array, BoolArray]:
+    """q4, q5, q6 (N,2,3) for arm angles (N,3) and the hand's rotation (N,3,3) in link 0, and which exist
+    (N,2).
+
+    Where axes 4 and 6 are parallel only their sum is determined: one representative with q4 = `free_q4`
+    exists.
+    """
+    z = geometry.axis
+    before = axis_rotation(z[0], arm[:, 0]) @ axis_rotation(z[1], arm[:, 1]) @ axis_rotation(z[2], arm[:, 2])
+    W = np.swapaxes(before, 1, 2) @ hand @ geometry.hand[:3, :3].T  # = exp(z4 q4) exp(z5 q5) exp(z6 q6)
+    e3 = np.cross(z[3], z[4])
+    pointing = W @ z[5]
+    c, a, b = pointing @ z[3], pointing @ z[4], pointing @ e3
+    s = np.hypot(a, b)
+    singular = s < SINGULAR_WRIST
+    q, exists = np.empty((len(arm), 2, 3)), np.empty((len(arm), 2), bool)
+    for flip in (0, 1):
+        sign = -1.0 if flip else 1.0
+        q4 = np.where(singular, free_q4, np.arctan2(sign * a, -sign * b))
+        q5 = np.arctan2(sign * s, c) - geometry.wrist_zero
+        rest = np.swapaxes(axis_rotation(z[3], q4) @ axis_rotation(z[4], q5), 1, 2) @ W  # = exp(z6 q6)
+        turned = rest @ z[4]
+        q[:, flip] = np.stack([q4, q5, np.arctan2(turned @ np.cross(z[5], z[4]), turned @ z[4])], axis=1)
+        exists[:, flip] = ~(singular & bool(flip))
+    return q, exists
+
+
+def turns(angle: float, low: float, high: float) -> list[float]:
+    """All values angle + 2 pi k within [low, high], ascending; within LIMIT_TOLERANCE of a limit counts as
+    on it.
+    """
+    first = int(np.ceil((low - LIMIT_TOLERANCE - angle) / (2.0 * np.pi)))
+    last = int(np.floor((high + LIMIT_TOLERANCE - angle) / (2.0 * np.pi)))
+    return [min(max(angle + 2.0 * np.pi * k, low), high) for k in range(first, last + 1)]
+
+
+def solve(
+    geometry: WristGeometry, hand: Array, position_min: Array, position_max: Array
+) -> tuple[Array, IntArray, IntArray]:
+    """All q (M,6) for poses of link 6 (N,4,4) in link 0, with pose index (M,) and branch (M,), sorted by
+    pose, branch, q.
+    """
+    centre = hand[:, :3, 3] + hand[:, :3, :3] @ geometry.wrist_in_hand
+    arm, arm_exists = arm_branches(geometry, centre)
+    free_q4 = float(np.clip(0.0, position_min[3], position_max[3]))
+    found: list[tuple[int, int, tuple[float, ...]]] = []
+    for high in range(4):
+        wrist, wrist_exists = wrist_branches(geometry, arm[:, high], hand[:, :3, :3], free_q4)
+        for flip in (0, 1):
+            for k in np.flatnonzero(arm_exists[:, high] & wrist_exists[:, flip]):
+                angles = [*arm[k, high], *wrist[k, flip]]
+                ranges = zip(angles, position_min, position_max, strict=True)
+                all_turns = [turns(float(v), float(lo), float(hi)) for v, lo, hi in ranges]
+                found.extend((int(k), 2 * high + flip, q) for q in product(*all_turns))
+    found.sort()
+    q_all = np.array([entry[2] for entry in found]).reshape(-1, 6)
+    index = np.array([entry[0] for entry in found], np.int64)
+    return q_all, index, np.array([entry[1] for entry in found], np.int64)

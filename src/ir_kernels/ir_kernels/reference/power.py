@@ -1,0 +1,28 @@
+"""The drives' common DC bus, step by step: the oracle of the compiled scan."""
+
+import numpy as np
+
+from ir_kernels.dynamics_data import Array
+
+
+def dc_bus(
+    axis_power: Array, dt: Array, capacity: float, regeneration: str, stored: float
+) -> tuple[Array, Array, Array]:
+    """Mains W, burnt W and stored J after each of the N steps; see `ir_kernels.power.dc_bus`."""
+    N = len(axis_power)
+    mains, burnt, level = np.empty(N), np.zeros(N), np.empty(N)
+    for k in range(N):
+        if regeneration == "none":
+            mains[k] = sum(max(p, 0.0) for p in axis_power[k])
+            burnt[k] = sum(max(-p, 0.0) for p in axis_power[k])
+        else:
+            net = float(sum(axis_power[k])) * dt[k]  # J that the axes want in this step
+            moved = min(net, stored) if net > 0.0 else -min(-net, capacity - stored)
+            stored -= moved
+            rest = net - moved  # J that the capacitor could not give or take
+            if rest < 0.0 and regeneration == "shared":
+                burnt[k] = -rest / dt[k]
+                rest = 0.0
+            mains[k] = rest / dt[k]
+        level[k] = stored
+    return mains, burnt, level

@@ -1,0 +1,98 @@
+"""Constants of a 6R arm with a spherical wrist, derived from its chain; anything else is refused with the
+reason.
+
+At q = 0 and in the frame of link 0 the joints are lines: points o_i, directions z_i. The closed form
+(Pieper 1968) needs z1 _|_ z2, z2 || z3 (a planar arm behind a turning base), z4 _|_ z5 _|_ z6 and axes 4,
+5, 6 meeting in one point, the wrist centre. Arm quantities are complex numbers in the plane normal to z2:
+z + i x, with z along z1 and x = z2 x z1, because a turn by q about z2 multiplies them by exp(i q).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_kernels.arguments import Array
+from ir_kernels.chain import Chain
+from ir_kernels.errors import InputError
+
+POINT_TOLERANCE = 1e-9  # m: by how much axes 4, 5, 6 may miss each other
+ANGLE_TOLERANCE = 1e-9  # of the scalar products that have to vanish
+
+
+@dataclass(frozen=True)
+class WristGeometry:
+    """See the module. All in the frame of link 0 at q = 0; arrays are read-only."""
+
+    axis: Array  # (6,3) z_i
+    plane: Array  # (3,3) rows x, y = z2, z = z1
+    axis_point: Array  # (3,) foot of axis 1: a point on it
+    lateral: float  # m, distance of the wrist centre from axis 1 along z2
+    forward: float  # +1 or -1: the side of axis 1, along x, to which the arm reaches forwards at q1 = 0
+    shoulder: complex  # axis 2 seen from axis_point
+    upper_arm: complex  # from axis 2 to axis 3
+    forearm: complex  # from axis 3 to the wrist centre
+    elbow_sign: float  # +1 where z3 = z2, -1 where z3 = -z2
+    wrist_zero: float  # rad, angle from z4 to z6 about z5
+    hand: Array  # (4,4) pose of link 6 at q = 0
+    wrist_in_hand: Array  # (3,) wrist centre in the frame of link 6
+
+
+def _meeting_point(o: Array, z: Array) -> Array:
+    """Point nearest to the three lines, or InputError when it isn't on each of them."""
+    normal = np.eye(3) - z[:, :, None] * z[:, None, :]
+    point = np.linalg.lstsq(normal.reshape(-1, 3), np.einsum("kij,kj->ki", normal, o).ravel(), rcond=None)[0]
+    miss = float(np.linalg.norm(np.einsum("kij,kj->ki", normal, point - o), axis=1).max())
+    if miss > POINT_TOLERANCE:
+        raise InputError(
+            f"chain: the wrist is not spherical, its axes miss a common point by {miss:.3g} m "
+            f"(at most {POINT_TOLERANCE} m)"
+        )
+    return np.asarray(point)
+
+
+def wrist_geometry(chain: Chain) -> WristGeometry:
+    """Derive the constants of `chain`; InputError names the condition that it breaks, with the value."""
+    if chain.n != 6:
+        raise InputError(f"chain has {chain.n} joints, the closed form needs 6")
+    to_base = np.linalg.inv(chain.base_pose)
+    links = to_base @ chain.link_poses(np.zeros((1, 6)))[0]
+    frames = links[1:]
+    z = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.joint_axis)
+    o = frames[:, :3, 3]
+    conditions = {
+        "axes 1 and 2 are not perpendicular: z1.z2": z[0] @ z[1],
+        "axes 2 and 3 are not parallel: |z2 x z3|": np.linalg.norm(np.cross(z[1], z[2])),
+        "axes 4 and 5 are not perpendicular: z4.z5": z[3] @ z[4],
+        "axes 5 and 6 are not perpendicular: z5.z6": z[4] @ z[5],
+    }
+    for sentence, value in conditions.items():
+        if abs(value) > ANGLE_TOLERANCE:
+            raise InputError(f"chain: {sentence} = {value:.3g} (at most {ANGLE_TOLERANCE})")
+    centre = _meeting_point(o[3:], z[3:])
+    plane = np.stack([np.cross(z[1], z[0]), z[1], z[0]])
+    foot = o[0] + z[0] * (z[0] @ (o[1] - o[0]))
+
+    def planar(vector: Array) -> complex:
+        return complex(plane[2] @ vector, plane[0] @ vector)
+
+    for array in (z, plane, foot):
+        array.setflags(write=False)
+    shoulder, upper_arm, forearm = planar(o[1] - foot), planar(o[2] - o[1]), planar(centre - o[2])
+    if abs(upper_arm) < POINT_TOLERANCE or abs(forearm) < POINT_TOLERANCE:
+        raise InputError(
+            f"chain: upper arm of {abs(upper_arm):.3g} m or forearm of {abs(forearm):.3g} m vanishes"
+        )
+    return WristGeometry(
+        axis=z,
+        plane=plane,
+        axis_point=foot,
+        lateral=float(z[1] @ (centre - foot)),
+        forward=-1.0 if shoulder.imag < -POINT_TOLERANCE else 1.0,
+        shoulder=shoulder,
+        upper_arm=upper_arm,
+        forearm=forearm,
+        elbow_sign=float(np.sign(z[1] @ z[2])),
+        wrist_zero=float(np.arctan2(z[4] @ np.cross(z[3], z[5]), z[3] @ z[5])),
+        hand=frames[5],
+        wrist_in_hand=frames[5, :3, :3].T @ (centre - frames[5, :3, 3]),
+    )
