@@ -1,0 +1,43 @@
+"""How much work a request may cost: counted in certified edges, with time only as a ceiling, and a way to stop it.
+
+Counting work keeps answers reproducible; a clock that cuts an answer short makes it say `truncated`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ir_planner.errors import CancelledError
+
+Clock = Callable[[], float]
+
+
+@dataclass
+class Budget:
+    """Work left for one request.
+
+    `max_iterations`: edges that searches may certify. `deadline` [s] on `clock`. `cancelled` is asked at every step.
+    """
+
+    max_iterations: int
+    deadline: float
+    clock: Clock
+    cancelled: Callable[[], bool] = lambda: False
+    iterations: int = field(default=0, init=False)
+    truncated: bool = field(default=False, init=False)
+
+    def spend(self, edges: int) -> None:
+        """Count work. Raises CancelledError when the caller asked to stop."""
+        self.iterations += edges
+        self.check()
+
+    def check(self) -> None:
+        """Raise CancelledError when the caller asked to stop."""
+        if self.cancelled():
+            raise CancelledError("stopped on request")
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether searches must end: by work, or cut by time (then `truncated`)."""
+        if self.clock() >= self.deadline:
+            self.truncated = True
+        return self.truncated or self.iterations >= self.max_iterations

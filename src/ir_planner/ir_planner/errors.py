@@ -1,0 +1,52 @@
+"""What can go wrong in the planner, as one tree.
+
+PlannerError
+├── RequestError         a request that makes no sense: status code and a sentence with value, bound and unit
+│   └── UnknownNameError a name that nobody has; the sentence lists the known ones
+├── TimingError          no time law exists: a joint's torque does not carry the arm along this path
+└── CancelledError       the caller asked to stop
+
+A plan that was looked for and not found is no error: it is a result with a status.
+"""
+
+from collections.abc import Iterable
+
+from ir_msgs_py.status import Status, StatusCode
+
+
+class PlannerError(Exception):
+    """Root of everything that ir_planner raises."""
+
+
+class RequestError(PlannerError):
+    """A request that makes no sense; answered with `code` and the sentence."""
+
+    def __init__(self, code: StatusCode, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+    @property
+    def status(self) -> Status:
+        """The answer."""
+        return Status(self.code, str(self))
+
+
+class UnknownNameError(RequestError):
+    """A name that is not known."""
+
+    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+        shown = ascii(name) if len(name) <= 60 else ascii(name[:57]) + "..."
+        listed = ", ".join(known) or "none"
+        super().__init__(StatusCode.INVALID_OBJECT_NAME, f"{what} {shown} is unknown: known are {listed}")
+
+
+class TimingError(PlannerError):
+    """A path that can't be driven however slowly; `joint` is the one that can't carry on."""
+
+    def __init__(self, sentence: str, joint: int) -> None:
+        super().__init__(sentence)
+        self.joint = joint
+
+
+class CancelledError(PlannerError):
+    """The caller asked to stop."""

@@ -1,0 +1,50 @@
+"""Cost of a movement by the masses that it swings: eq. (9).
+
+W = sum_i w_i |q_{s+1}^i - q_s^i| with w_i = 1/2 sum_{l=i..n} m_l qd_{l,max}^2: a joint near the base carries more of
+the arm and counts more. (As printed the lower index of the sum makes all weights equal; it starts at the joint.)
+W ranks movements; it is not their energy.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def movement_weights(link_mass: FloatArray, velocity_max: FloatArray, load_mass: float = 0.0) -> FloatArray:
+    """Weights w (n,) of eq. (9) [kg rad^2/s^2].
+
+    `link_mass` (n+1,) kg from the base on (the base never moves and does not count), `velocity_max` (n,) rad/s,
+    `load_mass` kg is carried by the last link.
+    """
+    mass = np.array(link_mass[1:], dtype=float)
+    mass[-1] += load_mass
+    kinetic = 0.5 * mass * np.square(velocity_max)
+    return np.ascontiguousarray(np.cumsum(kinetic[::-1])[::-1])
+
+
+def movement_cost(weights: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
+    """W of the movement from `start` to `goal`, shapes (..., n) that broadcast; result (...)."""
+    return np.asarray(np.abs(np.asarray(goal) - np.asarray(start)) @ weights)
+
+
+def path_cost(weights: FloatArray, waypoints: FloatArray) -> float:
+    """W summed over the steps of a path (N, n)."""
+    return float(np.sum(np.abs(np.diff(waypoints, axis=0)) @ weights))
+
+
+def cheapest_chain(layers: list[FloatArray], weights: FloatArray) -> tuple[list[int], float]:
+    """Shortest path of eq. (9) over layers of configurations: the index taken in each layer, and its W.
+
+    `layers[s]` (K_s, n): the configurations that reach station s. Every layer needs at least one.
+    """
+    cost = np.zeros(len(layers[0]))
+    came: list[NDArray[np.intp]] = []
+    for here, there in zip(layers, layers[1:], strict=False):
+        through = cost[:, None] + movement_cost(weights, here[:, None, :], there[None, :, :])
+        came.append(np.argmin(through, axis=0))
+        cost = np.min(through, axis=0)
+    chosen = [int(np.argmin(cost))]
+    for step in reversed(came):
+        chosen.append(int(step[chosen[-1]]))
+    return chosen[::-1], float(np.min(cost))

@@ -1,0 +1,100 @@
+"""Exact extremes of a trajectory between its points: what a limit is compared with.
+
+A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, 6). An extreme of a
+polynomial lies at an end or at a root of its derivative; roots are bracketed between the roots of the next
+derivative, down to a line, so none is missed and no sampling takes part.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+_HALVINGS = 30  # a root to 1e-9 of the segment: the value at an extreme is off by its square
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Largest values per segment and joint, each (S, n): rad, rad/s, rad/s^2, rad/s^3; `travel` is sum |dq|."""
+
+    lowest: FloatArray
+    highest: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    travel: FloatArray
+
+
+def evaluate(polynomial: FloatArray, u: FloatArray) -> FloatArray:
+    """Values (P, M) of polynomials (P, k+1), lowest power first, at u (P, M)."""
+    value = np.broadcast_to(polynomial[:, -1:], u.shape).copy()
+    for k in range(polynomial.shape[1] - 2, -1, -1):
+        value *= u
+        value += polynomial[:, k : k + 1]
+    return value
+
+
+def derivative(polynomial: FloatArray) -> FloatArray:
+    """Derivatives (P, k) of polynomials (P, k+1)."""
+    return polynomial[:, 1:] * np.arange(1, polynomial.shape[1])
+
+
+def roots_between(polynomial: FloatArray, turning: FloatArray) -> FloatArray:
+    """Roots in [0, 1] of polynomials (P, k+1), given points (P, k-1) that hold the roots of their derivatives.
+
+    Returns (P, k), ascending; where a piece has no root, one of its ends stands in.
+    """
+    rows = len(polynomial)
+    edges = np.concatenate([np.zeros((rows, 1)), turning, np.ones((rows, 1))], axis=1)
+    low, high = edges[:, :-1].copy(), edges[:, 1:].copy()
+    value = evaluate(polynomial, edges)
+    sign_low = np.sign(value[:, :-1])
+    crossing = sign_low * np.sign(value[:, 1:]) < 0
+    high = np.where(crossing, high, low)
+    if not crossing.any():
+        return low
+    active = np.flatnonzero(crossing.any(axis=1))
+    part, lo, hi, sign = polynomial[active], low[active], high[active], sign_low[active]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (lo + hi)
+        left = np.sign(evaluate(part, middle)) == sign
+        lo = np.where(left, middle, lo)
+        hi = np.where(left, hi, middle)
+    low[active] = 0.5 * (lo + hi)
+    return low
+
+
+def extremes(coefficients: FloatArray, durations: FloatArray) -> Extremes:
+    """Extremes of the trajectory with `coefficients` (S, n, 6) and `durations` (S,) s."""
+    segments, joints = coefficients.shape[:2]
+    scale = durations[:, None, None] ** np.arange(6)
+    position = (coefficients * scale).reshape(-1, 6)
+    per_second = np.repeat(1.0 / durations, joints) if segments else np.zeros(0)
+    chain = [position]
+    for _ in range(4):
+        chain.append(derivative(chain[-1]))
+    snap = chain[4]  # a line: its root in closed form
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.where(snap[:, 1] != 0.0, -snap[:, 0] / snap[:, 1], 0.0)
+    points = np.clip(np.nan_to_num(root), 0.0, 1.0)[:, None]
+    largest: list[FloatArray] = []
+    for order in (3, 2, 1):
+        ends = _with_ends(points)
+        largest.append(np.max(np.abs(evaluate(chain[order], ends)), axis=1) * per_second**order)
+        points = roots_between(chain[order], points)
+    along = evaluate(position, _with_ends(points))
+    shape = (segments, joints)
+    return Extremes(
+        lowest=along.min(axis=1).reshape(shape),
+        highest=along.max(axis=1).reshape(shape),
+        velocity=largest[2].reshape(shape),
+        acceleration=largest[1].reshape(shape),
+        jerk=largest[0].reshape(shape),
+        travel=np.abs(np.diff(along, axis=1)).sum(axis=1).reshape(shape),
+    )
+
+
+def _with_ends(points: FloatArray) -> FloatArray:
+    rows = len(points)
+    return np.concatenate([np.zeros((rows, 1)), points, np.ones((rows, 1))], axis=1)

@@ -1,0 +1,104 @@
+"""Joint splines of eq. (10): cubics through given points with speed and acceleration given at both ends.
+
+Each segment runs in its own normalised time u in [0, 1]. The first and the last segment carry the conditions at the
+ends, the middle ones join with continuous q, qd and qdd. Giving q, qd and qdd at both ends leaves no room for two of
+the inner positions: the second and the second last knot are virtual, their positions follow.
+(As printed the linear coefficient of the last segment ends in a_f t_n / 2; only with a_f t_n^2 / 2 do the end
+conditions hold.)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly, make_interp_spline
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointSpline:
+    """Knots (K,) s with q, qd, qdd (K, n) at each; between knots every joint is a cubic, so nothing else is needed."""
+
+    times: FloatArray
+    positions: FloatArray
+    velocities: FloatArray
+    accelerations: FloatArray
+
+
+def first_segment(q0: float, q1: float, v0: float, a0: float, t1: float) -> FloatArray:
+    """Coefficients (4,) in u, lowest first, of the cubic from q0 with speed v0 and acceleration a0 to q1 in t1 s."""
+    delta = q1 - q0
+    return np.array([q0, v0 * t1, a0 * t1**2 / 2, delta - v0 * t1 - a0 * t1**2 / 2])
+
+
+def middle_segment(q0: float, q1: float, v0: float, a0: float, t: float) -> FloatArray:
+    """Coefficients (4,) of a middle cubic: it takes over speed v0 and acceleration a0 of the segment before."""
+    return first_segment(q0, q1, v0, a0, t)
+
+
+def last_segment(q0: float, qf: float, vf: float, af: float, tn: float) -> FloatArray:
+    """Coefficients (4,) of the cubic from q0 to qf, where it ends with speed vf and acceleration af after tn s."""
+    delta = qf - q0
+    return np.array(
+        [
+            q0,
+            3 * delta - 2 * vf * tn + af * tn**2 / 2,
+            -3 * delta + 3 * vf * tn - af * tn**2,
+            delta - vf * tn + af * tn**2 / 2,
+        ]
+    )
+
+
+def end_state(coefficients: FloatArray, t: float) -> tuple[float, float, float]:
+    """Position, speed and acceleration at the end (u = 1) of a segment that lasts t s."""
+    c = coefficients
+    return float(c.sum()), float((c[1] + 2 * c[2] + 3 * c[3]) / t), float((2 * c[2] + 6 * c[3]) / t**2)
+
+
+def virtual_knots(point_times: FloatArray) -> FloatArray:
+    """Knots (M+2,) for points passed at `point_times` (M,): one virtual knot halves the first and last interval.
+
+    With two points the three intervals are equal: a movement of three cubics.
+    """
+    t = np.asarray(point_times, dtype=float)
+    if len(t) == 2:
+        return np.linspace(t[0], t[1], 4)
+    return np.concatenate([t[:1], [(t[0] + t[1]) / 2], t[1:-1], [(t[-2] + t[-1]) / 2], t[-1:]])
+
+
+def spline_through(
+    points: FloatArray,
+    point_times: FloatArray,
+    knots: FloatArray,
+    start: tuple[FloatArray, FloatArray] | None = None,
+    end: tuple[FloatArray, FloatArray] | None = None,
+) -> JointSpline:
+    """The C2 spline of eq. (10) through `points` (M, n) at `point_times` (M,) s, cubic between `knots` (M+2,) s.
+
+    `start` and `end`: speed and acceleration (n,) there; None is rest. The knots are the point times and two virtual
+    ones. Raises ValueError when times do not increase.
+    """
+    points = np.asarray(points, dtype=float)
+    if np.any(np.diff(knots) <= 0.0) or np.any(np.diff(point_times) <= 0.0):
+        raise ValueError("times of a spline must increase")
+    rest = (np.zeros(points.shape[1]), np.zeros(points.shape[1]))
+    (v0, a0), (vf, af) = start or rest, end or rest
+    full = np.concatenate([np.repeat(knots[0], 4), knots[1:-1], np.repeat(knots[-1], 4)])
+    spline = make_interp_spline(point_times, points, k=3, t=full, bc_type=([(1, v0), (2, a0)], [(1, vf), (2, af)]))
+    q, qd, qdd = spline(knots), spline(knots, 1), spline(knots, 2)
+    q[0], q[-1], qd[0], qd[-1], qdd[0], qdd[-1] = points[0], points[-1], v0, vf, a0, af
+    return JointSpline(np.asarray(knots, dtype=float), q, qd, qdd)
+
+
+def natural_durations(points: FloatArray, velocity_max: FloatArray) -> FloatArray:
+    """Durations (M-1,) s in which the fastest joint of each step runs at its speed limit: a first guess."""
+    return np.asarray(np.max(np.abs(np.diff(points, axis=0)) / velocity_max, axis=1))
+
+
+def to_ppoly(spline: JointSpline) -> PPoly:
+    """The spline as scipy's piecewise polynomial."""
+    h = np.diff(spline.times)[:, None]
+    jerk = np.diff(spline.accelerations, axis=0) / h
+    c = np.stack([jerk / 6, spline.accelerations[:-1] / 2, spline.velocities[:-1], spline.positions[:-1]])
+    return PPoly(c, spline.times)

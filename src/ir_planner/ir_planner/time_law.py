@@ -1,0 +1,150 @@
+"""Time laws s(t) of piecewise constant jerk from 0 to 1, at rest at both ends: seven phases on a grid of 1 ms.
+
+Phases: jerk up, constant acceleration, jerk down, constant speed, and the same for braking; the two halves may
+differ. All durations are whole milliseconds: switches of several laws then never come closer than 1 ms, stretching
+by a factor of six decimals keeps whole nanoseconds, and the interpolant of the points is the law itself.
+Given the durations, speed, accelerations and jerks follow from the distance: rounding durations up never breaks a limit.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+GRID_S = 1e-3
+GRID_NS = 1_000_000
+_HALVINGS = 60
+
+
+@dataclass(frozen=True)
+class LawLimits:
+    """Bounds of s, arrays (K,) of K candidate laws: speed 1/s, acceleration and braking 1/s^2, their jerks 1/s^3."""
+
+    speed: FloatArray
+    acceleration: FloatArray
+    braking: FloatArray
+    jerk: FloatArray
+
+
+def _ramp(speed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Durations (jerk phase, constant acceleration) (K,) s of a ramp from rest to `speed`."""
+    full = speed * jerk >= acceleration**2
+    phase = np.where(full, acceleration / jerk, np.sqrt(speed / jerk))
+    constant = np.where(full, speed / acceleration - acceleration / jerk, 0.0)
+    return phase, np.maximum(constant, 0.0)
+
+
+def _ramp_time(speed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
+    phase, constant = _ramp(speed, acceleration, jerk)
+    return np.asarray(2.0 * phase + constant)
+
+
+def reached_speed(limits: LawLimits) -> FloatArray:
+    """Largest speed (K,) 1/s that the distance 1 leaves room for, at most the limit."""
+    low, high = np.zeros_like(limits.speed), limits.speed.copy()
+
+    def distance(speed: FloatArray) -> FloatArray:
+        up = _ramp_time(speed, limits.acceleration, limits.jerk)
+        return np.asarray(0.5 * speed * (up + _ramp_time(speed, limits.braking, limits.jerk)))
+
+    room = distance(high) <= 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        fits = distance(middle) <= 1.0
+        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+    return np.where(room, limits.speed, low)
+
+
+def phase_steps(limits: LawLimits) -> IntArray:
+    """Durations (K, 7) in grid steps of the fastest laws within `limits`; each rounded up, so never faster."""
+    speed = reached_speed(limits)
+    up, steady = _ramp(speed, limits.acceleration, limits.jerk)
+    down, slowing = _ramp(speed, limits.braking, limits.jerk)
+    covered = 0.5 * speed * (2 * up + steady + 2 * down + slowing)
+    cruise = np.maximum(1.0 - covered, 0.0) / speed
+    exact = np.stack([up, steady, up, cruise, down, slowing, down], axis=-1) / GRID_S
+    steps = np.ceil(exact - 1e-9).astype(np.int64)
+    steps[:, (0, 2, 4, 6)] = np.maximum(steps[:, (0, 2, 4, 6)], 1)
+    return steps
+
+
+@dataclass(frozen=True)
+class LawStates:
+    """Laws at the 8 switches of their phases: times (K, 8) s, s, its derivatives (K, 8), and jerk (K, 7)."""
+
+    times: FloatArray
+    s: FloatArray
+    sd: FloatArray
+    sdd: FloatArray
+    jerk: FloatArray
+
+
+def law_states(steps: IntArray) -> LawStates:
+    """States of the laws with phases `steps` (K, 7): the first half is integrated from 0, the second back from 1."""
+    t = steps * GRID_S
+    rise = t[:, 0] * (t[:, 0] + t[:, 1])
+    fall = t[:, 4] * (t[:, 4] + t[:, 5])
+    speed = 1.0 / (0.5 * (2 * t[:, 0] + t[:, 1] + 2 * t[:, 4] + t[:, 5]) + t[:, 3])
+    jerk = np.zeros(steps.shape)
+    jerk[:, 0], jerk[:, 2] = speed / rise, -speed / rise
+    jerk[:, 4], jerk[:, 6] = -speed / fall, speed / fall
+    s, sd, sdd = np.zeros((3, len(steps), 8))
+    peak, brake = jerk[:, 0] * t[:, 0], jerk[:, 4] * t[:, 4]
+    sdd[:, 1] = sdd[:, 2] = peak
+    sdd[:, 5] = sdd[:, 6] = brake
+    sd[:, 1] = 0.5 * peak * t[:, 0]
+    sd[:, 2] = sd[:, 1] + peak * t[:, 1]
+    sd[:, 3] = sd[:, 4] = speed
+    sd[:, 6] = -0.5 * brake * t[:, 6]
+    sd[:, 5] = sd[:, 6] - brake * t[:, 5]
+    s[:, 7] = 1.0
+    for k in (0, 1, 2):
+        s[:, k + 1] = s[:, k] + t[:, k] * (sd[:, k] + t[:, k] * (sdd[:, k] / 2 + jerk[:, k] * t[:, k] / 6))
+    for k in (6, 5, 4):
+        s[:, k] = s[:, k + 1] - t[:, k] * (
+            sd[:, k + 1] - t[:, k] * (sdd[:, k + 1] / 2 - jerk[:, k] * t[:, k] / 6)
+        )
+    times = np.concatenate([np.zeros((len(t), 1)), np.cumsum(steps, axis=1) * GRID_S], axis=1)
+    return LawStates(times, s, sd, sdd, jerk)
+
+
+@dataclass(frozen=True)
+class TimeLaw:
+    """One law: its seven phases in grid steps."""
+
+    steps: tuple[int, ...]
+
+    @property
+    def total(self) -> int:
+        """Duration in grid steps."""
+        return sum(self.steps)
+
+    @property
+    def ramp_up(self) -> int:
+        """Grid steps until the speed is constant."""
+        return sum(self.steps[:3])
+
+    @property
+    def ramp_down(self) -> int:
+        """Grid steps of braking."""
+        return sum(self.steps[4:])
+
+    def switches(self) -> IntArray:
+        """Grid steps at which a phase starts or ends, (M,) ascending without doubles."""
+        return np.unique(np.concatenate([[0], np.cumsum(self.steps)]))
+
+    def at(self, steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """s, sd, sdd (M,) at grid steps (M,); at rest before 0 and after the end."""
+        states = law_states(np.array([self.steps]))
+        ends = np.concatenate([[0], np.cumsum(self.steps)])
+        inside = np.clip(steps, 0, self.total)
+        phase = np.clip(np.searchsorted(ends, inside, side="right") - 1, 0, 6)
+        # the second half is measured back from its end, so that the law closes exactly
+        anchor = np.where(phase < 4, phase, phase + 1)
+        tau = (inside - ends[anchor]) * GRID_S
+        j = states.jerk[0, phase]
+        s0, v0, a0 = states.s[0, anchor], states.sd[0, anchor], states.sdd[0, anchor]
+        s = s0 + tau * (v0 + tau * (a0 / 2 + j * tau / 6))
+        return s, v0 + tau * (a0 + j * tau / 2), a0 + j * tau

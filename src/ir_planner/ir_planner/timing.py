@@ -1,0 +1,153 @@
+"""Time for a straight movement of all joints (PTP): as fast as speed, acceleration, jerk and torque allow.
+
+All joints follow one law s(t) (synchronous). The limits of the joints bound s'; the torque envelope is not a bound
+of s' alone: it depends on where the arm is and what it carries. So laws of several cruising speeds are tried, and for
+each the acceleration and the braking are raised, by halving, as far as the torque of every joint stays within its
+share of the envelope along the whole law; the shortest wins.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_planner.errors import TimingError
+from ir_planner.time_law import GRID_S, LawLimits, TimeLaw, law_states, phase_steps
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+STILL = 1e-9  # rad: nothing moves
+
+
+class Dynamics(Protocol):
+    """What timing needs of ir_kernels.DynamicsModel."""
+
+    def inverse_dynamics(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """Torque (N, n) Nm."""
+
+    def torque_limit(self, qd: FloatArray) -> FloatArray:
+        """Torque (N, n) Nm available."""
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """Bounds per joint (n,): rad/s, rad/s^2, rad/s^3; and the share (0, 1] of the torque envelope to use."""
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    torque_share: float = 0.98
+
+    def scaled(self, velocity: float, acceleration: float) -> "MotionLimits":
+        """Bounds times the request's scalings; acceleration scaling holds for the jerk as well."""
+        return MotionLimits(
+            self.velocity * velocity, self.acceleration * acceleration, self.jerk * acceleration, self.torque_share
+        )
+
+    def with_torque_share(self, share: float) -> "MotionLimits":
+        """The same bounds with another share of the torque."""
+        return MotionLimits(self.velocity, self.acceleration, self.jerk, share)
+
+
+_SPEEDS = np.array([1.0, 0.93, 0.86, 0.78, 0.7, 0.6, 0.5, 0.4, 0.28, 0.15])
+_REFINED = np.array([-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045])
+_HALVINGS = 7
+_PER_PHASE = 7
+
+
+def torque_use(dynamics: Dynamics, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+    """Share (N, n) of the torque envelope that a motion needs."""
+    return np.abs(dynamics.inverse_dynamics(q, qd, qdd)) / dynamics.torque_limit(qd)
+
+
+def _law_samples(steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """s, sd, sdd (K, 7, P) at P instants of every phase, ends included."""
+    states = law_states(steps)
+    t = (steps * GRID_S)[:, :, None] * np.linspace(0.0, 1.0, _PER_PHASE)
+    j = states.jerk[:, :, None]
+    a0, v0, s0 = (x[:, :7, None] for x in (states.sdd, states.sd, states.s))
+    return s0 + t * (v0 + t * (a0 / 2 + j * t / 6)), v0 + t * (a0 + j * t / 2), a0 + j * t
+
+
+def _torque_of_laws(dynamics: Dynamics, start: FloatArray, delta: FloatArray, steps: IntArray) -> FloatArray:
+    """Largest use of torque (K, 2, n): while speeding up and cruising, and while braking."""
+    s, sd, sdd = _law_samples(steps)
+    shape = (*s.shape, len(start))
+    flat = [x.reshape(-1, 1) * delta for x in (s, sd, sdd)]
+    use = torque_use(dynamics, start + flat[0], flat[1], flat[2]).reshape(shape)
+    return np.stack([use[:, :4].max(axis=(1, 2)), use[:, 4:].max(axis=(1, 2))], axis=1)
+
+
+def path_limits(delta: FloatArray, limits: MotionLimits) -> tuple[float, float, float]:
+    """Bounds of s' [1/s], s'' and s''' for the movement by `delta` (n,)."""
+    size = np.maximum(np.abs(delta), 1e-300)
+    return tuple(float(np.min(bound / size)) for bound in (limits.velocity, limits.acceleration, limits.jerk))  # type: ignore[return-value]
+
+
+def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics: Dynamics) -> TimeLaw:
+    """Law of the shortest synchronous movement from `start` to `goal` (n,).
+
+    Raises TimingError when some joint's torque does not suffice however slowly.
+    """
+    delta = np.asarray(goal) - np.asarray(start)
+    if np.max(np.abs(delta)) < STILL:
+        return TimeLaw((1, 0, 1, 0, 1, 0, 1))
+    v, a, j = path_limits(delta, limits)
+    free = phase_steps(_limits(np.array([v]), np.array([a]), np.array([a]), j))
+    use = _torque_of_laws(dynamics, start, delta, free)
+    if use.max() <= limits.torque_share:
+        return TimeLaw(tuple(int(k) for k in free[0]))
+    top = float(law_states(free).sd[0, 3])
+    best = _best_law(start, delta, top * _SPEEDS, (a, j), limits.torque_share, dynamics)
+    if best is None:
+        best = _best_law(start, delta, top * 0.5 ** np.arange(3, 9), (a, j), limits.torque_share, dynamics)
+    if best is None:
+        joint = int(np.argmax(use[0].max(axis=0)))
+        raise TimingError(
+            f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full speed and too much at "
+            "1/256 of it as well: the load is too heavy for this movement",
+            joint,
+        )
+    return _refined(best, start, delta, (a, j), limits.torque_share, dynamics)
+
+
+def _refined(
+    best: TimeLaw, start: FloatArray, delta: FloatArray, aj: tuple[float, float], share: float, dynamics: Dynamics
+) -> TimeLaw:
+    speed = float(law_states(np.array([best.steps])).sd[0, 3])
+    better = _best_law(start, delta, speed * (1.0 + _REFINED), aj, share, dynamics)
+    return better if better is not None and better.total < best.total else best
+
+
+def _limits(speed: FloatArray, acceleration: FloatArray, braking: FloatArray, jerk: float) -> LawLimits:
+    return LawLimits(speed, acceleration, braking, np.full(len(speed), jerk))
+
+
+def _best_law(
+    start: FloatArray,
+    delta: FloatArray,
+    speeds: FloatArray,
+    aj: tuple[float, float],
+    share: float,
+    dynamics: Dynamics,
+) -> TimeLaw | None:
+    """Shortest law over cruising `speeds` (K,) whose torque stays within `share`; None when there is none."""
+    a, jerk = aj
+    count = len(speeds)
+    low, high = np.full((count, 2), 0.01 * a), np.full((count, 2), a)
+    trial = high
+    for k in range(_HALVINGS + 1):
+        steps = phase_steps(_limits(speeds, trial[:, 0], trial[:, 1], jerk))
+        fits = _torque_of_laws(dynamics, start, delta, steps).max(axis=2) <= share
+        low, high = np.where(fits, trial, low), np.where(fits & (k > 0), high, np.where(fits, a, trial))
+        trial = 0.5 * (low + high)
+    steps = phase_steps(_limits(speeds, low[:, 0], low[:, 1], jerk))
+    for _ in range(4):
+        fits_whole = _torque_of_laws(dynamics, start, delta, steps).max(axis=(1, 2)) <= share
+        if fits_whole.any():
+            totals = np.where(fits_whole, steps.sum(axis=1), np.iinfo(np.int64).max)
+            return TimeLaw(tuple(int(k) for k in steps[int(np.argmin(totals))]))
+        low = 0.85 * low
+        steps = phase_steps(_limits(speeds, low[:, 0], low[:, 1], jerk))
+    return None
