@@ -1,0 +1,1 @@
+"""Recordings of the cell: written by a node, read and explained without ROS."""

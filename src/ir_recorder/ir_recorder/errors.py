@@ -1,0 +1,30 @@
+"""What can go wrong with recordings.
+
+::
+
+    RecorderError
+    ├── PathError        the file asked for can't be written there, or is taken
+    ├── WriteError       the disk refused while recording: full, read-only, gone
+    ├── SchemaError      no definition of a message type is installed
+    └── ReadError        not a recording at all, or nothing in it that could be read
+"""
+
+
+class RecorderError(Exception):
+    """Root of what this package raises."""
+
+
+class PathError(RecorderError):
+    """A path that can't become a recording; the sentence says why."""
+
+
+class WriteError(RecorderError):
+    """The storage failed while a recording was written."""
+
+
+class SchemaError(RecorderError):
+    """A message type whose definition isn't installed."""
+
+
+class ReadError(RecorderError):
+    """A file that isn't a recording, or holds nothing readable."""

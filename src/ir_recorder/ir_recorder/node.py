@@ -1,0 +1,297 @@
+"""The recorder node `ir_recorder`: all topics of the cell into one MCAP, started and stopped by service or
+by `ir-record`.
+
+Control never waits for the recorder: it only subscribes, and a storage that fails ends the recording, not
+the node.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from ir_msgs.srv import GetCell, StartRecording, StopRecording
+from ir_msgs_py.status import StatusCode
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import remove_ros_args
+
+from ir_msgs_py import names
+from ir_recorder.cell_files import CellFiles, cell_files
+from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
+from ir_recorder.parameters import declare_settings
+from ir_recorder.qos import QosOffer, request_for
+from ir_recorder.session import RecordingSession
+from ir_recorder.settings import RecorderSettings
+from ir_recorder.topics import TopicSelection, single_type
+from ir_recorder.writer import RecordingWriter
+
+_LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
+OpenWriter = Callable[[str, bool], RecordingWriter]
+
+
+def open_writer(path: str, overwrite: bool) -> RecordingWriter:
+    """The writer of a file; a test may hand in another."""
+    return RecordingWriter(path, overwrite=overwrite)
+
+
+class RecorderNode(Node):
+    """Records while a session is open; looks for new topics several times a second."""
+
+    def __init__(
+        self, settings: RecorderSettings | None = None, writer: OpenWriter = open_writer, **options: Any
+    ) -> None:
+        super().__init__(names.RECORDER, **options)
+        self._settings = settings or declare_settings(self)
+        self._open_writer = writer
+        self._session: RecordingSession | None = None
+        self._selection = TopicSelection()
+        self._recorded: dict[str, Any] = {}
+        self._passed_over: set[str] = set()
+        self._lost = 0
+        self._failure = ""
+        self._cell_answer: Any = None
+        self._get_cell = self.create_client(GetCell, names.GET_CELL)
+        self._events = SubscriptionEventCallbacks(message_lost=self._on_lost, use_default_callbacks=False)
+        self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+        self.create_service(StartRecording, "~/start", self._on_start)
+        self.create_service(StopRecording, "~/stop", self._on_stop)
+        self.create_timer(self._settings.discovery_period, self._discover)
+        self.create_timer(1.0, self._each_second)
+        if self._settings.path:
+            self.start(self._settings.path, self._settings.overwrite, self._settings.topics)
+
+    def start(self, path: str, overwrite: bool = False, topics: Sequence[str] = (), cell: str = "") -> str:
+        """Opens a recording and returns its absolute path; PathError or WriteError when it can't."""
+        if self._session is not None:
+            raise PathError(f"already recording into {self._session.path}; stop first")
+        name = cell or self._settings.cell
+        files = cell_files(name) if name else None
+        writer = self._open_writer(path, overwrite)
+        self._session = RecordingSession(writer, self._settings.named_facts, self._now())
+        self._selection = TopicSelection(tuple(topics) or self._settings.topics, self.get_namespace())
+        self._passed_over.clear()
+        self._lost, self._failure = 0, ""
+        if files is not None:
+            self._attach(files)
+        self._discover()
+        self.get_logger().info(f"recording into {writer.path}")
+        return str(writer.path)
+
+    def finish(self) -> Any:
+        """Ends the recording and returns its summary, or None when there was none."""
+        session, self._session = self._session, None
+        for subscription in self._recorded.values():
+            self.destroy_subscription(subscription)
+        self._recorded.clear()
+        if session is None:
+            return None
+        summary = session.finish()
+        self.get_logger().info(
+            f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, {self._lost} lost"
+        )
+        return summary
+
+    def _on_start(self, request: Any, response: Any) -> Any:
+        response.status.source = self.get_name()
+        try:
+            response.path = self.start(request.path, request.overwrite, request.topics)
+        except RecorderError as error:
+            self._session = None if isinstance(error, WriteError) else self._session
+            response.status.code = int(StatusCode.FAILURE)
+            response.status.message = str(error)
+        else:
+            response.status.code = int(StatusCode.SUCCESS)
+            response.status.message = f"recording into {response.path}"
+        return response
+
+    def _on_stop(self, request: Any, response: Any) -> Any:
+        response.status.source = self.get_name()
+        try:
+            summary = self.finish()
+        except WriteError as error:
+            self._failure = str(error)
+            summary = None
+        if summary is None:
+            response.status.code = int(StatusCode.FAILURE)
+            response.status.message = self._failure or "nothing is being recorded"
+            return response
+        response.status.code = int(StatusCode.SUCCESS)
+        response.status.message = f"{summary.messages} messages over {summary.seconds:.1f} s"
+        response.path = str(summary.path)
+        response.messages, response.seconds = summary.messages, summary.seconds
+        return response
+
+    def _discover(self) -> None:
+        """Subscribes to topics that are new and belong to the recording."""
+        if self._session is None:
+            return
+        for topic, types in self.get_topic_names_and_types():
+            if topic in self._recorded or topic in self._passed_over or topic not in self._selection:
+                continue
+            type_name = single_type(topic, types)
+            publishers = self.get_publishers_info_by_topic(topic)
+            if type_name is None:
+                self._pass_over(topic, f"types {', '.join(types)} can't be recorded")
+            elif publishers:
+                self._subscribe(topic, type_name, [_offer(publisher) for publisher in publishers])
+
+    def _subscribe(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
+        if self._session is None:
+            return
+        try:
+            message_type = _message_type(type_name)
+            self._session.open_topic(topic, type_name, offers)
+        except (SchemaError, ImportError, AttributeError) as error:
+            self._pass_over(topic, str(error))
+            return
+        except WriteError as error:
+            self._abandon(error)
+            return
+        request = request_for(offers)
+        profile = QoSProfile(
+            depth=self._settings.depth,
+            reliability=ReliabilityPolicy.RELIABLE if request.reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL
+            if request.transient_local
+            else DurabilityPolicy.VOLATILE,
+        )
+        self._recorded[topic] = self.create_subscription(
+            message_type,
+            topic,
+            partial(self._on_message, topic),
+            profile,
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(
+                message_lost=self._on_lost, use_default_callbacks=False
+            ),
+        )
+
+    def _on_message(self, topic: str, data: bytes) -> None:
+        if self._session is not None:
+            try:
+                self._session.message(topic, data, self._now())
+            except WriteError as error:
+                self._abandon(error)
+
+    def _on_lost(self, event: Any) -> None:
+        self._lost += event.total_count_change
+
+    def _each_second(self) -> None:
+        self._ask_for_cell()
+        status = DiagnosticStatus(name=self.get_name(), hardware_id="")
+        status.level = DiagnosticStatus.ERROR if self._failure else DiagnosticStatus.OK
+        if self._lost and not self._failure:
+            status.level = DiagnosticStatus.WARN
+        session = self._session
+        status.message = self._failure or ("recording" if session is not None else "idle")
+        status.values = [
+            KeyValue(key="path", value=session.path if session else ""),
+            KeyValue(key="messages", value=str(session.messages if session else 0)),
+            KeyValue(key="topics", value=str(len(self._recorded))),
+            KeyValue(key="lost", value=str(self._lost)),
+        ]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _ask_for_cell(self) -> None:
+        """Asks the planner for its cell, until it has one, so that the recording can be read on its own."""
+        if self._session is None or self._session.cell_attached:
+            return
+        if self._cell_answer is not None and not self._cell_answer.done():
+            return
+        if self._get_cell.service_is_ready():
+            self._cell_answer = self._get_cell.call_async(GetCell.Request())
+            self._cell_answer.add_done_callback(self._on_cell)
+
+    def _on_cell(self, future: Any) -> None:
+        answer = future.result()
+        if answer is not None and answer.status.code == StatusCode.SUCCESS and answer.cell_yaml:
+            self._attach(CellFiles(answer.cell_yaml, answer.robot_description))
+
+    def _attach(self, files: CellFiles) -> None:
+        if self._session is not None:
+            try:
+                self._session.attach_cell(files, self._now())
+            except WriteError as error:
+                self._abandon(error)
+
+    def _abandon(self, error: WriteError) -> None:
+        self._failure = str(error)
+        self._session = None
+        self.get_logger().error(self._failure)
+
+    def _pass_over(self, topic: str, reason: str) -> None:
+        self._passed_over.add(topic)
+        self.get_logger().warning(f"{topic} isn't recorded: {reason}")
+
+    def _now(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
+
+
+def _offer(publisher: Any) -> QosOffer:
+    profile = publisher.qos_profile
+    return QosOffer(
+        reliable=profile.reliability == ReliabilityPolicy.RELIABLE,
+        transient_local=profile.durability == _LATCHED,
+        depth=int(profile.depth),
+    )
+
+
+def _message_type(name: str) -> Any:
+    package, kind, own = name.split("/")
+    return getattr(import_module(f"{package}.{kind}"), own)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """`ir-record PATH [--overwrite] [--topics ...] [--cell NAME]`: records until SIGINT or SIGTERM."""
+    everything = sys.argv[1:] if arguments is None else list(arguments)
+    parser = argparse.ArgumentParser(prog="ir-record", description="Records a cell into one MCAP file.")
+    parser.add_argument("path", nargs="?", default="", help="file to write; none: wait for ~/start")
+    parser.add_argument("--overwrite", action="store_true", help="replace the file")
+    parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
+    parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
+    options = parser.parse_args(remove_ros_args(["ir-record", *everything])[1:])
+    rclpy.init(args=everything)
+    node = None
+    try:
+        node = RecorderNode()
+        if options.path:
+            node.start(options.path, options.overwrite, options.topics, options.cell)
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return _close(node)
+    except RecorderError as error:
+        _say(error)
+    _close(node)
+    return 1
+
+
+def _close(node: RecorderNode | None) -> int:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)  # a second one must not cut the end of the file off
+    try:
+        if node is not None:
+            node.finish()
+    except WriteError as error:
+        _say(error)
+        return 1
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _say(error: RecorderError) -> None:
+    sys.stderr.write(f"ir-record: {error}\n")

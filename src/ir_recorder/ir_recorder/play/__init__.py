@@ -1,0 +1,1 @@
+"""Playback of recordings into the ROS graph."""

@@ -1,0 +1,53 @@
+"""When each message of a recording is due in playback: recorded distances divided by the rate. No ROS, no
+clock here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from ir_recorder.errors import RecorderError
+
+
+@dataclass(frozen=True)
+class PlaySettings:
+    """How to play: rate (2 = twice as fast), loop, names or patterns of topics (empty: all but the
+    actions').
+    """
+
+    rate: float = 1.0
+    loop: bool = False
+    topics: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "topics", tuple(self.topics))
+        if not 0.001 <= self.rate <= 1000.0:
+            raise RecorderError(f"rate is {self.rate:g}, must be 0.001 to 1000")
+
+    def plays(self, topic: str) -> bool:
+        """Whether a topic is played; hidden ones only by name."""
+        if self.topics:
+            return any(fnmatchcase(topic, pattern) for pattern in self.topics)
+        return not any(part.startswith("_") for part in topic.split("/"))
+
+
+@dataclass(frozen=True)
+class DueMessage:
+    """A message with the time it is due [s after the start of playback] and its recorded time [ns]."""
+
+    due: float
+    recorded_ns: int
+    topic: str
+    data: bytes
+
+
+def schedule(messages: Sequence[tuple[int, str, bytes]], settings: PlaySettings) -> Iterator[DueMessage]:
+    """One pass over messages (log time [ns], topic, data) in the order of time."""
+    ordered = sorted((m for m in messages if settings.plays(m[1])), key=lambda message: message[0])
+    if not ordered:
+        return
+    first = ordered[0][0]
+    for time, topic, data in ordered:
+        yield DueMessage((time - first) * 1e-9 / settings.rate, time, topic, data)

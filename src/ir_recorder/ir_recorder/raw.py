@@ -1,0 +1,178 @@
+"""What an MCAP file holds, channel by channel, however much of it is left.
+
+A recording that ended with a power cut has no summary and half a chunk; one that was copied badly has a
+chunk whose check sum fails. All that can be read is given, with a sentence for what can't.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from mcap.exceptions import EndOfFile, InvalidMagic
+from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from numpy.typing import NDArray
+
+from ir_recorder.errors import ReadError
+
+
+@dataclass(frozen=True)
+class RawChannel:
+    """One topic's messages as bytes; log_time (N,) [ns] in the order of the file."""
+
+    topic: str
+    type: str
+    message_encoding: str
+    schema_encoding: str
+    schema_text: str
+    qos: str
+    log_time: NDArray[np.int64]
+    messages: tuple[bytes, ...]
+
+
+@dataclass(frozen=True)
+class RawAttachment:
+    """A file beside the messages."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class RawRecording:
+    """Everything readable in a file; `problems` says what wasn't, `facts` are the metadata records' texts
+    by key.
+    """
+
+    path: Path
+    channels: tuple[RawChannel, ...]
+    attachments: tuple[RawAttachment, ...]
+    facts: tuple[tuple[str, str], ...]
+    problems: tuple[str, ...]
+
+    def channel(self, topic: str) -> RawChannel | None:
+        """The first channel of a topic that has messages."""
+        return next((c for c in self.channels if c.topic == topic and c.messages), None)
+
+    def attachment(self, name: str) -> bytes | None:
+        """Content of the last attachment of that name."""
+        return next((a.data for a in reversed(self.attachments) if a.name == name), None)
+
+    def fact(self, key: str) -> str:
+        """A fact of the metadata records, "" where it isn't told."""
+        return next((value for name, value in reversed(self.facts) if name == key), "")
+
+
+class _Collector:
+    """Sorts records into channels; those of a lost chunk are missed by number only."""
+
+    def __init__(self) -> None:
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.times: dict[int, list[int]] = {}
+        self.data: dict[int, list[bytes]] = {}
+        self.attachments: list[RawAttachment] = []
+        self.facts: list[tuple[str, str]] = []
+        self.problems: list[str] = []
+        self.orphans = 0
+        self.complete = False
+
+    def add(self, record: McapRecord) -> None:
+        if isinstance(record, Message):
+            if record.channel_id in self.channels:
+                self.times[record.channel_id].append(record.log_time)
+                self.data[record.channel_id].append(record.data)
+            else:
+                self.orphans += 1
+        elif isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
+            self.times.setdefault(record.id, [])
+            self.data.setdefault(record.id, [])
+        elif isinstance(record, Attachment):
+            self.attachments.append(RawAttachment(record.name, record.media_type, record.data))
+        elif isinstance(record, Metadata):
+            self.facts.extend(record.metadata.items())
+        elif isinstance(record, Footer):
+            self.complete = True
+
+    def raw_channels(self) -> Iterator[RawChannel]:
+        for number, channel in self.channels.items():
+            schema = self.schemas.get(channel.schema_id)
+            yield RawChannel(
+                channel.topic,
+                schema.name if schema else "",
+                channel.message_encoding,
+                schema.encoding if schema else "",
+                schema.data.decode(errors="replace") if schema else "",
+                channel.metadata.get("offered_qos_profiles", ""),
+                np.array(self.times[number], dtype=np.int64),
+                tuple(self.data[number]),
+            )
+
+
+def read_raw(path: str | Path) -> RawRecording:
+    """Everything readable in an MCAP file; ReadError when there is nothing, or it isn't one."""
+    path = Path(path)
+    try:
+        with path.open("rb") as stream:
+            found = _collect(stream)
+    except OSError as error:
+        raise ReadError(f"{path} can't be read: {error.strerror}") from error
+    except InvalidMagic as error:
+        raise ReadError(f"{path} is not an MCAP file: its first bytes are others") from error
+    messages = sum(len(data) for data in found.data.values())
+    if found.orphans:
+        found.problems.append(f"{found.orphans} messages belong to channels that were lost")
+    if not found.complete:
+        found.problems.append(f"the file ends early; {messages} messages were read up to there")
+    if not messages and not found.attachments and not found.facts:
+        raise ReadError(f"{path} holds no messages" + "".join(f"; {p}" for p in found.problems))
+    return RawRecording(
+        path, tuple(found.raw_channels()), tuple(found.attachments), tuple(found.facts), tuple(found.problems)
+    )
+
+
+def _collect(stream: BinaryIO) -> _Collector:
+    found = _Collector()
+    records = StreamReader(stream, emit_chunks=True).records
+    while True:
+        offset = stream.tell()
+        try:
+            record = next(records)
+        except StopIteration:
+            return found
+        except InvalidMagic:
+            if offset == 0:
+                raise
+            return found  # the closing magic is cut off
+        except EndOfFile:
+            return found
+        except Exception as error:  # damaged bytes make the library raise nearly anything
+            found.problems.append(
+                f"unreadable record at byte {offset}: {type(error).__name__} {error}".rstrip()
+            )
+            return found
+        if isinstance(record, Chunk):
+            _open_chunk(record, offset, found)
+        else:
+            found.add(record)
+
+
+def _open_chunk(chunk: Chunk, offset: int, found: _Collector) -> None:
+    try:
+        records = breakup_chunk(chunk, validate_crc=True)
+    except Exception as error:  # the decompressors raise errors of their own; a lost chunk isn't the end
+        found.problems.append(
+            f"chunk at byte {offset} is damaged ({type(error).__name__}): "
+            f"{(chunk.message_end_time - chunk.message_start_time) * 1e-9:.2f} s of messages are lost"
+        )
+        return
+    for record in records:
+        found.add(record)

@@ -1,0 +1,63 @@
+"""Which topics belong to the cell.
+
+By default the shared ones and everything under the project's nodes, in the recorder's own namespace. Hidden
+topics (a name part that starts with "_") stay out, but for the status of actions: the feedback's types
+can't be read back without ROS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from ir_msgs_py import names
+
+SHARED = (names.JOINT_STATES, names.ROBOT_DESCRIPTION, "tf", "tf_static")  # in the cell's namespace
+GLOBAL = ("/diagnostics", "/rosout", "/parameter_events")
+NODES = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER, names.RECORDER)
+ACTION_STATUS = "/_action/status"
+_FEEDBACK = "_FeedbackMessage"
+
+
+@dataclass(frozen=True)
+class TopicSelection:
+    """Decides for each topic of the graph whether it is recorded.
+
+    `wanted`: names or patterns ("/ir_planner/*"; "*" is every visible topic); empty: the topics of the cell
+    below `namespace` ("/" or "/cell_1").
+    """
+
+    wanted: tuple[str, ...] = ()
+    namespace: str = "/"
+
+    def __contains__(self, topic: str) -> bool:
+        if _hidden(topic) and not topic.endswith(ACTION_STATUS):
+            return False
+        if self.wanted:
+            return any(fnmatchcase(topic, self._absolute(pattern)) for pattern in self.wanted)
+        if topic in GLOBAL:
+            return True
+        prefix = self.namespace.rstrip("/") + "/"
+        if not topic.startswith(prefix):
+            return False
+        name = topic[len(prefix) :]
+        return name in SHARED or name.split("/", 1)[0] in NODES
+
+    def _absolute(self, pattern: str) -> str:
+        if pattern.startswith(("/", "*")):
+            return pattern
+        return f"{self.namespace.rstrip('/')}/{pattern}"
+
+
+def single_type(topic: str, types: Sequence[str]) -> str | None:
+    """The type of a topic, or None where recordings can't take it: several types, or one derived from an
+    action.
+    """
+    if len(types) != 1 or types[0].endswith(_FEEDBACK):
+        return None
+    return types[0]
+
+
+def _hidden(topic: str) -> bool:
+    return any(part.startswith("_") for part in topic.split("/"))
