@@ -19,12 +19,13 @@ OPTIMISE = ["-O3", "-std=c++17", "-fvisibility=hidden", "-g0", "-fno-math-errno"
 SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-omit-frame-pointer"]
 # What GCC may use on its own under -march=native, as preprocessor name -> name of __builtin_cpu_supports.
 FEATURES = {
-    "__POPCNT__": "popcnt", "__SSE3__": "sse3", "__SSSE3__": "ssse3", "__SSE4_1__": "sse4.1", "__SSE4_2__": "sse4.2",
-    "__SSE4A__": "sse4a", "__AVX__": "avx", "__FMA__": "fma", "__FMA4__": "fma4", "__XOP__": "xop", "__BMI__": "bmi",
-    "__BMI2__": "bmi2", "__AVX2__": "avx2", "__AVX512F__": "avx512f", "__AVX512DQ__": "avx512dq",
-    "__AVX512CD__": "avx512cd", "__AVX512BW__": "avx512bw", "__AVX512VL__": "avx512vl",
-    "__AVX512IFMA__": "avx512ifma", "__AVX512VBMI__": "avx512vbmi", "__AVX512VBMI2__": "avx512vbmi2",
-    "__AVX512VNNI__": "avx512vnni", "__AVX512BITALG__": "avx512bitalg", "__AVX512VPOPCNTDQ__": "avx512vpopcntdq",
+    "__POPCNT__": "popcnt", "__SSE3__": "sse3", "__SSSE3__": "ssse3", "__SSE4_1__": "sse4.1",
+    "__SSE4_2__": "sse4.2", "__SSE4A__": "sse4a", "__AVX__": "avx", "__FMA__": "fma", "__FMA4__": "fma4",
+    "__XOP__": "xop", "__BMI__": "bmi", "__BMI2__": "bmi2", "__AVX2__": "avx2", "__AVX512F__": "avx512f",
+    "__AVX512DQ__": "avx512dq", "__AVX512CD__": "avx512cd", "__AVX512BW__": "avx512bw",
+    "__AVX512VL__": "avx512vl", "__AVX512IFMA__": "avx512ifma", "__AVX512VBMI__": "avx512vbmi",
+    "__AVX512VBMI2__": "avx512vbmi2", "__AVX512VNNI__": "avx512vnni", "__AVX512BITALG__": "avx512bitalg",
+    "__AVX512VPOPCNTDQ__": "avx512vpopcntdq",
 }  # fmt: skip
 
 
@@ -69,8 +70,8 @@ class BuildBothVariants(build_ext):
         super().run()
         if not any(os.path.exists(self.get_ext_fullpath(e.name)) for e in self.extensions):
             print(
-                f"{PACKAGE}: no C++ compiler with pybind11 was found: nothing compiled, the (slow) NumPy reference "
-                "will be used. Install g++ and pybind11 and install again.",
+                f"{PACKAGE}: no C++ compiler with pybind11 was found: nothing compiled, the (slow) NumPy "
+                "reference will be used. Install g++ and pybind11 and install again.",
                 file=sys.stderr,
             )
 

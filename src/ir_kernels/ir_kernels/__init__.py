@@ -1,20 +1,55 @@
-"""Batch functions over arrays: kinematics, exact distances, certified motion, dynamics, inverse kinematics."""
+"""Batch functions over arrays: kinematics, exact distances, certified motion, dynamics, inverse
+kinematics.
+"""
 
+from ir_kernels.ccd import CcdResult, CcdSettings, ccd
+from ir_kernels.chain import Chain
+from ir_kernels.collision import (
+    COLLIDES,
+    FREE,
+    UNDECIDED,
+    Certificate,
+    Certificates,
+    CollisionModel,
+    MinDistance,
+    Witnesses,
+)
 from ir_kernels.dynamics import DynamicsModel, Gradients
 from ir_kernels.errors import InputError, KernelError
+from ir_kernels.geometry import ENVIRONMENT, SELF, Pair
 from ir_kernels.inverse_kinematics import IkSet, SphericalWristIk
+from ir_kernels.limits import Extrema, MotionExtrema, motion_extrema, polynomial_extrema
 from ir_kernels.power import DcBus, DcBusParameters, DriveEnergy, dc_bus, drive_energy
 
 __all__ = [
+    "COLLIDES",
+    "ENVIRONMENT",
+    "FREE",
+    "SELF",
+    "UNDECIDED",
+    "CcdResult",
+    "CcdSettings",
+    "Certificate",
+    "Certificates",
+    "Chain",
+    "CollisionModel",
     "DcBus",
     "DcBusParameters",
     "DriveEnergy",
     "DynamicsModel",
+    "Extrema",
     "Gradients",
     "IkSet",
     "InputError",
     "KernelError",
+    "MinDistance",
+    "MotionExtrema",
+    "Pair",
     "SphericalWristIk",
+    "Witnesses",
+    "ccd",
     "dc_bus",
     "drive_energy",
+    "motion_extrema",
+    "polynomial_extrema",
 ]

@@ -1,8 +1,8 @@
 """Which build of the compiled core this process uses: native, baseline, or none (the NumPy reference).
 
-`_native` was compiled for the processor of the machine that built it and may hold instructions that another one
-lacks; `_baseline` runs on any x86-64 and knows what `_native` needs. The environment variable IR_KERNELS forces one
-of "native", "baseline", "reference".
+`_native` was compiled for the processor of the machine that built it and may hold instructions that another
+one lacks; `_baseline` runs on any x86-64 and knows what `_native` needs. The environment variable IR_KERNELS
+forces one of "native", "baseline", "reference".
 """
 
 import importlib
@@ -23,8 +23,8 @@ def _import(name: str) -> Any | None:
 def load(choice: str = "") -> tuple[str, Any | None]:
     """Name of the build and its module, None for the NumPy reference.
 
-    `choice`: one of CHOICES, or empty for the fastest that runs here. Raises ImportError when a build that is asked
-    for by name is not installed; warns once (RuntimeWarning) when nothing compiled is there.
+    `choice`: one of CHOICES, or empty for the fastest that runs here. Raises ImportError when a build that is
+    asked for by name is not installed; warns once (RuntimeWarning) when nothing compiled is there.
     """
     if choice not in ("", *CHOICES):
         raise ImportError(f"IR_KERNELS is {choice!r}: known are {', '.join(CHOICES)}")
@@ -37,7 +37,9 @@ def load(choice: str = "") -> tuple[str, Any | None]:
     if baseline is not None and choice != "native":
         return "baseline", baseline
     if choice:
-        raise ImportError(f"IR_KERNELS asks for the {choice} build of ir_kernels, which is not there or can't run here")
+        raise ImportError(
+            f"IR_KERNELS asks for the {choice} build of ir_kernels, which is not there or can't run here"
+        )
     warnings.warn(
         "ir_kernels: no compiled core is installed, the NumPy reference is used (some hundred times slower); "
         "install a C++ compiler and install ir_kernels again",

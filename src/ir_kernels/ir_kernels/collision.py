@@ -1,0 +1,203 @@
+"""Exact signed distances, collision checks and proofs of motion for a robot among bodies.
+
+A distance is that of two surfaces: positive apart, zero in touch, and where they overlap minus the depth of
+penetration, which is the shortest translation that parts them (for one capsule and one body).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ir_kernels import data
+from ir_kernels.chain import Chain
+from ir_kernels.data import BodyLike, BoolArray, CapsuleLike, FloatArray, IntArray
+from ir_kernels.errors import InputError
+from ir_kernels.geometry import Geometry, Pair, geometry
+from ir_kernels.reference import certify
+from ir_kernels.reference import collision as reference
+from ir_kernels.reference.certify import COLLIDES, FREE, UNDECIDED
+
+__all__ = [
+    "COLLIDES",
+    "FREE",
+    "UNDECIDED",
+    "Certificate",
+    "Certificates",
+    "CollisionModel",
+    "MinDistance",
+    "Witnesses",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Witnesses:
+    """One pair per row: distance (N,) [m], points on the surfaces of body_a and body_b (N, 3), and the unit
+    normal (N, 3) from b to a: point_a - point_b = distance * normal, also in penetration. All in the world.
+    """
+
+    distance: FloatArray
+    pair: IntArray
+    point_a: FloatArray
+    point_b: FloatArray
+    normal: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MinDistance(Witnesses):
+    """The nearest pair of each configuration; distance +inf and pair -1 where there is no pair."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificates:
+    """Verdicts (N,) FREE, COLLIDES or UNDECIDED; interval [t0, t1] (N,) of the first violation, and its pair
+    (N,).
+
+    Everything before t0 is proved. COLLIDES: at t1 the pair's distance isn't above its threshold. UNDECIDED:
+    neither could be shown in [t0, t1]; count it as unsafe. FREE: t0 = t1 = 1 and pair -1.
+    """
+
+    verdict: NDArray[np.uint8]
+    t0: FloatArray
+    t1: FloatArray
+    pair: IntArray
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The same for one trajectory: interval in s from its start, FREE: both at its end.
+
+    lower_bound [m]: for FREE a proven lower bound of distance - threshold over all pairs and times, else
+    -inf.
+    """
+
+    verdict: int
+    interval: tuple[float, float]
+    pair: int
+    lower_bound: float
+
+
+class CollisionModel:
+    """Capsules on the links of a chain, bodies of the scene, and the Z pairs whose distances count.
+
+    Pairs: every capsule with every body (capsule by capsule), but those of link 0 (nothing of them moves) and
+    those in `ignored_pairs`; then `self_pairs` of capsules. All by name. Immutable: build another one when a
+    door opens or a load is attached (some 50 us). Raises InputError for data that make no sense.
+    """
+
+    def __init__(
+        self,
+        chain: Chain,
+        capsules: Sequence[CapsuleLike],
+        bodies: Sequence[BodyLike],
+        self_pairs: Iterable[tuple[str, str]],
+        ignored_pairs: Iterable[tuple[str, str]] = (),
+    ) -> None:
+        self.chain = chain
+        self._geometry: Geometry = geometry(chain, capsules, bodies, self_pairs, ignored_pairs)
+        self.pairs: tuple[Pair, ...] = self._geometry.pairs
+
+    def _per_pair(self, value: ArrayLike, name: str) -> FloatArray:
+        """`value` for every pair: one number, or (Z,); -inf is allowed, NaN and +inf aren't."""
+        values = np.asarray(value, dtype=np.float64)
+        if values.shape not in ((), (len(self.pairs),)):
+            raise InputError(f"{name} has shape {values.shape}: expected one number or ({len(self.pairs)},)")
+        if np.isnan(values).any() or (values == np.inf).any():
+            raise InputError(f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair")
+        return np.ascontiguousarray(np.broadcast_to(values, len(self.pairs)))
+
+    def distances(self, q: ArrayLike) -> FloatArray:
+        """(N, Z): signed distances [m] of all pairs at q (N, n)."""
+        q = self.chain.checked(q)
+        return reference.distances(
+            self._geometry, reference.ends(self._geometry, reference.poses(self._geometry, q))
+        )
+
+    def min_distance(self, q: ArrayLike, offset: ArrayLike | None = None) -> MinDistance:
+        """The pair of least distance - offset (Z,) [m] at each q (N, n), and its true distance.
+
+        With the safety distances as offset it is the pair that comes nearest to violating its own; an offset
+        of -inf leaves a pair out.
+        """
+        q = self.chain.checked(q)
+        shift = self._per_pair(0.0 if offset is None else offset, "offset")
+        pair = reference.nearest(self.distances(q), shift)
+        found = pair >= 0
+        near = self.witnesses(q[found], pair[found]) if found.any() else None
+        distance = np.full(len(q), np.inf)
+        point_a, point_b, normal = np.full((3, len(q), 3), np.nan)
+        if near is not None:
+            distance[found], point_a[found], point_b[found] = near.distance, near.point_a, near.point_b
+            normal[found] = near.normal
+        return MinDistance(distance, pair, point_a, point_b, normal)
+
+    def witnesses(self, q: ArrayLike, pair: ArrayLike) -> Witnesses:
+        """Distance, nearest points and normal of one pair (N,) at each q (N, n)."""
+        q = self.chain.checked(q)
+        pair = data.indices(pair, "pair", (len(q),), len(self.pairs))
+        segments = reference.ends(self._geometry, reference.poses(self._geometry, q))
+        found = reference.witnesses(self._geometry, segments, pair)
+        return Witnesses(found.distance, pair, found.on_segment, found.on_body, found.normal)
+
+    def gradients(self, q: ArrayLike, pair: ArrayLike) -> FloatArray:
+        """(N, n): derivative of the distance of one pair (N,) by the joint values at each q (N, n) [m/rad].
+
+        The distance has a kink where two places are equally near; there it is the derivative of one of them.
+        """
+        q = self.chain.checked(q)
+        pair = data.indices(pair, "pair", (len(q),), len(self.pairs))
+        poses = reference.poses(self._geometry, q)
+        found = reference.witnesses(self._geometry, reference.ends(self._geometry, poses), pair)
+        return reference.gradient(self._geometry, poses, found, pair)
+
+    def is_free(self, q: ArrayLike, threshold: ArrayLike) -> BoolArray:
+        """(N,): whether every pair's distance exceeds its threshold (one number or (Z,)) [m] at q (N, n).
+
+        A threshold of -inf ignores the pair. Stops at the first pair that is too near.
+        """
+        return reference.is_free(self.distances(q), self._per_pair(threshold, "threshold"))
+
+    def certify_edges(self, q0: ArrayLike, q1: ArrayLike, threshold: ArrayLike) -> Certificates:
+        """Whether all distances exceed their threshold everywhere on the straight segments q0 (N, n) to q1
+        (N, n).
+
+        A FREE verdict is a proof: rounding is counted. See reference.certify for the bound.
+        """
+        start, goal = self.chain.checked(q0, "q0"), self.chain.checked(q1, "q1")
+        if len(start) != len(goal):
+            raise InputError(f"q1 has {len(goal)} rows: expected {len(start)} as q0")
+        found = certify.certify(
+            self._geometry, certify.Edges(start, goal), self._per_pair(threshold, "threshold")
+        )
+        return Certificates(found.verdict, found.t0, found.t1, found.pair)
+
+    def certify_trajectory(
+        self, coefficients: ArrayLike, durations: ArrayLike, threshold: ArrayLike
+    ) -> Certificate:
+        """The same for one trajectory of segments q(t) = sum_k c_k t^k, t from the start of the segment [s].
+
+        coefficients (S, n, K), lowest power first (quintics: K = 6); durations (S,) [s], not negative.
+        """
+        c = data.array(coefficients, "coefficients", (None, self.chain.n, None))
+        span = data.array(durations, "durations", (len(c),))
+        if c.shape[2] == 0:
+            raise InputError("coefficients has shape (S, n, 0): expected at least the constant term")
+        if (span < 0.0).any():
+            raise InputError(f"durations holds {span.min()} s: expected at least 0")
+        found = certify.certify(
+            self._geometry, certify.Polynomials(c, span), self._per_pair(threshold, "threshold")
+        )
+        return _first(found, span)
+
+
+def _first(found: certify.Outcome, span: FloatArray) -> Certificate:
+    """The certificate of a trajectory, from those of its segments."""
+    unsafe = np.flatnonzero(found.verdict != FREE)
+    if not len(unsafe):
+        total = float(span.sum())
+        return Certificate(FREE, (total, total), -1, float(found.bound.min(initial=np.inf)))
+    k = int(unsafe[0])
+    begin = float(span[:k].sum())
+    interval = (begin + float(found.t0[k]), begin + float(found.t1[k]))
+    return Certificate(int(found.verdict[k]), interval, int(found.pair[k]), -np.inf)

@@ -1,0 +1,173 @@
+"""Proof that a motion keeps all distances above their thresholds, by bisection of time.
+
+Over an interval about its middle every joint j stays within spread_j of its value there. Then no point of a
+capsule on link i moves farther, seen from link k, than the sum found by turning the joints one after the
+other from the outermost: m <- m + spread_j (reach_j + m), j = i..k+1, with reach_j the distance of the
+capsule's axis from joint axis j in the middle (a point that has already moved by m is at most reach_j + m
+away from axis j, which hasn't moved yet). A distance in the middle that exceeds threshold + m therefore
+proves the interval. What can't be proved is halved, down to a movement of RESOLUTION: what is left is
+undecided.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_kernels.data import FloatArray, IntArray
+from ir_kernels.geometry import Geometry
+from ir_kernels.reference import chain, collision
+
+FREE, COLLIDES, UNDECIDED = 0, 1, 2
+MARGIN = 1e-9  # [m] more than double precision loses on lengths of some ten metres
+RESOLUTION = 1e-6  # [m] an interval whose bodies move less than this isn't halved any more
+FRONT = 16  # intervals of a motion that are looked at together, the earliest first
+LOCATE = 2.0**-8  # the first collision is located to this part of the motion
+
+
+class Motion(Protocol):
+    """M motions over a parameter."""
+
+    def span(self) -> FloatArray:
+        """(M,): the parameter runs from 0 to this."""
+
+    def at(self, rows: IntArray, parameter: FloatArray) -> FloatArray:
+        """(I, n): joint values of the motions `rows` (I,) at `parameter` (I,)."""
+
+    def spread(self, rows: IntArray, middle: FloatArray, half: FloatArray) -> FloatArray:
+        """(I, n): bound of |q_j(u) - q_j(middle)| for u in middle -+ half [rad]."""
+
+
+class Edges:
+    """Straight segments in joint space from q0 (M, n) to q1 (M, n), parameter 0..1."""
+
+    def __init__(self, q0: FloatArray, q1: FloatArray) -> None:
+        self.q0, self.step = q0, q1 - q0
+
+    def span(self) -> FloatArray:
+        """Every edge runs from 0 to 1."""
+        return np.ones(len(self.q0))
+
+    def at(self, rows: IntArray, parameter: FloatArray) -> FloatArray:
+        """Linear in the parameter."""
+        result: FloatArray = self.q0[rows] + parameter[:, None] * self.step[rows]
+        return result
+
+    def spread(self, rows: IntArray, middle: FloatArray, half: FloatArray) -> FloatArray:
+        """Half of the way over the interval."""
+        result: FloatArray = half[:, None] * np.abs(self.step[rows])
+        return result
+
+
+class Polynomials:
+    """Segments q(t) = sum_k c_k t^k of coefficients (M, n, K) over durations (M,), parameter t in s."""
+
+    def __init__(self, coefficients: FloatArray, durations: FloatArray) -> None:
+        self.coefficients, self.durations = coefficients, durations
+
+    def span(self) -> FloatArray:
+        """The durations."""
+        return self.durations
+
+    def at(self, rows: IntArray, parameter: FloatArray) -> FloatArray:
+        """Horner's rule."""
+        return self._shifted(rows, parameter)[..., 0]
+
+    def spread(self, rows: IntArray, middle: FloatArray, half: FloatArray) -> FloatArray:
+        """Sum of the absolute terms of the polynomial about the middle, at the interval's end."""
+        shifted = np.abs(self._shifted(rows, middle))
+        powers = half[:, None] ** np.arange(1, shifted.shape[-1])
+        result: FloatArray = np.einsum("ijk,ik->ij", shifted[..., 1:], powers)
+        return result
+
+    def _shifted(self, rows: IntArray, centre: FloatArray) -> FloatArray:
+        """Coefficients of the polynomials in t - centre, by repeated Horner division."""
+        c = self.coefficients[rows].copy()
+        for first in range(c.shape[-1] - 1):
+            for k in range(c.shape[-1] - 2, first - 1, -1):
+                c[..., k] += centre[:, None] * c[..., k + 1]
+        return c
+
+
+class Outcome(NamedTuple):
+    """Per motion: verdict (M,), interval [t0, t1] of the first violation (M,), its pair (M,), and a proven
+    bound (M,).
+
+    Everything before t0 is proved free. COLLIDES: at t1 the pair is not above its threshold. UNDECIDED:
+    neither could be shown between t0 and t1. FREE: t0 = t1 = the end, pair -1. bound: min over all proved
+    intervals of distance - threshold - movement; meaningful for FREE only.
+    """
+
+    verdict: NDArray[np.uint8]
+    t0: FloatArray
+    t1: FloatArray
+    pair: IntArray
+    bound: FloatArray
+
+
+def motion_bounds(
+    model: Geometry, link_poses: FloatArray, segments: FloatArray, spread: FloatArray
+) -> FloatArray:
+    """(I, Z): how much each pair's distance can change while joint j moves by at most spread_j (I, n) [m]."""
+    origin, direction = chain.axes(model.chain.joint_axis, link_poses)
+    links, n = model.capsules.link, model.chain.n
+    # bound[:, c, k]: movement of capsule c, seen from link k <= its own
+    bound = np.zeros((len(segments), len(links), n + 1))
+    for c, link in enumerate(links):
+        moved = np.zeros(len(segments))
+        for j in range(link - 1, -1, -1):
+            arm = segments[:, c] - origin[:, None, j]
+            reach = np.linalg.norm(np.cross(arm, direction[:, None, j]), axis=-1).max(axis=1)
+            moved = moved + spread[:, j] * (reach + moved)
+            bound[:, c, j] = moved
+    outside = bound[:, model.environment[:, 0], 0]
+    a, b = model.self_pairs.T
+    outer, inner = np.where(links[a] >= links[b], a, b), np.where(links[a] >= links[b], b, a)
+    return np.concatenate([outside, bound[:, outer, links[inner]]], axis=1)
+
+
+def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:
+    """Outcome for every motion; thresholds (Z,) in m, -inf ignores a pair."""
+    span = motion.span()
+    hit_at, hit_pair = np.full(len(span), np.inf), np.full(len(span), -1)
+    stuck_from, stuck_to, stuck_pair = np.full(len(span), np.inf), span.copy(), np.full(len(span), -1)
+    bound = np.full(len(span), np.inf)
+    rows, low, high = np.arange(len(span)), np.zeros(len(span)), span.copy()
+    while len(rows) and len(threshold):
+        turn = _rank(rows) < FRONT
+        now, a, b = rows[turn], low[turn], high[turn]
+        middle = (a + b) / 2.0
+        poses = collision.poses(model, motion.at(now, middle))
+        segments = collision.ends(model, poses)
+        above = collision.distances(model, segments) - threshold
+        moved = motion_bounds(model, poses, segments, motion.spread(now, middle, (b - a) / 2.0)) + MARGIN
+        index, nearest, doubtful = np.arange(len(now)), above.argmin(axis=1), (above - moved).argmin(axis=1)
+        proved = (above - moved)[index, doubtful]
+        hit, free = above[index, nearest] <= -MARGIN, proved > 0.0
+        np.minimum.at(bound, now[free], proved[free])
+        for k in np.flatnonzero(hit):
+            if middle[k] < hit_at[now[k]]:
+                hit_at[now[k]], hit_pair[now[k]] = middle[k], nearest[k]
+        located = np.isfinite(hit_at[now]) & (b - a < LOCATE * span[now])
+        stuck = ~free & (located | (~hit & (moved[index, doubtful] < RESOLUTION)))
+        for k in np.flatnonzero(stuck):
+            if a[k] < stuck_from[now[k]]:
+                stuck_from[now[k]], stuck_to[now[k]], stuck_pair[now[k]] = a[k], b[k], doubtful[k]
+        before, split = hit & ~stuck, ~free & ~hit & ~stuck
+        rows = np.concatenate([now[before], now[split], now[split], rows[~turn]])
+        high = np.concatenate([middle[before], middle[split], b[split], high[~turn]])
+        low = np.concatenate([a[before], a[split], middle[split], low[~turn]])
+        open_ = np.flatnonzero(low < np.minimum(hit_at, stuck_from)[rows])
+        order = open_[np.lexsort((low[open_], rows[open_]))]
+        rows, low, high = rows[order], low[order], high[order]
+    collides = np.isfinite(hit_at)
+    doubt = np.isfinite(stuck_from)
+    verdict = np.where(collides, COLLIDES, np.where(doubt, UNDECIDED, FREE)).astype(np.uint8)
+    t1 = np.where(collides, hit_at, np.where(doubt, stuck_to, span))
+    return Outcome(verdict, np.minimum(stuck_from, t1), t1, np.where(collides, hit_pair, stuck_pair), bound)
+
+
+def _rank(rows: IntArray) -> IntArray:
+    """Position of each entry among those of the same (sorted) row."""
+    first = np.searchsorted(rows, rows)
+    return np.arange(len(rows)) - first

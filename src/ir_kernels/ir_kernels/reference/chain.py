@@ -1,0 +1,58 @@
+"""Forward kinematics and Jacobians of a serial chain of revolute joints, as product of transforms."""
+
+import numpy as np
+
+from ir_kernels.data import FloatArray
+
+
+def axis_rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
+    """(N, 3, 3): rotation by `angle` (N,) about the unit `axis` (3,) (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    outer = np.outer(axis, axis)
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    result: FloatArray = outer + c * (np.eye(3) - outer) + s * cross
+    return result
+
+
+def link_poses(
+    joint_origin: FloatArray, joint_axis: FloatArray, base_pose: FloatArray, q: FloatArray
+) -> FloatArray:
+    """(N, n + 1, 4, 4): poses of the links 0..n in the world at q (N, n)."""
+    result = np.empty((len(q), len(joint_axis) + 1, 4, 4))
+    result[:, 0] = base_pose
+    for i, (origin, axis) in enumerate(zip(joint_origin, joint_axis, strict=True)):
+        turn = np.zeros((len(q), 4, 4))
+        turn[:, :3, :3] = axis_rotation(axis, q[:, i])
+        turn[:, 3, 3] = 1.0
+        result[:, i + 1] = result[:, i] @ origin @ turn
+    return result
+
+
+def axes(joint_axis: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Origins and unit directions (N, n, 3) of the joint axes in the world, from link poses (N, n + 1, 4,
+    4).
+    """
+    frames = poses[:, 1:]
+    return frames[..., :3, 3], np.einsum("kjab,jb->kja", frames[..., :3, :3], joint_axis)
+
+
+def point_jacobian(
+    joint_axis: FloatArray, poses: FloatArray, points: FloatArray, link: FloatArray | int
+) -> FloatArray:
+    """(N, 3, n): velocity in the world of points (N, 3) fixed to `link` (one, or (N,)), per joint
+    velocity.
+    """
+    origin, direction = axes(joint_axis, poses)
+    columns = np.cross(direction, points[:, None] - origin)
+    moved = np.arange(1, len(joint_axis) + 1) <= np.broadcast_to(link, len(points))[:, None]
+    return (columns * moved[..., None]).transpose(0, 2, 1)
+
+
+def jacobian(joint_axis: FloatArray, poses: FloatArray, tcp: FloatArray) -> FloatArray:
+    """(N, 6, n): linear, then angular velocity of the tcp (4, 4 in link n) in the world, per joint
+    velocity.
+    """
+    point = (poses[:, -1] @ tcp)[:, :3, 3]
+    linear = point_jacobian(joint_axis, poses, point, len(joint_axis))
+    return np.concatenate([linear, axes(joint_axis, poses)[1].transpose(0, 2, 1)], axis=1)

@@ -1,0 +1,102 @@
+"""Signed distances of capsules on a chain from the bodies of a scene and from each other, with witnesses."""
+
+import numpy as np
+
+from ir_kernels.data import BoolArray, FloatArray, IntArray
+from ir_kernels.geometry import Geometry
+from ir_kernels.reference import chain
+from ir_kernels.reference.segments import Witness, segment_body, segment_segment
+
+
+def poses(model: Geometry, q: FloatArray) -> FloatArray:
+    """(N, n + 1, 4, 4): link poses at q (N, n)."""
+    return chain.link_poses(model.chain.joint_origin, model.chain.joint_axis, model.chain.base_pose, q)
+
+
+def ends(model: Geometry, link_poses: FloatArray) -> FloatArray:
+    """(N, C, 2, 3): ends of the capsules' axes in the world."""
+    frames = link_poses[:, model.capsules.link]
+    turned = np.einsum("ncab,ceb->ncea", frames[..., :3, :3], model.capsules.ends)
+    result: FloatArray = turned + frames[:, :, None, :3, 3]
+    return result
+
+
+def _inflate(axis: Witness, radius_a: FloatArray, radius_b: FloatArray) -> Witness:
+    """Witness of the surfaces, from that of the axes."""
+    return Witness(
+        axis.distance - radius_a - radius_b,
+        axis.on_segment - radius_a[:, None] * axis.normal,
+        axis.on_body + radius_b[:, None] * axis.normal,
+        axis.normal,
+    )
+
+
+def witnesses(model: Geometry, segments: FloatArray, pairs: IntArray) -> Witness:
+    """One pair (N,) of each row of capsule ends (N, C, 2, 3): distance, points on both surfaces, normal from
+    b to a.
+    """
+    result = Witness(np.empty(len(pairs)), *(np.empty((len(pairs), 3)) for _ in range(3)))
+    outside = len(model.environment)
+    radius = model.capsules.radius
+    body_of = np.full(len(pairs), -1)
+    body_of[pairs < outside] = model.environment[pairs[pairs < outside], 1]
+    for body in np.unique(body_of):
+        rows = np.flatnonzero(body_of == body)
+        if body < 0:
+            a, b = model.self_pairs[pairs[rows] - outside].T
+            first, second = segments[rows, a], segments[rows, b]
+            found = segment_segment(first[:, 0], first[:, 1], second[:, 0], second[:, 1])
+            found = _inflate(found, radius[a], radius[b])
+        else:
+            a = model.environment[pairs[rows], 0]
+            rotation, origin = model.scene.pose[body, :3, :3], model.scene.pose[body, :3, 3]
+            local = (segments[rows, a] - origin) @ rotation
+            hull, kind = model.scene.hulls[body], int(model.scene.kind[body])
+            found = segment_body(local[:, 0], local[:, 1], kind, model.scene.size[body], hull)
+            found = _inflate(found, radius[a], np.zeros(len(rows)))
+            found = Witness(
+                found.distance,
+                found.on_segment @ rotation.T + origin,
+                found.on_body @ rotation.T + origin,
+                found.normal @ rotation.T,
+            )
+        for whole, part in zip(result, found, strict=True):
+            whole[rows] = part
+    return result
+
+
+def distances(model: Geometry, segments: FloatArray) -> FloatArray:
+    """(N, Z): signed distances [m] of all pairs, from capsule ends (N, C, 2, 3); penetration is negative."""
+    rows, count = len(segments), len(model.environment) + len(model.self_pairs)
+    pairs = np.tile(np.arange(count), rows)
+    found = witnesses(model, np.repeat(segments, count, axis=0), pairs)
+    return found.distance.reshape(rows, count)
+
+
+def nearest(distance: FloatArray, offset: FloatArray) -> IntArray:
+    """(N,): the pair with the least distance - offset (Z,), the first of equals; -1 where there is none."""
+    if distance.shape[1] == 0:
+        return np.full(len(distance), -1)
+    excess = distance - offset
+    best = excess.argmin(axis=1)
+    return np.where(np.isinf(excess[np.arange(len(best)), best]), -1, best)
+
+
+def gradient(model: Geometry, link_poses: FloatArray, found: Witness, pairs: IntArray) -> FloatArray:
+    """(N, n): derivative of the distance of `pairs` (N,) by q [m/rad], along the witness' normal (Danskin's
+    theorem).
+    """
+    outside = len(model.environment)
+    own = pairs >= outside
+    both = np.concatenate([model.environment * [1, 0], model.self_pairs])[pairs]
+    link = model.capsules.link[both]
+    axis = model.chain.joint_axis
+    moved_a = chain.point_jacobian(axis, link_poses, found.on_segment, link[:, 0])
+    moved_b = chain.point_jacobian(axis, link_poses, found.on_body, np.where(own, link[:, 1], 0))
+    result: FloatArray = np.einsum("na,nai->ni", found.normal, moved_a - moved_b)
+    return result
+
+
+def is_free(distance: FloatArray, threshold: FloatArray) -> BoolArray:
+    """(N,): whether all distances (N, Z) exceed their threshold (Z,)."""
+    return np.asarray((distance > threshold).all(axis=1))
