@@ -1,0 +1,50 @@
+"""The port between the controller and a robot, and what a robot did with its motors.
+
+Three kinds of steps of length dt: the motors follow a command (`track`), the mechanical brakes act (`brake`), or
+the brakes are closed and nothing moves (`rest`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+from ir_sim_driver.arrays import Array
+
+
+class Work(NamedTuple):
+    """What the motors did in K steps: speed (K, n) [rad/s] in the middle of the step, torque (K, n) [Nm] at the joint."""
+
+    speed: Array
+    torque: Array
+
+
+class Backend(Protocol):
+    """A robot of n joints that is stepped.
+
+    q, qd (n,): present position [rad] and speed [rad/s]. torque (n,): of the motors in the last step [Nm].
+    disturbance (n,) or None: outside torque [Nm] that acts in every step until it is changed.
+    """
+
+    q: Array
+    qd: Array
+    torque: Array
+    disturbance: Array | None
+
+    def reset(self, q: Array) -> None:
+        """Stand still at q (n,), commanded to stay there."""
+
+    def set_load(self, loads: Sequence[Any]) -> None:
+        """Carry these loads (ir_description Load, in the last link's frame) from now on."""
+
+    def track(self, q_next: Array) -> None:
+        """Make a step of dt: the motors follow the command, which is q_next (n,) at the end of the step."""
+
+    def brake(self) -> None:
+        """Make a step of dt without motor torque, the mechanical brakes closing."""
+
+    def rest(self) -> None:
+        """Make a step of dt with closed brakes: nothing moves, no torque."""
+
+    def work(self) -> Work:
+        """What the motors did since the last call."""

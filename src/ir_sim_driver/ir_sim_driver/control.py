@@ -1,0 +1,58 @@
+"""Computed torque with PD: the acceleration that brings the robot back onto the command.
+
+Command and robot are compared on the same grid of steps: speed is the difference of two commands, acceleration
+the difference of two speeds. The command's velocity and acceleration feed forward exactly, whatever its path time
+does, and there is nothing to differentiate by hand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_sim_driver.arrays import Array
+from ir_sim_driver.errors import SettingsError
+
+
+@dataclass(frozen=True)
+class ControlSettings:
+    """Gains of the position loop.
+
+    natural_frequency [rad/s] and damping of the error; the frequency is bounded by what a 1 kHz loop can do.
+    """
+
+    natural_frequency: float = 100.0
+    damping: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.natural_frequency <= 300.0:
+            raise SettingsError(
+                f"natural_frequency is {self.natural_frequency:g} rad/s: it must be in [1, 300] rad/s"
+            )
+        if not 0.3 <= self.damping <= 2.0:
+            raise SettingsError(f"damping is {self.damping:g}: it must be in [0.3, 2]")
+
+
+class CommandFollower:
+    """Turns commands (n,), one per step of dt [s], into wanted accelerations (n,)."""
+
+    def __init__(self, dt: float, settings: ControlSettings | None = None) -> None:
+        settings = settings or ControlSettings()
+        self._per_dt = 1.0 / dt
+        self._kp = settings.natural_frequency**2
+        self._kd = 2.0 * settings.damping * settings.natural_frequency
+
+    def reset(self, q: Array) -> None:
+        """Start over with a command that stands at q."""
+        self.command: Array = q.copy()
+        self._speed: Array = np.zeros(len(q))
+
+    def acceleration(self, q_next: Array, q: Array, qd: Array) -> Array:
+        """Acceleration (n,) for the step that ends with the command q_next; the robot is at q, qd now."""
+        speed = (q_next - self.command) * self._per_dt
+        wanted: Array = (
+            (speed - self._speed) * self._per_dt + self._kd * (self._speed - qd) + self._kp * (self.command - q)
+        )
+        self.command, self._speed = q_next, speed
+        return wanted

@@ -1,0 +1,75 @@
+"""What stands between motor and link: rotor inertia, friction, counterbalance and the torque envelope (eq. 8).
+
+One robot at a time and in plain floats where that is faster: this runs every millisecond.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ir_sim_driver.arrays import Array
+
+FRICTION_SMOOTHING = 1e-3
+"""Speed [rad/s] over which Coulomb friction changes its sign: 1/1000 of working speed, and zero at rest, so
+that it never hides the holding torque."""
+
+
+class Drivetrain:
+    """Drives of the n joints of `robot` (an ir_description RobotModel).
+
+    rotor_inertia (n,) [kg m^2], seen at the joint.
+    """
+
+    def __init__(self, robot: Any, smoothing: float = FRICTION_SMOOTHING) -> None:
+        self.rotor_inertia: Array = np.array(robot.reflected_inertia)
+        self._viscous: Array = np.array(robot.friction_viscous)
+        self._coulomb: Array = np.array(robot.friction_coulomb)
+        self._per_smoothing = 1.0 / smoothing
+        self._counterbalance = robot.counterbalance
+        self._speeds: Array = np.array(robot.envelope_speed)
+        self._torques: Array = np.array(robot.envelope_torque)
+        self._least: Array = self._torques[:, -1].copy()
+
+    def resistance(self, q: Array, qd: Array) -> Array:
+        """Friction less counterbalance (n,) [Nm]: what the motor has to add to H qdd + h."""
+        torque: Array = self._viscous * qd + self._coulomb * np.tanh(qd * self._per_smoothing)
+        if self._counterbalance is not None:
+            j = self._counterbalance.joint
+            torque[j] -= self.counterbalance_torque(float(q[j]))
+        return torque
+
+    def counterbalance_torque(self, angle: float) -> float:
+        """Torque [Nm] about the positive axis at the joint angle [rad]; formula of ir_description's data."""
+        c = self._counterbalance
+        if c is None:
+            return 0.0
+        sin, cos = math.sin(angle), math.cos(angle)
+        (bx, bz), (ex, ez) = c.pivot, c.rod_eye
+        px, pz = cos * ex + sin * ez, cos * ez - sin * ex
+        length = math.hypot(px - bx, pz - bz)
+        volume = c.gas_volume - c.piston_area * (length - c.rod_length_at_charge)
+        force = c.piston_area * c.charge_pressure * (c.gas_volume / volume) ** c.exponent
+        return float(force * (pz * (bx - px) - px * (bz - pz)) / length)
+
+    def limited(self, torque: Array, qd: Array) -> tuple[Array, bool]:
+        """Torque (n,) within the envelope at the speeds qd, and whether anything was cut off."""
+        size = np.abs(torque)
+        if (size <= self._least).all():
+            return torque, False
+        limit = self.limit(qd)
+        if (size <= limit).all():
+            return torque, False
+        return np.clip(torque, -limit, limit), True
+
+    def limit(self, qd: Array) -> Array:
+        """Torque (n,) [Nm] available at the speeds |qd|."""
+        limits = np.empty(len(qd))
+        for j, speed in enumerate(np.abs(qd).tolist()):
+            if speed < self._speeds[j, 0]:
+                limits[j] = self._torques[j, 0]
+            else:
+                limits[j] = np.interp(speed, self._speeds[j], self._torques[j, 1:])
+        return limits

@@ -1,0 +1,40 @@
+"""What can go wrong in the driver, as one tree.
+
+DriverError
+├── SettingsError (ValueError)        a setting out of its range
+├── TrajectoryRefusedError            a trajectory that is not executed; code of control_msgs/FollowJointTrajectory
+├── RequestRefusedError               a service request that cannot be met; code of moveit_msgs/MoveItErrorCodes
+└── BackendError                      the physics gave up: not installed, disconnected or diverged
+"""
+
+from __future__ import annotations
+
+from ir_msgs_py.status import StatusCode
+
+
+class DriverError(Exception):
+    """Root of all errors of this package."""
+
+
+class SettingsError(DriverError, ValueError):
+    """A setting out of its range; the sentence names it with value, bound and unit."""
+
+
+class TrajectoryRefusedError(DriverError):
+    """A trajectory that is not executed; `code` is an ErrorCode."""
+
+    def __init__(self, code: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
+class RequestRefusedError(DriverError):
+    """A service request that cannot be met; `code` answers it."""
+
+    def __init__(self, code: StatusCode, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
+class BackendError(DriverError):
+    """The physics cannot go on."""

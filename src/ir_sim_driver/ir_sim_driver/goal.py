@@ -1,0 +1,64 @@
+"""What is asked of the executor and how it ended; codes of control_msgs/FollowJointTrajectory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+from ir_msgs_py.trajectory import JointTrajectory
+
+
+class ErrorCode(IntEnum):
+    """How a trajectory ended."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+@dataclass(frozen=True)
+class JointTolerance:
+    """Tolerance of one joint [rad, rad/s, rad/s^2]; 0: the default, -1: unbounded."""
+
+    name: str
+    position: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryGoal:
+    """A trajectory with what the sender allows.
+
+    stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for the goal tolerance
+    after the end, 0 = the default. has_effort: points carry effort. multi_dof: number of multi-dof points.
+    """
+
+    trajectory: JointTrajectory
+    stamp_ns: int = 0
+    path_tolerance: tuple[JointTolerance, ...] = ()
+    goal_tolerance: tuple[JointTolerance, ...] = ()
+    goal_time: float = 0.0
+    has_effort: bool = False
+    multi_dof: int = 0
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How goal `goal_id` ended.
+
+    canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp; energy [J] at the
+    mains while it ran.
+    """
+
+    goal_id: int
+    code: ErrorCode
+    sentence: str
+    canceled: bool = False
+    max_tool_deviation: float = 0.0
+    energy: float = 0.0

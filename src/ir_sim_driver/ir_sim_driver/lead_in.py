@@ -1,0 +1,98 @@
+"""From where the command is onto a trajectory, without a jump.
+
+First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference (within the start
+tolerance) is closed before path time starts. First time 0 in motion: a polynomial bridges to the next point far
+enough away.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_sim_driver.arrays import Array
+from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.goal import ErrorCode
+from ir_sim_driver.path import Motion, Path, quintic
+
+_GENTLE = 0.25  # share of the acceleration limit that closing the last difference may use
+_PEAK = 10.0 / math.sqrt(3.0)  # largest acceleration of a unit quintic step of unit duration
+_SAME = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A path and the path time [s] at which its trajectory starts."""
+
+    path: Path
+    offset: float
+
+
+def route_onto(
+    trajectory: JointTrajectory, now: Motion, acceleration_max: Array, settings: ExecutionSettings
+) -> Route:
+    """Path from the commanded motion `now` onto and along the trajectory. Raises TrajectoryRefusedError."""
+    coefficients, durations = trajectory.coefficients()
+    first = float(trajectory.times[0])
+    if first > 0.0:
+        lead = quintic(now, _motion_at_point(trajectory, 0), first)
+        return Route(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0)
+    _check_start(trajectory, now, acceleration_max, settings)
+    delta = np.abs(trajectory.positions[0] - now.q)
+    if now.qd.any():
+        if len(durations) == 0:
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL, "the only point has time 0 s and the robot moves: give it a time above 0 s"
+            )
+        k = min(int(np.searchsorted(trajectory.times, settings.bridge_time)), len(durations))
+        bridge = quintic(now, _motion_at_point(trajectory, k), float(trajectory.times[k]))
+        pieces = [bridge, coefficients[k:]], [trajectory.times[k : k + 1], durations[k:]]
+        return Route(_path(*pieces, now.q), 0.0)
+    if delta.max() <= _SAME:
+        return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0)
+    T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / _GENTLE)
+    still = np.zeros_like(delta)
+    closing = quintic(Motion(now.q, still, still), Motion(trajectory.positions[0], still, still), T)
+    return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T)
+
+
+def _path(coefficients: list[Array], durations: list[Array], rest: Array) -> Path:
+    return Path(np.concatenate(coefficients), np.concatenate(durations), rest)
+
+
+def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
+    """Motion right after point k; what a trajectory does not say comes from its own polynomial."""
+    samples = trajectory.sample(trajectory.times[k : k + 1])
+    last = k == len(trajectory.times_ns) - 1
+    still = np.zeros(samples.q.shape[1])
+    v = samples.qd[0] if trajectory.velocities is None else trajectory.velocities[k]
+    a = samples.qdd[0] if trajectory.accelerations is None else trajectory.accelerations[k]
+    if last:  # the robot rests there
+        v, a = (still if trajectory.velocities is None else v), (still if trajectory.accelerations is None else a)
+    return Motion(trajectory.positions[k], v, a)
+
+
+def _check_start(
+    trajectory: JointTrajectory, now: Motion, acceleration_max: Array, settings: ExecutionSettings
+) -> None:
+    delta = trajectory.positions[0] - now.q
+    j = int(np.abs(delta).argmax())
+    if abs(delta[j]) > settings.start_tolerance:
+        raise TrajectoryRefusedError(
+            ErrorCode.INVALID_GOAL,
+            f"{trajectory.joint_names[j]} starts at {trajectory.positions[0, j]:.6f} rad, {delta[j]:+.6f} rad from the "
+            f"commanded {now.q[j]:.6f} rad: at most {settings.start_tolerance:g} rad (or a first time above 0 s)",
+        )
+    jump = _motion_at_point(trajectory, 0).qd - now.qd
+    over = np.abs(jump) - settings.blend_time * acceleration_max
+    j = int(over.argmax())
+    if over[j] > 0.0:
+        raise TrajectoryRefusedError(
+            ErrorCode.INVALID_GOAL,
+            f"{trajectory.joint_names[j]} starts with {jump[j]:+.4f} rad/s against the command: at most "
+            f"{settings.blend_time * acceleration_max[j]:.4f} rad/s (or a first time above 0 s)",
+        )

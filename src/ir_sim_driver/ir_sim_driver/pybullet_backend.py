@@ -1,0 +1,239 @@
+"""The robot in PyBullet, driven by motor torques within the envelope. The only file that knows PyBullet.
+
+Rotor inertia is up to 4000 times a link's own and can neither be fed back as a torque (it diverges in six steps)
+nor be added to the links. So every step solves qdd = (H + J_r)^-1 (tau - h - friction + counterbalance) and applies
+H qdd + h to the links: exact, and without saturation H is not even needed.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ir_sim_driver.arrays import Array
+from ir_sim_driver.backend import Work
+from ir_sim_driver.control import CommandFollower, ControlSettings
+from ir_sim_driver.drivetrain import Drivetrain
+from ir_sim_driver.errors import BackendError
+
+GRAVITY = 9.80665
+BRAKE_FACTOR = 1.5
+"""Torque of a mechanical brake over the joint's largest motor torque (an estimate; no public figure)."""
+SPEED_GUARD = 50.0
+"""Speed [rad/s] that no joint reaches: beyond it the physics has diverged."""
+_CHUNK = 4096
+
+
+class PyBulletBackend:
+    """Implements Backend for `robot` standing at `base_pose` (4, 4).
+
+    urdf: makes the URDF text of the robot with one load (None: nothing attached); combine: makes one load of many.
+    Raises BackendError when PyBullet is missing or has diverged.
+    """
+
+    def __init__(
+        self,
+        robot: Any,
+        dt: float,
+        urdf: Callable[[Any, Any], str],
+        base_pose: Array | None = None,
+        control: ControlSettings | None = None,
+    ) -> None:
+        self._bullet, self._client = _connect(dt)
+        self._robot, self._dt, self._urdf = robot, dt, urdf
+        self._base = np.eye(4) if base_pose is None else base_pose
+        self._n = len(robot.joint_names)
+        self._drives = Drivetrain(robot)
+        self._follower = CommandFollower(dt, control)
+        self._brake_torque: Array = BRAKE_FACTOR * np.array(robot.envelope_torque)[:, 0]
+        self._zeros = [0.0] * self._n
+        self._still: Array = np.zeros(self._n)
+        self.disturbance: Array | None = None
+        self.torque: Array = self._still
+        self.q: Array = np.array(robot.machine_home, dtype=np.float64)
+        self.qd: Array = self._still
+        self._speed: Array = self._still
+        self._speeds: list[Array] = []
+        self._torques: list[Array] = []
+        self._body = -1
+        self.set_load(())
+        self.reset(self.q)
+
+    def close(self) -> None:
+        """Let go of the physics server."""
+        self._bullet.disconnect(physicsClientId=self._client)
+
+    def reset(self, q: Array) -> None:
+        """Stand still at q."""
+        self.q, self.qd, self._speed = np.array(q, dtype=np.float64), self._still, self._still
+        self._follower.reset(self.q)
+        self._write_state()
+
+    def set_load(self, loads: Sequence[Any]) -> None:
+        """Rebuild the robot with these loads, in the same motion."""
+        text = self._urdf(self._robot, tuple(loads))
+        bullet, client = self._bullet, self._client
+        if self._body >= 0:
+            bullet.removeBody(self._body, physicsClientId=client)
+        with tempfile.TemporaryDirectory(prefix="ir_sim_driver_") as folder:
+            path = Path(folder) / "robot.urdf"
+            path.write_text(text, encoding="utf-8")
+            self._body = bullet.loadURDF(
+                str(path), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
+            )
+        self._joints = self._movable_joints()
+        self._place_base()
+        for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
+            bullet.changeDynamics(
+                self._body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=client
+            )
+            bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=client)
+        for joint in self._joints:  # the built-in motors off
+            bullet.setJointMotorControl2(
+                self._body, joint, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client
+            )
+        self._write_state()
+
+    def track(self, q_next: Array) -> None:
+        """Follow the command with the torque that the envelope allows."""
+        speed, drives = self._speed, self._drives
+        qdd = self._follower.acceleration(q_next, self.q, speed)
+        now = speed + (0.5 * self._dt) * qdd  # the state's speed lags half a step: explicit steps of Bullet
+        links = self._inverse_dynamics(qdd)
+        resistance = drives.resistance(self.q, now)
+        torque, cut = drives.limited(links + drives.rotor_inertia * qdd + resistance, now)
+        if cut or self.disturbance is not None:
+            links, qdd = self._driven(torque, resistance)
+        self.torque = torque
+        self._advance(links)
+
+    def brake(self) -> None:
+        """Take the torque that stops each joint within this step, as far as its brake can."""
+        resistance = self._drives.resistance(self.q, self._still)
+        stopping = self._speed * (-1.0 / self._dt)
+        links = self._inverse_dynamics(stopping)
+        wanted = links + self._drives.rotor_inertia * stopping + resistance
+        torque = np.clip(wanted, -self._brake_torque, self._brake_torque)
+        if (torque != wanted).any() or self.disturbance is not None:
+            links, _ = self._driven(torque, resistance)
+        self.torque = self._still
+        self._advance(links)
+        self._follower.reset(self.q)
+
+    def rest(self) -> None:
+        """Stay where the closed brakes hold the robot."""
+        if self._speed.any():
+            self._speed = self.qd = self._still
+            self._write_state()
+        self.torque = self._still
+        self._speeds.append(self._still)
+        self._torques.append(self._still)
+
+    def work(self) -> Work:
+        """Speed and torque of every step since the last call."""
+        shape = (len(self._speeds), self._n)
+        work = Work(np.array(self._speeds).reshape(shape), np.array(self._torques).reshape(shape))
+        self._speeds.clear()
+        self._torques.clear()
+        return work
+
+    def mass_matrix(self) -> Array:
+        """H (n, n) at the present state, without rotor inertia."""
+        H = self._bullet.calculateMassMatrix(self._body, self.q.tolist(), physicsClientId=self._client)
+        return np.array(H, dtype=np.float64)
+
+    def bias(self) -> Array:
+        """h = C qd + g (n,) at the present state."""
+        return self._inverse_dynamics(self._still)
+
+    def link_com_pose(self, link: int) -> tuple[Array, Array]:
+        """Position (3,) and quaternion xyzw (4,) of the centre-of-mass frame of link 1..n in the world.
+
+        Bullet keeps this frame in double precision, the link frame itself only in single.
+        """
+        state = self._bullet.getLinkState(
+            self._body, self._joints[link - 1], computeForwardKinematics=True, physicsClientId=self._client
+        )
+        return np.array(state[0]), np.array(state[1])
+
+    def _driven(self, torque: Array, resistance: Array) -> tuple[Array, Array]:
+        """Torque on the links and acceleration under motor torque and disturbance."""
+        H, h = self.mass_matrix(), self.bias()
+        outer = torque - h - resistance
+        if self.disturbance is not None:
+            outer = outer + self.disturbance
+        qdd = np.linalg.solve(H + np.diag(self._drives.rotor_inertia), outer)
+        return H @ qdd + h, qdd
+
+    def _inverse_dynamics(self, qdd: Array) -> Array:
+        result = self._bullet.calculateInverseDynamics(
+            self._body, self.q.tolist(), self._speed.tolist(), qdd.tolist(), physicsClientId=self._client
+        )
+        if len(result) != self._n:
+            raise BackendError("PyBullet gives no inverse dynamics: the physics server is gone")
+        return np.array(result)
+
+    def _advance(self, links: Array) -> None:
+        bullet, client = self._bullet, self._client
+        try:
+            bullet.setJointMotorControlArray(
+                self._body, self._joints, bullet.TORQUE_CONTROL, forces=links.tolist(), physicsClientId=client
+            )
+            bullet.stepSimulation(physicsClientId=client)
+            states = bullet.getJointStates(self._body, self._joints, physicsClientId=client)
+        except bullet.error as error:
+            raise BackendError(f"PyBullet failed: {error}") from error
+        before = self._speed
+        q = np.array([state[0] for state in states])
+        speed = np.array([state[1] for state in states])
+        if not np.abs(speed).max() < SPEED_GUARD:  # NaN does not pass either
+            raise BackendError(f"the physics has diverged: a joint moves faster than {SPEED_GUARD:g} rad/s")
+        self.q, self._speed = q, speed
+        self.qd = speed + 0.5 * (speed - before)
+        self._speeds.append(0.5 * (before + speed))
+        self._torques.append(self.torque)
+        if len(self._speeds) > _CHUNK:  # nobody reads the work: keep the memory bounded
+            del self._speeds[:_CHUNK], self._torques[:_CHUNK]
+
+    def _write_state(self) -> None:
+        for joint, q, speed in zip(self._joints, self.q.tolist(), self._speed.tolist(), strict=True):
+            self._bullet.resetJointState(self._body, joint, q, speed, physicsClientId=self._client)
+
+    def _movable_joints(self) -> list[int]:
+        by_name = {}
+        for joint in range(self._bullet.getNumJoints(self._body, physicsClientId=self._client)):
+            info = self._bullet.getJointInfo(self._body, joint, physicsClientId=self._client)
+            by_name[info[1].decode()] = joint
+        return [by_name[name] for name in self._robot.joint_names]
+
+    def _place_base(self) -> None:
+        """Put base_link, which Bullet moves by its centre of mass, to the base pose."""
+        bullet, client = self._bullet, self._client
+        com = bullet.getDynamicsInfo(self._body, -1, physicsClientId=client)[3]
+        turn = bullet.getDynamicsInfo(self._body, -1, physicsClientId=client)[4]
+        position, rotation = self._base[:3, 3].tolist(), _quaternion(self._base[:3, :3])
+        position, rotation = bullet.multiplyTransforms(position, rotation, com, turn)
+        bullet.resetBasePositionAndOrientation(self._body, position, rotation, physicsClientId=client)
+
+
+def _connect(dt: float) -> tuple[Any, int]:
+    try:
+        import pybullet  # noqa: PLC0415  a missing PyBullet is reported when it is wanted
+    except ImportError as error:
+        raise BackendError(f"PyBullet is not installed ({error}): use backend ideal") from error
+    client = pybullet.connect(pybullet.DIRECT)
+    if client < 0:
+        raise BackendError("PyBullet offers no physics server")
+    pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+    pybullet.setTimeStep(dt, physicsClientId=client)
+    return pybullet, client
+
+
+def _quaternion(R: Array) -> list[float]:
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415  slow import, needed once
+
+    return [float(x) for x in Rotation.from_matrix(R).as_quat()]

@@ -1,0 +1,100 @@
+"""At the door: is this trajectory one that the robot can and may follow from here?"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from ir_msgs_py.errors import JointNamesError
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.goal import ErrorCode, JointTolerance, TrajectoryGoal
+from ir_sim_driver.lead_in import Route, route_onto
+from ir_sim_driver.limit_checks import check_limits
+from ir_sim_driver.path import Motion
+
+_REST = 1e-6  # rad/s that still counts as standing
+_NS = 1e-9
+
+
+def check_goal(goal: TrajectoryGoal, joint_names: tuple[str, ...], settings: ExecutionSettings, now_ns: int) -> TrajectoryGoal:
+    """Return the goal in the robot's joint order. Raises TrajectoryRefusedError; knows nothing of the robot's state."""
+    if goal.multi_dof:
+        raise _invalid(f"{goal.multi_dof} multi-dof points: the robot has joints only")
+    if goal.has_effort:
+        raise _invalid("points carry effort: torques are the driver's business, leave them empty")
+    points = len(goal.trajectory.times_ns)
+    if points > settings.max_points:
+        raise _invalid(f"the trajectory has {points} points: at most {settings.max_points}")
+    try:
+        trajectory = goal.trajectory.reordered(joint_names)
+    except JointNamesError as error:
+        raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, str(error)) from error
+    if trajectory.duration > settings.max_duration:
+        raise _invalid(f"the trajectory takes {trajectory.duration:g} s: at most {settings.max_duration:g} s")
+    _check_stamp(goal, trajectory, settings, now_ns)
+    _check_end(trajectory)
+    for tolerance in (*goal.path_tolerance, *goal.goal_tolerance):
+        _check_tolerance(tolerance, joint_names)
+    if not (math.isfinite(goal.goal_time) and goal.goal_time >= 0.0):
+        raise _invalid(f"goal_time_tolerance is {goal.goal_time:g} s: it must be at least 0 s")
+    return TrajectoryGoal(
+        trajectory, goal.stamp_ns, goal.path_tolerance, goal.goal_tolerance, goal.goal_time, label=goal.label
+    )
+
+
+def checked_route(
+    goal: TrajectoryGoal, now: Motion, robot: Any, dynamics: Any, settings: ExecutionSettings, dt: float
+) -> Route:
+    """Path from the commanded motion `now` along a goal that passed check_goal. Raises TrajectoryRefusedError."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        route = route_onto(goal.trajectory, now, robot.acceleration_max, settings)
+        if not np.isfinite(route.path.coefficients).all():
+            raise _invalid("the points lie so close in time that their interpolation is not finite")
+    check_limits(route, robot, dynamics, settings, dt)
+    return route
+
+
+def _check_stamp(goal: TrajectoryGoal, trajectory: JointTrajectory, settings: ExecutionSettings, now_ns: int) -> None:
+    if goal.stamp_ns == 0:
+        return
+    delay = (goal.stamp_ns - now_ns) * _NS
+    if delay + trajectory.duration < 0.0:
+        raise TrajectoryRefusedError(
+            ErrorCode.OLD_HEADER_TIMESTAMP,
+            f"the trajectory ended {-delay - trajectory.duration:.3f} s ago by its header stamp: it must end in the future",
+        )
+    if delay > settings.max_delay:
+        raise _invalid(f"the trajectory starts in {delay:.3f} s by its header stamp: at most {settings.max_delay:g} s")
+
+
+def _check_end(trajectory: JointTrajectory) -> None:
+    if trajectory.velocities is None:
+        return
+    last = trajectory.velocities[-1]
+    j = int(np.abs(last).argmax())
+    if abs(last[j]) > _REST:
+        raise _invalid(
+            f"point {len(trajectory.times_ns) - 1} joint {j} ({trajectory.joint_names[j]}) ends with {last[j]:g} rad/s: "
+            "the last velocity must be 0 rad/s"
+        )
+
+
+def _check_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) -> None:
+    if tolerance.name not in joint_names:
+        raise _invalid(
+            f"tolerance for unknown joint {tolerance.name[:80]!r}: expected are {', '.join(joint_names)}"
+        )
+    for what in ("position", "velocity", "acceleration"):
+        value = getattr(tolerance, what)
+        if not (math.isfinite(value) and (value >= 0.0 or value == -1.0)):
+            raise _invalid(
+                f"{what} tolerance of {tolerance.name} is {value:g}: it must be at least 0 (0: default), or -1 (unbounded)"
+            )
+
+
+def _invalid(sentence: str) -> TrajectoryRefusedError:
+    return TrajectoryRefusedError(ErrorCode.INVALID_GOAL, sentence)
