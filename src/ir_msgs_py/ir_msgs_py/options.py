@@ -1,0 +1,51 @@
+"""What a planning request may choose, with the defaults of ir_msgs/PlanOptions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ir_msgs_py.checks import at_least, finite, in_fraction, one_of, set_field
+from ir_msgs_py.errors import InvalidValueError
+
+OBJECTIVES = ("movement_cost", "time", "energy", "time_and_energy")
+TIMINGS = ("synchronous", "asynchronous")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanOptions:
+    """Zero is a value: a seed or safety distance of 0 is taken literally.
+
+    planner_id: "" = the node's portfolio. random_seed: draw a seed and echo it. max_iterations: budget in
+    work, 0 = the node's default. planning_time: ceiling [s]. safety_distance: S_m [m]. time_value [W] in J
+    = E + time_value x T. duration: wanted [s], 0 = free. velocity_scaling, acceleration_scaling in (0, 1].
+    load: load text, "" = what is attached. include_points: put the points into the answer.
+    """
+
+    planner_id: str = ""
+    seed: int = 0
+    random_seed: bool = False
+    max_iterations: int = 0
+    planning_time: float = 5.0
+    safety_distance: float = 0.02
+    objective: str = "time_and_energy"
+    time_value: float = 500.0
+    duration: float = 0.0
+    timing: str = "synchronous"
+    velocity_scaling: float = 1.0
+    acceleration_scaling: float = 1.0
+    load: str = ""
+    include_points: bool = False
+
+    def __post_init__(self) -> None:
+        for name, bound in (("seed", 2**64), ("max_iterations", 2**32)):
+            if not 0 <= getattr(self, name) < bound:
+                raise InvalidValueError(f"{name} is {getattr(self, name)}: it must be in 0 .. {bound - 1}")
+        planning_time = finite(self.planning_time, "planning_time", "s")
+        if planning_time <= 0.0:
+            raise InvalidValueError(f"planning_time is {planning_time:g} s: it must be more than 0 s")
+        for name, unit in (("safety_distance", "m"), ("time_value", "W"), ("duration", "s")):
+            set_field(self, name, at_least(getattr(self, name), 0.0, name, unit))
+        one_of(self.objective, OBJECTIVES, "objective")
+        one_of(self.timing, TIMINGS, "timing")
+        for name in ("velocity_scaling", "acceleration_scaling"):
+            set_field(self, name, in_fraction(getattr(self, name), name))

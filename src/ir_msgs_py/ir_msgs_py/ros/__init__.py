@@ -1,0 +1,1 @@
+"""What needs rclpy: conversions, parameters, a client for scripts and fixtures for tests."""

@@ -1,0 +1,88 @@
+"""Stamps, float arrays and configurations of joints, to and from messages."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point
+from ir_msgs.msg import Status as StatusMsg
+from sensor_msgs.msg import JointState
+
+from ir_msgs_py.checks import FloatArray, read_only
+from ir_msgs_py.errors import InvalidValueError, JointNamesError
+from ir_msgs_py.status import Status
+
+NS_PER_S = 1_000_000_000
+
+
+def float_array(values: FloatArray) -> array[float]:
+    """What a float64[] field takes without looking at each element."""
+    return array("d", values.tobytes())
+
+
+def time_to_msg(stamp_ns: int) -> Time:
+    """Node clock [ns] as a stamp."""
+    seconds, nanoseconds = divmod(int(stamp_ns), NS_PER_S)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def time_from_msg(msg: Time) -> int:
+    """Stamp as node clock [ns]."""
+    return int(msg.sec) * NS_PER_S + int(msg.nanosec)
+
+
+def point_to_msg(point: FloatArray) -> Point:
+    """Point (3,) [m]."""
+    x, y, z = (float(value) for value in point)
+    return Point(x=x, y=y, z=z)
+
+
+def point_from_msg(msg: Point) -> FloatArray:
+    """Point (3,) [m], finite."""
+    return read_only([msg.x, msg.y, msg.z], "point", (3,))
+
+
+def status_to_msg(status: Status) -> StatusMsg:
+    """Outcome of a request."""
+    return StatusMsg(code=int(status.code), message=status.message, source=status.source)
+
+
+def status_from_msg(msg: StatusMsg) -> Status:
+    """Outcome of a request."""
+    return Status(int(msg.code), msg.message, msg.source)
+
+
+def configuration_to_msg(joint_names: Sequence[str], q: FloatArray, stamp_ns: int = 0) -> JointState:
+    """Joint values q (n,) [rad] with their names."""
+    msg = JointState(name=list(joint_names), position=float_array(q))
+    msg.header.stamp = time_to_msg(stamp_ns)
+    return msg
+
+
+def configuration_given(msg: JointState) -> bool:
+    """Whether a request names a configuration at all: an empty one means the node's default."""
+    return bool(msg.name or msg.position)
+
+
+def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> FloatArray:
+    """Joint values (n,) [rad] in the order of joint_names; names may be missing (then that order is meant).
+
+    Raises JointNamesError for foreign, missing or double names, InvalidValueError for the values.
+    """
+    expected = list(joint_names)
+    names = list(msg.name) or expected
+    known = ", ".join(expected)
+    if len(names) != len(set(names)):
+        raise JointNamesError(f"a joint is named more than once: expected are {known}")
+    for name in names:
+        if name not in expected:
+            raise JointNamesError(f"unknown joint {name[:80]!r}: expected are {known}")
+    for name in expected:
+        if name not in names:
+            raise JointNamesError(f"joint {name!r} is missing: expected are {known}")
+    if len(msg.position) != len(names):
+        raise InvalidValueError(f"position has {len(msg.position)} values: {len(names)} joints need as many")
+    values = read_only(msg.position, "position", (len(names),))
+    return read_only(values[[names.index(name) for name in expected]], "position", (len(names),))
