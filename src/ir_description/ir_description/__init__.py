@@ -1,6 +1,10 @@
 """The robot and the cells as data: limits, drives, power modes, cells, and their typed, validated loading."""
 
+from ir_description.body import Body
 from ir_description.capsule import Capsule
+from ir_description.cell import Cell, Task
+from ir_description.cell_writer import cell_to_yaml
+from ir_description.equipment import AllowedContact, Equipment, EquipmentState, Station, Zone
 from ir_description.errors import (
     CellFileError,
     DescriptionError,
@@ -9,24 +13,50 @@ from ir_description.errors import (
     RobotFileError,
     UnknownNameError,
 )
-from ir_description.library import bundled_robots, load_power_data, load_robot
+from ir_description.library import (
+    bundled_cells,
+    bundled_robots,
+    cell_from_yaml,
+    load_cell,
+    load_power_data,
+    load_robot,
+)
 from ir_description.load import Load
+from ir_description.part import Part
 from ir_description.power import PowerData
+from ir_description.program import CellSignal, PartPlaces, ProgramStep, Signal
 from ir_description.robot import Counterbalance, RobotModel
 
 __all__ = [
+    "AllowedContact",
+    "Body",
     "Capsule",
+    "Cell",
     "CellFileError",
+    "CellSignal",
     "Counterbalance",
     "DescriptionError",
     "DescriptionFileError",
+    "Equipment",
+    "EquipmentState",
     "InvalidValueError",
     "Load",
+    "Part",
+    "PartPlaces",
     "PowerData",
+    "ProgramStep",
     "RobotFileError",
     "RobotModel",
+    "Signal",
+    "Station",
+    "Task",
     "UnknownNameError",
+    "Zone",
+    "bundled_cells",
     "bundled_robots",
+    "cell_from_yaml",
+    "cell_to_yaml",
+    "load_cell",
     "load_power_data",
     "load_robot",
 ]

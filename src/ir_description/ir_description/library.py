@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
-from ir_description.errors import UnknownNameError
+from ir_description.cell import Cell
+from ir_description.cell_reader import read_cell
+from ir_description.errors import CellFileError, InvalidValueError, UnknownNameError, shown
+from ir_description.mesh import read_regular_file
 from ir_description.power import PowerData
 from ir_description.power_file import power_from_yaml
 from ir_description.robot import RobotModel
 from ir_description.robot_file import robot_from_yaml
 
 _DATA = files("ir_description") / "data"
+
+CELL_BYTES_MAX = 8_000_000
+"""Largest cell file [bytes]."""
 
 
 def _bundled(folder: str) -> tuple[str, ...]:
@@ -40,3 +48,46 @@ def load_power_data(name: str = "kr_c4") -> PowerData:
         raise UnknownNameError("controller", name, _bundled("power"))
     path = _DATA / "power" / f"{name}.yaml"
     return power_from_yaml(path.read_text(encoding="utf-8"), path.name)
+
+
+def bundled_cells() -> tuple[str, ...]:
+    """Return the names of cells that load_cell knows."""
+    return _bundled("cells")
+
+
+def load_cell(name_or_path: str | Path) -> Cell:
+    """Return a bundled cell by its name, or the cell of a file by its path.
+
+    A text with a folder or with the ending .yaml or .yml is a path. Only regular files of at most
+    CELL_BYTES_MAX are read; their meshes come from their own folder.
+    """
+    name = os.fspath(name_or_path)
+    if isinstance(name_or_path, str) and name in bundled_cells():
+        return _bundled_cell(name)
+    if isinstance(name_or_path, str) and os.sep not in name and not name.endswith((".yaml", ".yml")):
+        raise UnknownNameError("cell", name, bundled_cells())
+    path = Path(name)
+    try:
+        content = read_regular_file(path, CELL_BYTES_MAX)
+    except InvalidValueError as error:
+        raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
+    return read_cell(_decoded(content, str(path)), str(path), load_robot, path.parent)
+
+
+def cell_from_yaml(text: str, source: str = "<text>") -> Cell:
+    """Return the cell of a text; errors name `source` and line. Mesh files can't be named in a text."""
+    return read_cell(text, source, load_robot, None)
+
+
+@cache
+def _bundled_cell(name: str) -> Cell:
+    path = _DATA / "cells" / f"{name}.yaml"
+    return read_cell(path.read_text(encoding="utf-8"), path.name, load_robot, Path(str(path)).parent)
+
+
+def _decoded(content: bytes, source: str) -> str:
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise CellFileError(source, line, f"byte 0x{content[error.start]:02x} is not UTF-8 text") from error

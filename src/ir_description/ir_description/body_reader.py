@@ -1,0 +1,129 @@
+"""Reads poses and bodies of a cell file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ir_description.arrays import Array
+from ir_description.body import KINDS, SIZE_MAX, Body
+from ir_description.cell_checks import BODIES_MAX, NameRegister
+from ir_description.errors import InvalidValueError
+from ir_description.items import Item, Table
+from ir_description.mesh import HULL_VERTICES_MAX, convex_vertices, hull_vertices, mesh_path, read_stl
+from ir_description.poses import pose_of, rotation_from_abc, rotation_from_matrix, rotation_from_quaternion
+
+POSE_KEYS = ("xyz", "abc_deg", "quaternion", "rotation")
+FAR = 1000.0
+"""Farthest place [m] of anything in a cell."""
+
+
+def read_pose(item: Item) -> Array:
+    """Return the pose (4, 4) of a mapping with POSE_KEYS."""
+    return pose_in(item.table((), POSE_KEYS))
+
+
+def pose_in(table: Table) -> Array:
+    """Return the pose (4, 4) of xyz [m] and one of abc_deg, quaternion (x, y, z, w) or rotation (rows)."""
+    xyz = table["xyz"].numbers(3, -FAR, FAR, "m") if "xyz" in table else np.zeros(3)
+    if not any(key in table for key in POSE_KEYS[1:]):
+        return pose_of(xyz)
+    key = table.one_of(*POSE_KEYS[1:])
+    item = table[key]
+    with item.blamed():
+        if key == "abc_deg":
+            rotation = rotation_from_abc(item.numbers(3, -360.0, 360.0, "deg"))
+        elif key == "quaternion":
+            rotation = rotation_from_quaternion(item.numbers(4, -2.0, 2.0))
+        else:
+            rotation = rotation_from_matrix(item.rows(3, -2.0, 2.0, count=(3, 3)))
+    return pose_of(xyz, rotation)
+
+
+class BodyReader:
+    """Reads bodies, each with a name that no other body or capsule has."""
+
+    def __init__(self, shapes: NameRegister, folder: Path | None) -> None:
+        self._shapes, self._folder = shapes, folder
+        self._count = 0
+        self._meshes: dict[tuple[str, bool], Array] = {}
+
+    def read(self, item: Item) -> Body:
+        """Return one body; its keys depend on its kind."""
+        table = item.table(
+            ("name", "kind"),
+            (*POSE_KEYS, "size", "radius", "length", "file", "scale", "convex_hull", "vertices"),
+        )
+        self._count += 1
+        if self._count > BODIES_MAX:
+            item.fail(f"is one body too many, a cell has at most {BODIES_MAX}")
+        name = table["name"].name()
+        with table["name"].blamed():
+            self._shapes.add(name)
+        kind = table["kind"].choice(KINDS)
+        shape = _SHAPE_KEYS[kind]
+        for key in _ALL_SHAPE_KEYS:
+            if key in table and key not in shape:
+                table[key].fail(
+                    f"does not belong to a {kind}; its keys are {', '.join(shape) or 'only its pose'}"
+                )
+        size, vertices = self._mesh(table) if kind == "mesh" else (_size(table, kind), np.zeros((0, 3)))
+        with item.blamed():
+            return Body(name, kind, pose_in(table), size, vertices)  # type: ignore[arg-type]
+
+    def _mesh(self, table: Table) -> tuple[Array, Array]:
+        key = table.one_of("file", "vertices")
+        if key == "vertices":
+            for other in ("scale", "convex_hull"):
+                if other in table:
+                    table[other].fail("belongs to a mesh with a file")
+            points = table["vertices"].rows(3, -FAR, FAR, "m", count=(4, HULL_VERTICES_MAX))
+            with table["vertices"].blamed():
+                return np.zeros(3), hull_vertices(points)
+        item = table["file"]
+        name = item.text()
+        scale = table["scale"].number(0, 1000, above=True) if "scale" in table else 1.0
+        take_hull = table["convex_hull"].boolean() if "convex_hull" in table else False
+        with item.blamed():
+            if (name, take_hull) not in self._meshes:
+                if self._folder is None:
+                    raise InvalidValueError(
+                        "a mesh file can be named only in a cell file, this is a text; give its vertices"
+                    )
+                self._meshes[name, take_hull] = convex_vertices(
+                    read_stl(mesh_path(self._folder, name)), take_hull
+                )
+            vertices = self._meshes[name, take_hull] * scale
+            if np.abs(vertices).max() > FAR:
+                raise InvalidValueError(
+                    f"the mesh reaches {np.abs(vertices).max():g} m, must stay within {FAR:g} m "
+                    "(scale: 0.001 for mm)"
+                )
+        return np.zeros(3), vertices
+
+
+_SHAPE_KEYS: dict[str, tuple[str, ...]] = {
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "capsule": ("radius", "length"),
+    "plane": (),
+    "mesh": ("file", "scale", "convex_hull", "vertices"),
+}
+_ALL_SHAPE_KEYS = ("size", "radius", "length", "file", "scale", "convex_hull", "vertices")
+
+
+def _size(table: Table, kind: str) -> Array:
+    """Return size (3,) [m] as Body wants it."""
+    for key in _SHAPE_KEYS[kind]:
+        if key not in table:
+            table.item.fail(f"has no {key}; a {kind} has {', '.join(_SHAPE_KEYS[kind])}")
+    if kind == "box":
+        return table["size"].numbers(3, 0.0, SIZE_MAX, "m", above=True)
+    lengths = np.zeros(3)
+    if "radius" in table:
+        lengths[0] = table["radius"].number(0.0, SIZE_MAX, "m", above=True)
+    if "length" in table:
+        lengths[1] = table["length"].number(0.0, SIZE_MAX, "m", above=kind == "cylinder")
+    return lengths

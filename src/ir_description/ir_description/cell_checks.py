@@ -1,0 +1,176 @@
+"""What must hold between the things of a cell: unique names, known names, a payload the robot carries.
+
+The rules are small objects and functions so that the reader of cell files can ask each at the line it reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from ir_description.body import Body
+from ir_description.capsule import Capsule
+from ir_description.equipment import AllowedContact
+from ir_description.errors import InvalidValueError, UnknownNameError
+from ir_description.load import Load, total_mass
+from ir_description.part import Part
+from ir_description.program import CellSignal, PartPlaces, ProgramStep
+from ir_description.robot import RobotModel
+
+if TYPE_CHECKING:
+    from ir_description.cell import Cell
+
+BODIES_MAX = 20_000
+"""Most bodies a cell may have."""
+
+
+class NameRegister:
+    """Names of one kind, each given once."""
+
+    def __init__(self, what: str, taken: Iterable[str] = ()) -> None:
+        self._what = what
+        self._names = dict.fromkeys(taken)
+
+    def __iter__(self) -> Iterable[str]:
+        return iter(self._names)
+
+    def add(self, name: str) -> None:
+        """Take a name; the second of the same name is refused."""
+        if name in self._names:
+            raise InvalidValueError(f"{self._what} {name} is there twice")
+        self._names[name] = None
+
+
+def shape_register(robot: RobotModel) -> NameRegister:
+    """Return the register of all capsules and bodies: a reported pair must be clear by its names."""
+    return NameRegister("capsule or body", [*(capsule.name for capsule in robot.capsules), "floor"])
+
+
+def check_contact(contact: AllowedContact, capsules: Iterable[str], bodies: Iterable[str]) -> None:
+    """Refuse an allowed contact whose names nobody has, or without a capsule of robot, tool or part."""
+    capsules, bodies = set(capsules), set(bodies)
+    for name in (contact.body_a, contact.body_b):
+        if name not in capsules and name not in bodies:
+            raise UnknownNameError("capsule or body", name, sorted(capsules) + sorted(bodies))
+    if contact.body_a not in capsules and contact.body_b not in capsules:
+        raise InvalidValueError(
+            f"allowed contact {contact.body_a}, {contact.body_b} has no capsule of robot, tool or part; "
+            f"capsules are {', '.join(sorted(capsules))}"
+        )
+
+
+def check_step(
+    step: ProgramStep, before: PartPlaces, stations: Iterable[str], signals: Iterable[str]
+) -> PartPlaces:
+    """Return where the parts are after a step; refuse unknown names and what can't be done."""
+    stations, signals = tuple(stations), tuple(signals)
+    if step.kind == "STATION" and step.target not in stations:
+        raise UnknownNameError("station", step.target, stations)
+    for signal in (*step.wait_for, *step.set_signals):
+        if signal.name not in signals:
+            raise UnknownNameError("signal", signal.name, signals)
+    return before.after(step)
+
+
+def check_part_mass(robot: RobotModel, tool: Load | None, part: Load | None = None) -> None:
+    """Refuse a tool, or a tool with a part, beyond the rated payload."""
+    loads = tuple(load for load in (tool, part) if load is not None)
+    mass = total_mass(loads)
+    if mass > robot.rated_payload:
+        names = " and ".join(load.name for load in loads)
+        raise InvalidValueError(
+            f"{names}: mass is {mass:g} kg, {robot.name} carries at most {robot.rated_payload:g} kg"
+        )
+
+
+def check_follows(signals: Iterable[CellSignal]) -> None:
+    """Refuse a signal that follows one nobody has."""
+    signals = tuple(signals)
+    names = [signal.name for signal in signals]
+    for signal in signals:
+        if signal.follows and signal.follows not in names:
+            raise UnknownNameError(f"signal that {signal.name} follows", signal.follows, names)
+
+
+def check_names(cell: Cell) -> None:
+    """Refuse names that are given twice or that nobody has."""
+    shapes = shape_register(cell.robot)
+    for shape in _load_capsules(cell):
+        shapes.add(shape.name)
+    for body in _all_bodies(cell):
+        shapes.add(body.name)
+    for what, things in (
+        ("equipment", cell.equipment),
+        ("station", cell.stations),
+        ("part", cell.parts),
+        ("signal", cell.signals),
+        ("task", cell.tasks),
+    ):
+        register = NameRegister(what)
+        for thing in things:
+            register.add(thing.name)
+    stations = [station.name for station in cell.stations]
+    machines = [machine.name for machine in cell.equipment]
+    for part in cell.parts:
+        if part.station and part.station not in stations:
+            raise UnknownNameError(f"station of part {part.name}", part.station, stations)
+    for station in cell.stations:
+        if station.equipment not in machines:
+            raise UnknownNameError(f"equipment of station {station.name}", station.equipment, machines)
+    check_follows(cell.signals)
+    if sum(len(machine.bodies) for machine in cell.equipment) > BODIES_MAX:
+        raise InvalidValueError(f"the cell has more than {BODIES_MAX} bodies")
+
+
+def check_payload(cell: Cell) -> None:
+    """Refuse loads that the robot can't carry."""
+    check_part_mass(cell.robot, cell.tool)
+    for part in cell.parts:
+        check_part_mass(cell.robot, cell.tool, part.load)
+
+
+def check_contacts(cell: Cell) -> None:
+    """Refuse allowed contacts and base contacts with names that nobody has."""
+    capsules = {capsule.name for capsule in (*cell.robot.capsules, *_load_capsules(cell))}
+    bodies = {body.name for body in _all_bodies(cell)} | {"floor"}
+    for station in cell.stations:
+        for contact in station.allowed_contacts:
+            check_contact(contact, capsules, bodies)
+    for capsule, body in cell.base_contacts:
+        check_base_contact(cell.robot, capsule, body, bodies)
+
+
+def check_base_contact(robot: RobotModel, capsule: str, body: str, bodies: Iterable[str]) -> None:
+    """Refuse a base contact that is not a capsule of base_link with a body."""
+    base = [c.name for c in robot.capsules if c.link == 0]
+    if capsule not in base:
+        raise UnknownNameError("capsule of base_link", capsule, base)
+    if body not in (bodies := tuple(bodies)):
+        raise UnknownNameError("body", body, bodies)
+
+
+def check_program(cell: Cell) -> None:
+    """Refuse a program with unknown names or with parts where they can't be."""
+    state = cell.parts_at_start()
+    stations = [station.name for station in cell.stations]
+    signals = [signal.name for signal in cell.signals]
+    for step in cell.program:
+        state = check_step(step, state, stations, signals)
+
+
+def check_single_places(parts: Iterable[Part]) -> None:
+    """Refuse two parts that lie at one station."""
+    register = NameRegister("a part at station")
+    for part in parts:
+        if part.station:
+            register.add(part.station)
+
+
+def _load_capsules(cell: Cell) -> tuple[Capsule, ...]:
+    loads = (*((cell.tool,) if cell.tool is not None else ()), *(part.load for part in cell.parts))
+    return tuple(capsule for load in loads for capsule in load.capsules)
+
+
+def _all_bodies(cell: Cell) -> tuple[Body, ...]:
+    machines = (body for machine in cell.equipment for body in machine.bodies)
+    return (*machines, *(body for part in cell.parts for body in part.bodies))

@@ -1,0 +1,252 @@
+"""Reads a cell file into a Cell. The format: docs/cell_format.md.
+
+Errors stand at the line that is wrong: every rule between the things of a cell is asked while its line is
+at hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from ir_description.arrays import Array
+from ir_description.body_reader import BodyReader, read_pose
+from ir_description.cell import Cell, Task, check_posture
+from ir_description.cell_checks import (
+    NameRegister,
+    check_base_contact,
+    check_contact,
+    check_follows,
+    check_part_mass,
+    check_step,
+    shape_register,
+)
+from ir_description.equipment import Equipment, Station
+from ir_description.equipment_reader import read_equipment
+from ir_description.errors import CellFileError, UnknownNameError
+from ir_description.items import Item, Table, read_items
+from ir_description.load import Load
+from ir_description.load_reader import read_part, read_tool
+from ir_description.part import Part
+from ir_description.program import CellSignal, PartPlaces, ProgramStep
+from ir_description.program_reader import read_signal, read_step
+from ir_description.robot import RobotModel
+
+FORMAT = "ir_cell/1"
+RobotSource = Callable[[str], RobotModel]
+_T = TypeVar("_T")
+
+_REQUIRED = ("format", "name", "robot")
+_OPTIONAL = (
+    "description",
+    "base",
+    "base_contacts",
+    "floor",
+    "tool",
+    "tcp",
+    "parts",
+    "equipment",
+    "signals",
+    "home",
+    "home_deg",
+    "park",
+    "park_deg",
+    "program",
+    "tasks",
+)
+
+
+def read_cell(text: str, source: str, robots: RobotSource, folder: Path | None) -> Cell:
+    """Return the cell of a text; robots gives a robot by name, folder is where its meshes are."""
+    root = read_items(text, source, CellFileError)
+    table = root.table(_REQUIRED, _OPTIONAL)
+    table["format"].choice((FORMAT,))
+    with table["robot"].blamed():
+        robot = robots(table["robot"].name())
+    return _CellReader(root, table, robot, folder).cell()
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """Something read, with the item it came from."""
+
+    item: Item
+    station: Station
+
+
+class _CellReader:
+    """One reading: what has been named so far."""
+
+    def __init__(self, root: Item, table: Table, robot: RobotModel, folder: Path | None) -> None:
+        self._root, self._table, self._robot = root, table, robot
+        self._shapes = shape_register(robot)
+        self._bodies = BodyReader(self._shapes, folder)
+        self._capsules = [capsule.name for capsule in robot.capsules]
+
+    def cell(self) -> Cell:
+        table, robot = self._table, self._robot
+        base_pose = _pose(table.get("base"))
+        tcp = _pose(table.get("tcp"))
+        tool = self._tool()
+        parts = self._parts(tool)
+        equipment, placed = self._equipment()
+        stations = tuple(entry.station for entry in placed)
+        self._check_part_stations(parts, stations)
+        self._check_contacts(placed, equipment, parts)
+        signals = self._signals()
+        home = self._posture("home", robot.machine_home)
+        with self._root.blamed():
+            return Cell(
+                name=table["name"].name(),
+                description=table["description"].text(1000) if "description" in table else "",
+                robot=robot,
+                base_pose=base_pose,
+                tool=tool,
+                tcp=tcp,
+                parts=parts,
+                equipment=equipment,
+                stations=stations,
+                signals=signals,
+                park=self._posture("park", home),
+                machine_home=home,
+                program=self._program(stations, parts, signals),
+                tasks=self._tasks(),
+                floor=table["floor"].boolean() if "floor" in table else True,
+                base_contacts=self._base_contacts(equipment, parts),
+            )
+
+    def _list(self, key: str, high: int) -> list[Item]:
+        item = self._table.get(key)
+        return [] if item is None else item.list(0, high)
+
+    def _tool(self) -> Load | None:
+        item = self._table.get("tool")
+        if item is None:
+            return None
+        with item.blamed():
+            tool = read_tool(item, self._robot.n, self._shapes)
+            check_part_mass(self._robot, tool)
+        self._capsules += [capsule.name for capsule in tool.capsules]
+        return tool
+
+    def _parts(self, tool: Load | None) -> tuple[Part, ...]:
+        names, parts = NameRegister("part"), []
+        for item in self._list("parts", 1000):
+            with item.blamed():
+                part = read_part(item, self._robot.n, self._shapes, self._bodies)
+                names.add(part.name)
+                check_part_mass(self._robot, tool, part.load)
+            self._capsules += [capsule.name for capsule in part.load.capsules]
+            parts.append(part)
+        return tuple(parts)
+
+    def _equipment(self) -> tuple[tuple[Equipment, ...], list[_Placed]]:
+        names, station_names = NameRegister("equipment"), NameRegister("station")
+        machines, placed = [], []
+        for item in self._list("equipment", 10_000):
+            with item.blamed():
+                machine, stations = read_equipment(item, self._bodies)
+                names.add(machine.name)
+            machines.append(machine)
+            for station_item, station in stations:
+                with station_item.blamed():
+                    station_names.add(station.name)
+                placed.append(_Placed(station_item, station))
+        return tuple(machines), placed
+
+    def _check_part_stations(self, parts: tuple[Part, ...], stations: tuple[Station, ...]) -> None:
+        known = [station.name for station in stations]
+        taken = NameRegister("a part at station")
+        for item, part in zip(self._list("parts", 1000), parts, strict=True):
+            if part.station:
+                with item.blamed():
+                    if part.station not in known:
+                        raise UnknownNameError("station", part.station, known)
+                    taken.add(part.station)
+
+    def _check_contacts(
+        self, placed: list[_Placed], equipment: tuple[Equipment, ...], parts: tuple[Part, ...]
+    ) -> None:
+        capsules, bodies = set(self._capsules), _body_names(equipment, parts)
+        for entry in placed:
+            with entry.item.blamed():
+                for contact in entry.station.allowed_contacts:
+                    check_contact(contact, capsules, bodies)
+
+    def _base_contacts(
+        self, equipment: tuple[Equipment, ...], parts: tuple[Part, ...]
+    ) -> tuple[tuple[str, str], ...]:
+        bodies, pairs = _body_names(equipment, parts), []
+        for item in self._list("base_contacts", 1000):
+            first, second = item.list(2, 2)
+            pair = (first.name(), second.name())
+            with item.blamed():
+                check_base_contact(self._robot, *pair, bodies)
+            pairs.append(pair)
+        return tuple(pairs)
+
+    def _signals(self) -> tuple[CellSignal, ...]:
+        names, signals = NameRegister("signal"), []
+        for item in self._list("signals", 1000):
+            with item.blamed():
+                signal = read_signal(item)
+                names.add(signal.name)
+            signals.append(signal)
+        if signals:
+            with self._table["signals"].blamed():
+                check_follows(signals)
+        return tuple(signals)
+
+    def _posture(self, name: str, default: Array) -> Array:
+        given = [key for key in (name, f"{name}_deg") if key in self._table]
+        if not given:
+            return default
+        key = self._table.one_of(name, f"{name}_deg")
+        item = self._table[key]
+        values = item.numbers(self._robot.n, -3600.0, 3600.0, "deg" if key.endswith("_deg") else "rad")
+        posture = np.radians(values) if key.endswith("_deg") else values
+        with item.blamed():
+            check_posture(self._robot, posture, name)
+        return posture
+
+    def _tasks(self) -> tuple[Task, ...]:
+        names, tasks = NameRegister("task"), []
+        for item in self._list("tasks", 10_000):
+            row = item.table(("name", "start", "goal"))
+            with row["name"].blamed():
+                names.add(name := row["name"].text(64))
+            ends = []
+            for key in ("start", "goal"):
+                posture = row[key].numbers(self._robot.n, -70.0, 70.0, "rad")
+                with row[key].blamed():
+                    check_posture(self._robot, posture, f"{key} of {name}")
+                ends.append(posture)
+            tasks.append(Task(name, *ends))
+        return tuple(tasks)
+
+    def _program(
+        self, stations: tuple[Station, ...], parts: tuple[Part, ...], signals: tuple[CellSignal, ...]
+    ) -> tuple[ProgramStep, ...]:
+        station_names = [station.name for station in stations]
+        signal_names = [signal.name for signal in signals]
+        places = PartPlaces("", {part.name: part.station for part in parts})
+        steps = []
+        for item in self._list("program", 10_000):
+            with item.blamed():
+                step = read_step(item)
+                places = check_step(step, places, station_names, signal_names)
+            steps.append(step)
+        return tuple(steps)
+
+
+def _pose(item: Item | None) -> Array:
+    return np.eye(4) if item is None else read_pose(item)
+
+
+def _body_names(equipment: tuple[Equipment, ...], parts: tuple[Part, ...]) -> set[str]:
+    machines = {body.name for machine in equipment for body in machine.bodies}
+    return machines | {body.name for part in parts for body in part.bodies} | {"floor"}

@@ -1,0 +1,220 @@
+"""Writes a Cell as a cell file: what `read_cell` reads back is the same cell, bit for bit.
+
+Numbers are the shortest decimals that give the same float. Orientations are written as A, B, C where these
+give the same matrix, else as the matrix; postures in degrees where these give the same radians. Meshes
+stand as vertices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from ir_description.arrays import Array
+from ir_description.body import Body
+from ir_description.capsule import Capsule
+from ir_description.cell import Cell
+from ir_description.cell_reader import FORMAT
+from ir_description.equipment import Equipment, Station, zone_around
+from ir_description.load import Load
+from ir_description.part import Part
+from ir_description.poses import abc_from_rotation, rotation_from_abc
+from ir_description.program import CellSignal, ProgramStep, Signal
+
+_DIGITS = 10
+_IDENTITY = np.eye(4)
+
+
+def cell_to_yaml(cell: Cell) -> str:
+    """Return the cell as a cell file."""
+    return "\n".join(_cell(cell)) + "\n"
+
+
+def _cell(cell: Cell) -> Iterator[str]:
+    yield f"format: {FORMAT}"
+    yield f"name: {cell.name}"
+    if cell.description:
+        yield f"description: {_quoted(cell.description)}"
+    yield f"robot: {cell.robot.name}"
+    if not np.array_equal(cell.base_pose, _IDENTITY):
+        yield f"base: {{{_pose(cell.base_pose)}}}"
+    if cell.base_contacts:
+        yield f"base_contacts: [{', '.join(f'[{a}, {b}]' for a, b in cell.base_contacts)}]"
+    yield f"floor: {_word(cell.floor)}"
+    if cell.tool is not None:
+        yield "tool:"
+        yield from _indented(_load(cell.tool), 2)
+    if not np.array_equal(cell.tcp, _IDENTITY):
+        yield f"tcp: {{{_pose(cell.tcp)}}}"
+    yield from _posture("home", cell.machine_home)
+    yield from _posture("park", cell.park)
+    yield from _block("parts", (_part(part) for part in cell.parts))
+    yield from _block("equipment", (_machine(machine, cell.stations) for machine in cell.equipment))
+    yield from _block("signals", ([_signal(signal)] for signal in cell.signals))
+    yield from _block("program", ([_step(step)] for step in cell.program))
+    yield from _block(
+        "tasks",
+        (
+            [f"name: {_quoted(t.name)}", f"start: {_row(t.start)}", f"goal: {_row(t.goal)}"]
+            for t in cell.tasks
+        ),
+    )
+
+
+def _load(load: Load) -> Iterator[str]:
+    yield f"name: {load.name}"
+    yield f"mass: {_number(load.mass)}"
+    yield f"com: {_row(load.com)}"
+    J = load.inertia
+    yield f"inertia: {_row((J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]))}"
+    if load.kind == "tool":
+        yield f"watts_always: {_number(load.watts_always)}"
+        yield f"watts_drive_bus: {_number(load.watts_drive_bus)}"
+    yield from _block("capsules", ([_capsule(capsule)] for capsule in load.capsules))
+
+
+def _capsule(capsule: Capsule) -> str:
+    p0, p1 = _row(capsule.p0), _row(capsule.p1)
+    return f"{{name: {capsule.name}, p0: {p0}, p1: {p1}, radius: {_number(capsule.radius)}}}"
+
+
+def _part(part: Part) -> Iterator[str]:
+    yield from _load(part.load)
+    if not np.array_equal(part.grasp, _IDENTITY):
+        yield f"grasp: {{{_pose(part.grasp)}}}"
+    if part.station:
+        yield f"station: {part.station}"
+    yield from _block("bodies", ([_body(body)] for body in part.bodies))
+
+
+def _machine(machine: Equipment, stations: Iterable[Station]) -> Iterator[str]:
+    yield f"name: {machine.name}"
+    if not np.array_equal(machine.pose, _IDENTITY):
+        yield f"pose: {{{_pose(machine.pose)}}}"
+    if not machine.enabled:
+        yield "enabled: false"
+    yield _zone(machine)
+    if machine.states:
+        yield "states:"
+        for state in machine.states:
+            yield f"  {state.name}: [{', '.join(state.bodies)}]"
+        yield f"state: {machine.state}"
+    own = [station for station in stations if station.equipment == machine.name]
+    yield "bodies:" if machine.bodies else "bodies: []"
+    yield from _entries([_body(body)] for body in machine.bodies)
+    yield from _block("stations", (_station(station) for station in own))
+
+
+def _zone(machine: Equipment) -> str:
+    zone = machine.zone_in_equipment
+    if any(body.kind != "plane" for body in machine.bodies):
+        default = zone_around(zone.kind, machine.bodies)
+        if np.array_equal(default.pose, zone.pose) and np.array_equal(default.size, zone.size):
+            return f"zone: {zone.kind}"
+    return f"zone: {{kind: {zone.kind}, size: {_row(zone.size)}, {_pose(zone.pose)}}}"
+
+
+def _body(body: Body) -> str:
+    shape = {
+        "box": f", size: {_row(body.size)}",
+        "cylinder": f", radius: {_number(body.size[0])}, length: {_number(body.size[1])}",
+        "sphere": f", radius: {_number(body.size[0])}",
+        "capsule": f", radius: {_number(body.size[0])}, length: {_number(body.size[1])}",
+        "plane": "",
+        "mesh": f", vertices: [{', '.join(_row(vertex) for vertex in body.vertices)}]",
+    }[body.kind]
+    return f"{{name: {body.name}, kind: {body.kind}{shape}, {_pose(body.pose)}}}"
+
+
+def _station(station: Station) -> Iterator[str]:
+    yield f"name: {station.name}"
+    yield f"pose: {{{_pose(station.pose_in_equipment)}}}"
+    yield f"approach_distance: {_number(station.approach_distance)}"
+    yield from _block(
+        "allowed_contacts",
+        (
+            [f"{{between: [{c.body_a}, {c.body_b}], safety_distance: {_number(c.safety_distance)}}}"]
+            for c in station.allowed_contacts
+        ),
+    )
+
+
+def _signal(signal: CellSignal) -> str:
+    follows = f", follows: {signal.follows}, delay: {_number(signal.delay)}" if signal.follows else ""
+    return f"{{name: {signal.name}, initial: {_word(signal.initial)}{follows}}}"
+
+
+def _step(step: ProgramStep) -> str:
+    fields = []
+    if step.kind == "PAUSE":
+        fields += [f"pause: {_number(step.dwell)}", f"power_mode: {step.power_mode}"]
+    else:
+        fields.append(f"{step.kind.lower()}: {step.target}")
+        if step.dwell:
+            fields.append(f"dwell: {_number(step.dwell)}")
+    for key, part in (("attach", step.attach), ("detach", step.detach)):
+        if part:
+            fields.append(f"{key}: {part}")
+    for key, signals in (("wait_for", step.wait_for), ("set_signals", step.set_signals)):
+        if signals:
+            fields.append(f"{key}: {_signals(signals)}")
+    return f"{{{', '.join(fields)}}}"
+
+
+def _signals(signals: Sequence[Signal]) -> str:
+    return f"[{', '.join(signal.text for signal in signals)}]"
+
+
+def _posture(name: str, posture: Array) -> Iterator[str]:
+    degrees = np.round(np.degrees(posture), _DIGITS)
+    if np.array_equal(np.radians(degrees), posture):
+        yield f"{name}_deg: {_row(degrees)}"
+    else:
+        yield f"{name}: {_row(posture)}"
+
+
+def _pose(pose: Array) -> str:
+    """Return the keys of a pose without braces."""
+    xyz, R = f"xyz: {_row(pose[:3, 3])}", pose[:3, :3]
+    if np.array_equal(R, np.eye(3)):
+        return xyz
+    abc = np.round(abc_from_rotation(R), _DIGITS)
+    if np.array_equal(rotation_from_abc(abc), R):
+        return f"{xyz}, abc_deg: {_row(abc)}"
+    return f"{xyz}, rotation: [{', '.join(_row(row) for row in R)}]"
+
+
+def _block(key: str, entries: Iterable[Iterable[str]]) -> Iterator[str]:
+    lines = list(_entries(entries))
+    if lines:
+        yield f"{key}:"
+        yield from lines
+
+
+def _entries(entries: Iterable[Iterable[str]]) -> Iterator[str]:
+    for entry in entries:
+        for i, line in enumerate(entry):
+            yield ("  - " if i == 0 else "    ") + line
+
+
+def _indented(lines: Iterable[str], by: int) -> Iterator[str]:
+    return (" " * by + line for line in lines)
+
+
+def _row(values: Iterable[float]) -> str:
+    return f"[{', '.join(_number(value) for value in values)}]"
+
+
+def _number(value: float) -> str:
+    text = repr(float(value) + 0.0)  # + 0.0 turns -0.0 into 0.0
+    return text.removesuffix(".0")
+
+
+def _word(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

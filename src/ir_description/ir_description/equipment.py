@@ -1,0 +1,169 @@
+"""Equipment: machines grouped from bodies, with states, a forbidden zone and stations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from ir_description.arrays import Array, frozen, frozen_pose, in_range
+from ir_description.body import SIZE_MAX, Body
+from ir_description.errors import InvalidValueError, UnknownNameError
+from ir_description.poses import composed, pose_of
+
+ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
+ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)
+APPROACH_MAX = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """A forbidden zone: an oriented box, pose (4, 4) of its centre and full size (3,) [m].
+
+    The kind changes how a way in and out is searched, not what the zone is.
+    """
+
+    kind: ZoneKind
+    pose: Array
+    size: Array
+
+    def __post_init__(self) -> None:
+        if self.kind not in ZONE_KINDS:
+            raise InvalidValueError(f"kind of zone is {self.kind!r}, must be one of {', '.join(ZONE_KINDS)}")
+        object.__setattr__(self, "pose", frozen_pose(self.pose, "pose of the zone"))
+        object.__setattr__(self, "size", frozen(self.size, (3,), "size of the zone"))
+        if (self.size <= 0.0).any() or (self.size > SIZE_MAX).any():
+            raise InvalidValueError(
+                f"size of the zone is {self.size.tolist()} m, must be in (0, {SIZE_MAX:g}] m"
+            )
+
+
+def zone_around(kind: ZoneKind, bodies: Iterable[Body]) -> Zone:
+    """Return the box of all bodies along the axes of their machine's frame; planes don't count."""
+    bounds = [body.bounds() for body in bodies if body.kind != "plane"]
+    if not bounds:
+        raise InvalidValueError("the zone has no bodies to enclose; give its box (zone: {kind, size, ...})")
+    low = np.min([low for low, _ in bounds], axis=0)
+    high = np.max([high for _, high in bounds], axis=0)
+    return Zone(kind, pose_of((low + high) / 2.0), high - low)
+
+
+@dataclass(frozen=True)
+class EquipmentState:
+    """A state of a machine ("door_open") and the bodies that are there in this state only."""
+
+    name: str
+    bodies: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Equipment:
+    """A machine. pose (4, 4) in the world; bodies and zone_in_equipment in the machine's frame.
+
+    A body that no state names is always there; one that states name is there in these states only.
+    """
+
+    name: str
+    pose: Array
+    bodies: tuple[Body, ...]
+    zone_in_equipment: Zone
+    states: tuple[EquipmentState, ...] = ()
+    state: str = ""
+    enabled: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
+        names = {body.name for body in self.bodies}
+        if len(names) != len(self.bodies):
+            raise InvalidValueError(f"equipment {self.name} names a body twice")
+        known = [state.name for state in self.states]
+        if len(set(known)) != len(known):
+            raise InvalidValueError(f"equipment {self.name} names a state twice")
+        for state in self.states:
+            for body in state.bodies:
+                if body not in names:
+                    raise UnknownNameError(f"body in state {state.name} of {self.name}", body, names)
+        if self.state not in (known or [""]):
+            raise UnknownNameError(f"state of {self.name}", self.state, known)
+
+    @property
+    def zone(self) -> Zone:
+        """The forbidden zone in the world."""
+        zone = self.zone_in_equipment
+        return replace(zone, pose=composed(self.pose, zone.pose))
+
+    def present_bodies(self) -> tuple[Body, ...]:
+        """Return the bodies that are there in the current state, in the machine's frame."""
+        if not self.enabled:
+            return ()
+        bound = {body for state in self.states for body in state.bodies}
+        here = {body for state in self.states if state.name == self.state for body in state.bodies}
+        return tuple(body for body in self.bodies if body.name not in bound or body.name in here)
+
+    def world_bodies(self) -> tuple[Body, ...]:
+        """Return the bodies that are there in the current state, in the world."""
+        return tuple(body.placed(self.pose) for body in self.present_bodies())
+
+
+@dataclass(frozen=True)
+class AllowedContact:
+    """A pair that may come closer than the safety distance at a station, and its own distance [m]."""
+
+    body_a: str
+    body_b: str
+    safety_distance: float
+
+    def __post_init__(self) -> None:
+        in_range(self.safety_distance, 0.0, 10.0, "m", "safety_distance")
+        if self.body_a == self.body_b:
+            raise InvalidValueError(f"an allowed contact pairs {self.body_a} with itself")
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """Where the tool works: pose (4, 4) of the tcp in the WORLD, and the same in its machine's frame.
+
+    zone is the kind of its machine's zone. The tool leaves by approach_distance [m] along -x of the tcp.
+    The allowed contacts hold inside the machine's zone only.
+    """
+
+    name: str
+    equipment: str
+    pose: Array
+    zone: ZoneKind
+    pose_in_equipment: Array
+    allowed_contacts: tuple[AllowedContact, ...] = ()
+    approach_distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
+        object.__setattr__(
+            self, "pose_in_equipment", frozen_pose(self.pose_in_equipment, f"pose of {self.name}")
+        )
+        in_range(self.approach_distance, 0.0, APPROACH_MAX, "m", f"approach_distance of {self.name}")
+
+    def retreat_pose(self) -> Array:
+        """Return the pose (4, 4) of the tcp in the world after the retreat along -x."""
+        back = pose_of((-self.approach_distance, 0.0, 0.0))
+        return composed(self.pose, back)
+
+
+def station_at(
+    equipment: Equipment,
+    name: str,
+    pose_in_equipment: Array,
+    allowed_contacts: tuple[AllowedContact, ...] = (),
+    approach_distance: float = 0.0,
+) -> Station:
+    """Return a station of a machine from its pose (4, 4) in the machine's frame."""
+    return Station(
+        name=name,
+        equipment=equipment.name,
+        pose=composed(equipment.pose, pose_in_equipment),
+        zone=equipment.zone_in_equipment.kind,
+        pose_in_equipment=pose_in_equipment,
+        allowed_contacts=allowed_contacts,
+        approach_distance=approach_distance,
+    )

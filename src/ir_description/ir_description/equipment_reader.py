@@ -1,0 +1,101 @@
+"""Reads one machine of a cell file with its zone, states and stations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ir_description.arrays import Array
+from ir_description.body import SIZE_MAX, Body
+from ir_description.body_reader import POSE_KEYS, BodyReader, pose_in, read_pose
+from ir_description.equipment import (
+    APPROACH_MAX,
+    ZONE_KINDS,
+    AllowedContact,
+    Equipment,
+    EquipmentState,
+    Station,
+    Zone,
+    station_at,
+    zone_around,
+)
+from ir_description.items import Item, Table
+
+
+def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tuple[Item, Station]]]:
+    """Return a machine and its stations, each with the item it came from."""
+    table = item.table(("name", "bodies"), ("pose", "zone", "states", "state", "enabled", "stations"))
+    read = tuple(bodies.read(body) for body in table["bodies"].list(0, 20_000))
+    states = _states(table)
+    machine = Equipment(
+        name=table["name"].name(),
+        pose=_pose(table),
+        bodies=read,
+        zone_in_equipment=_zone(table, read),
+        states=states,
+        state=_state(table, states),
+        enabled=table["enabled"].boolean() if "enabled" in table else True,
+    )
+    stations = table["stations"].list(0, 10_000) if "stations" in table else []
+    return machine, [(station, _station(station, machine)) for station in stations]
+
+
+def _pose(table: Table) -> Array:
+    return read_pose(table["pose"]) if "pose" in table else np.eye(4)
+
+
+def _zone(table: Table, bodies: tuple[Body, ...]) -> Zone:
+    """A word is the kind around the bodies, a mapping may give the box."""
+    item = table.get("zone")
+    if item is None or item.is_scalar():
+        kind = "OPEN" if item is None else item.choice(ZONE_KINDS)
+        with (item or table.item).blamed():
+            return zone_around(kind, bodies)  # type: ignore[arg-type]
+    zone = item.table(("kind",), ("size", *POSE_KEYS))
+    kind = zone["kind"].choice(ZONE_KINDS)
+    with item.blamed():
+        if "size" not in zone:
+            for key in POSE_KEYS:
+                if key in zone:
+                    zone[key].fail("belongs to a zone with a size")
+            return zone_around(kind, bodies)  # type: ignore[arg-type]
+        size = zone["size"].numbers(3, 0.0, SIZE_MAX, "m", above=True)
+        return Zone(kind, pose_in(zone), size)  # type: ignore[arg-type]
+
+
+def _states(table: Table) -> tuple[EquipmentState, ...]:
+    if "states" not in table:
+        return ()
+    return tuple(
+        EquipmentState(name, tuple(body.name() for body in item.list(0, 1000)))
+        for name, item in table["states"].pairs()
+    )
+
+
+def _state(table: Table, states: tuple[EquipmentState, ...]) -> str:
+    if "state" in table:
+        return table["state"].name()
+    if states:
+        table.item.fail(
+            f"has states and must say its state, one of {', '.join(state.name for state in states)}"
+        )
+    return ""
+
+
+def _station(item: Item, machine: Equipment) -> Station:
+    table = item.table(("name", "pose"), ("approach_distance", "allowed_contacts"))
+    contacts = table["allowed_contacts"].list(0, 1000) if "allowed_contacts" in table else []
+    approach = table.get("approach_distance")
+    return station_at(
+        machine,
+        table["name"].name(),
+        read_pose(table["pose"]),
+        tuple(_contact(contact) for contact in contacts),
+        0.0 if approach is None else approach.number(0.0, APPROACH_MAX, "m"),
+    )
+
+
+def _contact(item: Item) -> AllowedContact:
+    table = item.table(("between", "safety_distance"))
+    first, second = table["between"].list(2, 2)
+    with item.blamed():
+        return AllowedContact(first.name(), second.name(), table["safety_distance"].number(0.0, 10.0, "m"))

@@ -1,0 +1,139 @@
+"""Convex meshes from STL files, binary and ASCII."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from ir_description.arrays import Array, frozen
+from ir_description.errors import InvalidValueError, shown
+
+BYTES_MAX = 20_000_000
+TRIANGLES_MAX = 200_000
+HULL_VERTICES_MAX = 1_000
+CONVEX_TOLERANCE = 1e-3
+"""A mesh whose volume is this share below its hull's still counts as convex (tessellation, rounding)."""
+
+_BINARY = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
+
+
+def read_regular_file(path: Path, limit: int) -> bytes:
+    """Return the content of a regular file of at most `limit` bytes; never blocks on a FIFO or device."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InvalidValueError(f"file {shown(str(path))} can't be opened: {reason}") from error
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise InvalidValueError(f"file {shown(str(path))} is not a regular file")
+        if status.st_size > limit:
+            raise InvalidValueError(
+                f"file {shown(str(path))} has {status.st_size} bytes, must be at most {limit} bytes"
+            )
+        return file.read(limit)
+
+
+def mesh_path(folder: Path, name: str) -> Path:
+    """Return the path of a mesh inside the folder of its cell file; nothing leads out of it."""
+    path = Path(name)
+    if (
+        "://" in name
+        or "\\" in name
+        or path.is_absolute()
+        or ".." in path.parts
+        or path.suffix.lower() != ".stl"
+    ):
+        raise InvalidValueError(
+            f"mesh file {shown(name)} must be an .stl file in the cell file's folder, named relative to it, "
+            "without '..'"
+        )
+    resolved = (folder / path).resolve()
+    if not resolved.is_relative_to(folder.resolve()):
+        raise InvalidValueError(f"mesh file {shown(name)} leads out of the cell file's folder")
+    return resolved
+
+
+def read_stl(path: Path) -> Array:
+    """Return the triangles (T, 3, 3) of an STL file in its own unit."""
+    return triangles_from_stl(read_regular_file(path, BYTES_MAX))
+
+
+def triangles_from_stl(content: bytes) -> Array:
+    """Return the triangles (T, 3, 3) of STL content; the length tells binary from ASCII."""
+    count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else -1
+    if len(content) == 84 + 50 * count:
+        triangles = np.frombuffer(content, dtype=_BINARY, offset=84)["corners"].astype(np.float64)
+    else:
+        triangles = _ascii_triangles(content)
+    if not 4 <= len(triangles) <= TRIANGLES_MAX:
+        raise InvalidValueError(f"the mesh has {len(triangles)} triangles, must have 4 to {TRIANGLES_MAX}")
+    return frozen(triangles, (None, 3, 3), "mesh")
+
+
+def _ascii_triangles(content: bytes) -> Array:
+    if not content.lstrip().startswith(b"solid"):
+        raise InvalidValueError("the file is neither a binary STL (its length does not fit) nor an ASCII one")
+    found = _VERTEX.findall(content)
+    if len(found) % 3:
+        raise InvalidValueError(f"the ASCII STL has {len(found)} vertices, must have three to a triangle")
+    try:
+        return np.array(found, dtype=np.float64).reshape(-1, 3, 3)
+    except ValueError as error:
+        raise InvalidValueError("the ASCII STL has a vertex that is not three numbers") from error
+
+
+def hull_vertices(points: Array) -> Array:
+    """Return the corners (V, 3) of the convex hull of points (N, 3)."""
+    return _points_of(_hull(points), points)
+
+
+def convex_vertices(triangles: Array, take_hull: bool) -> Array:
+    """Return the corners (V, 3) of a convex mesh (T, 3, 3); others are refused unless `take_hull`."""
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    hull = _hull(points)
+    volume = abs(float(np.linalg.det(triangles).sum()) / 6.0)
+    if not take_hull and not _closed(triangles):
+        raise InvalidValueError(
+            "the mesh is not closed (an edge does not belong to exactly two triangles); "
+            "say convex_hull: true to use its hull"
+        )
+    if not take_hull and volume < (1.0 - CONVEX_TOLERANCE) * hull.volume:
+        raise InvalidValueError(
+            f"the mesh is not convex (volume {volume:.4g} m^3, its hull {hull.volume:.4g} m^3); split it "
+            "into convex meshes or say convex_hull: true to use its hull"
+        )
+    return _points_of(hull, points)
+
+
+def _hull(points: Array) -> ConvexHull:
+    if not np.isfinite(points).all():
+        raise InvalidValueError("the mesh has corners that are not finite")
+    try:
+        return ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise InvalidValueError(f"the mesh has {len(points)} corners that span no volume") from error
+
+
+def _points_of(hull: ConvexHull, points: Array) -> Array:
+    corners = points[np.sort(hull.vertices)]
+    if len(corners) > HULL_VERTICES_MAX:
+        raise InvalidValueError(f"the hull has {len(corners)} corners, must have at most {HULL_VERTICES_MAX}")
+    return frozen(corners, (None, 3), "vertices")
+
+
+def _closed(triangles: Array) -> bool:
+    """Whether every edge is walked once in each direction."""
+    _, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    corners = index.reshape(-1, 3)
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    forward, count = np.unique(edges, axis=0, return_counts=True)
+    backward = np.unique(edges[:, ::-1], axis=0)
+    return bool((count == 1).all() and np.array_equal(forward, backward))

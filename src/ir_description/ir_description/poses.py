@@ -1,0 +1,105 @@
+"""Orientations as people write them: KUKA's A, B, C and quaternions, to matrices and back.
+
+A, B, C [deg] turn about Z, then the new Y, then the new X: R = Rz(A) Ry(B) Rx(C).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ir_description.arrays import Array, frozen
+from ir_description.errors import InvalidValueError
+
+QUATERNION_TOLERANCE = 1e-3
+"""A quaternion this far from unit length is normalised, beyond it is refused."""
+MATRIX_TOLERANCE = 1e-6
+"""A matrix this far from orthonormal is made so, beyond it is refused."""
+
+
+def pose_of(position: Any, rotation: Any = None) -> Array:
+    """Return the read-only pose (4, 4) of a position (3,) [m] and a rotation (3, 3)."""
+    pose = np.eye(4)
+    pose[:3, 3] = position
+    if rotation is not None:
+        pose[:3, :3] = rotation
+    return frozen(pose, (4, 4), "pose")
+
+
+def inverse(pose: Array) -> Array:
+    """Return the inverse (4, 4) of a pose."""
+    R = pose[:3, :3].T
+    return pose_of(-R @ pose[:3, 3], R)
+
+
+def composed(first: Array, second: Array) -> Array:
+    """Return first @ second as a read-only pose whose last row is exact."""
+    pose = first @ second
+    pose[3] = (0.0, 0.0, 0.0, 1.0)
+    return frozen(pose, (4, 4), "pose")
+
+
+def _cos_sin(angle_deg: float) -> tuple[float, float]:
+    """Cosine and sine, exact at multiples of 90 degrees."""
+    turn = math.fmod(angle_deg, 360.0)
+    quarter = turn / 90.0
+    if quarter == round(quarter):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
+    return math.cos(math.radians(turn)), math.sin(math.radians(turn))
+
+
+def rotation_from_abc(abc_deg: Any) -> Array:
+    """Return the rotation (3, 3) of KUKA's A, B, C [deg]."""
+    a, b, c = frozen(abc_deg, (3,), "abc_deg")
+    (ca, sa), (cb, sb), (cc, sc) = _cos_sin(a), _cos_sin(b), _cos_sin(c)
+    return np.array(
+        [
+            [ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc],
+            [sa * cb, sa * sb * sc + ca * cc, sa * sb * cc - ca * sc],
+            [-sb, cb * sc, cb * cc],
+        ]
+    )
+
+
+def abc_from_rotation(rotation: Array) -> Array:
+    """Return A, B, C [deg] of a rotation (3, 3), B in [-90, 90]; where A and C share an axis, C is 0."""
+    R = np.asarray(rotation, dtype=np.float64)
+    b = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+    if math.hypot(R[0, 0], R[1, 0]) > 1e-9:
+        a, c = math.atan2(R[1, 0], R[0, 0]), math.atan2(R[2, 1], R[2, 2])
+    else:
+        a, c = math.atan2(-R[0, 1], R[1, 1]), 0.0
+    return np.degrees([a, b, c])
+
+
+def rotation_from_quaternion(xyzw: Any) -> Array:
+    """Return the rotation (3, 3) of a quaternion x, y, z, w; small errors of length are normalised."""
+    q = frozen(xyzw, (4,), "quaternion")
+    length = float(np.linalg.norm(q))
+    if abs(length - 1.0) > QUATERNION_TOLERANCE:
+        raise InvalidValueError(
+            f"quaternion has length {length:g}, must be 1 within {QUATERNION_TOLERANCE:g} (order x, y, z, w)"
+        )
+    x, y, z, w = q / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def rotation_from_matrix(rows: Any) -> Array:
+    """Return rows (3, 3) as a rotation; errors of a few written digits are removed."""
+    R = frozen(rows, (3, 3), "rotation")
+    error = float(np.abs(R @ R.T - np.eye(3)).max())
+    if error > MATRIX_TOLERANCE or np.linalg.det(R) < 0.0:
+        raise InvalidValueError("rotation is not a right-handed orthonormal matrix")
+    if error <= 1e-12:
+        return R
+    left, _, right = np.linalg.svd(R)
+    nearest: Array = left @ right
+    return nearest

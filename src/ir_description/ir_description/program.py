@@ -1,0 +1,132 @@
+"""The program of a cell: stations, postures and pauses in order, with what happens at each.
+
+One step runs in this order: wait for the signals, move, attach or detach, set the signals, dwell. A pause
+stays where the step before it ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from ir_description.arrays import in_range
+from ir_description.errors import InvalidValueError, UnknownNameError
+
+StepKind = Literal["STATION", "POSTURE", "PAUSE"]
+POSTURES = ("home", "park")
+AUTO = "AUTO"
+PAUSE_POWER_MODES = (AUTO, "STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
+PAUSE_MAX = 604_800.0
+"""Longest pause or dwell [s]: a week."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A machine's signal with the value that is awaited or set; as text `door_open` or `not door_open`."""
+
+    name: str
+    value: bool = True
+
+    @property
+    def text(self) -> str:
+        """The signal as it is written."""
+        return self.name if self.value else f"not {self.name}"
+
+    @staticmethod
+    def from_text(text: str) -> Signal:
+        """Read what `text` gives."""
+        return Signal(text[4:].strip(), False) if text.startswith("not ") else Signal(text)
+
+
+@dataclass(frozen=True)
+class CellSignal:
+    """A signal of the cell, its value at the start, and how the machine answers.
+
+    Where `follows` is given the signal takes its value `delay` [s] after that signal was set (the soft
+    PLC's rule), e.g. the door is open 1.5 s after it was asked to.
+    """
+
+    name: str
+    initial: bool = False
+    follows: str = ""
+    delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        in_range(self.delay, 0.0, PAUSE_MAX, "s", f"delay of {self.name}")
+        if self.follows == self.name:
+            raise InvalidValueError(f"signal {self.name} follows itself")
+
+
+@dataclass(frozen=True)
+class ProgramStep:
+    """One step. target: a station's name, a posture ("home", "park"), or "" for a pause.
+
+    dwell [s] after arrival, or the length of a pause. attach and detach name a part ("" for none).
+    power_mode is one of PAUSE_POWER_MODES for a pause and "" otherwise; AUTO leaves the choice to whoever
+    plans.
+    """
+
+    kind: StepKind
+    target: str = ""
+    dwell: float = 0.0
+    attach: str = ""
+    detach: str = ""
+    wait_for: tuple[Signal, ...] = ()
+    set_signals: tuple[Signal, ...] = ()
+    power_mode: str = ""
+
+    def __post_init__(self) -> None:
+        in_range(self.dwell, 0.0, PAUSE_MAX, "s", "dwell")
+        if self.kind not in get_args(StepKind):
+            raise UnknownNameError("kind of step", self.kind, get_args(StepKind))
+        if self.kind == "POSTURE" and self.target not in POSTURES:
+            raise UnknownNameError("posture", self.target, POSTURES)
+        if self.kind == "PAUSE" and self.power_mode not in PAUSE_POWER_MODES:
+            raise UnknownNameError("power mode", self.power_mode, PAUSE_POWER_MODES)
+        if self.kind == "PAUSE" and (self.target or self.dwell <= 0.0):
+            raise InvalidValueError(
+                f"a pause must be longer than 0 s and has no target, it is {self.dwell:g} s long"
+            )
+        if self.kind != "PAUSE" and self.power_mode:
+            raise InvalidValueError("only a pause has a power mode")
+        if self.kind != "STATION" and (self.attach or self.detach):
+            raise InvalidValueError("parts are attached and detached at stations only")
+        if self.attach and self.detach:
+            raise InvalidValueError("a step attaches or detaches, not both")
+
+
+@dataclass(frozen=True)
+class PartPlaces:
+    """Where the parts are between two steps: the held one and the station each lies at; "" is none."""
+
+    held: str
+    lying: Mapping[str, str]
+
+    def after(self, step: ProgramStep) -> PartPlaces:
+        """Return where they are after a step; a step that can't be done is refused."""
+        if step.attach:
+            where = self._station_of(step.attach)
+            if self.held:
+                raise InvalidValueError(f"{step.attach} can't be attached, {self.held} is held")
+            if where != step.target:
+                raise InvalidValueError(
+                    f"{step.attach} can't be attached at {step.target}, it lies at {where or 'no station'}"
+                )
+            return PartPlaces(step.attach, {**self.lying, step.attach: ""})
+        if step.detach:
+            self._station_of(step.detach)
+            if self.held != step.detach:
+                raise InvalidValueError(f"{step.detach} can't be detached, {self.held or 'no part'} is held")
+            for part, station in self.lying.items():
+                if station == step.target:
+                    raise InvalidValueError(
+                        f"{step.detach} can't be detached at {station}, {part} lies there"
+                    )
+            return PartPlaces("", {**self.lying, step.detach: step.target})
+        return self
+
+    def _station_of(self, part: str) -> str:
+        if part not in self.lying:
+            raise UnknownNameError("part", part, self.lying)
+        return self.lying[part]

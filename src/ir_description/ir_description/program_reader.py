@@ -1,0 +1,74 @@
+"""Reads the signals and the program steps of a cell file."""
+
+from __future__ import annotations
+
+from ir_description.items import Item, Table
+from ir_description.program import PAUSE_MAX, PAUSE_POWER_MODES, POSTURES, CellSignal, ProgramStep, Signal
+
+_COMMON = ("wait_for", "set_signals")
+_STEP_KEYS = ("station", "posture", "pause", "dwell", "attach", "detach", "power_mode", *_COMMON)
+_KEYS = {
+    "station": ("station", "dwell", "attach", "detach", *_COMMON),
+    "posture": ("posture", "dwell", *_COMMON),
+    "pause": ("pause", "power_mode", *_COMMON),
+}
+
+
+def read_signal(item: Item) -> CellSignal:
+    """Return a signal of the cell."""
+    table = item.table(("name",), ("initial", "follows", "delay"))
+    if "delay" in table and "follows" not in table:
+        table["delay"].fail("belongs to a signal that follows another")
+    return CellSignal(
+        name=table["name"].name(),
+        initial=table["initial"].boolean() if "initial" in table else False,
+        follows=table["follows"].name() if "follows" in table else "",
+        delay=table["delay"].number(0.0, PAUSE_MAX, "s") if "delay" in table else 0.0,
+    )
+
+
+def read_step(item: Item) -> ProgramStep:
+    """Return one step; exactly one of station, posture and pause says what it is."""
+    table = item.table((), _STEP_KEYS)
+    kind = table.one_of("station", "posture", "pause")
+    for key in _STEP_KEYS:
+        if key in table and key not in _KEYS[kind]:
+            table[key].fail(f"does not belong to a {kind} step; its keys are {', '.join(_KEYS[kind])}")
+    wait_for, set_signals = _signals(table, "wait_for"), _signals(table, "set_signals")
+    if kind == "pause":
+        mode = (
+            table["power_mode"].choice(PAUSE_POWER_MODES) if "power_mode" in table else PAUSE_POWER_MODES[0]
+        )
+        return ProgramStep(
+            kind="PAUSE",
+            dwell=table["pause"].number(0.0, PAUSE_MAX, "s", above=True),
+            wait_for=wait_for,
+            set_signals=set_signals,
+            power_mode=mode,
+        )
+    dwell = table["dwell"].number(0.0, PAUSE_MAX, "s") if "dwell" in table else 0.0
+    if kind == "posture":
+        posture = table["posture"].choice(POSTURES)
+        return ProgramStep("POSTURE", posture, dwell, wait_for=wait_for, set_signals=set_signals)
+    return ProgramStep(
+        kind="STATION",
+        target=table["station"].name(),
+        dwell=dwell,
+        attach=table["attach"].name() if "attach" in table else "",
+        detach=table["detach"].name() if "detach" in table else "",
+        wait_for=wait_for,
+        set_signals=set_signals,
+    )
+
+
+def _signals(table: Table, key: str) -> tuple[Signal, ...]:
+    if key not in table:
+        return ()
+    return tuple(_signal(item) for item in table[key].list(0, 100))
+
+
+def _signal(item: Item) -> Signal:
+    signal = Signal.from_text(item.text(80))
+    if not signal.name or not signal.name.replace("_", "").replace(".", "").replace("-", "").isalnum():
+        item.fail(f"is {signal.name!r}, must be a signal's name, perhaps after 'not '")
+    return signal
