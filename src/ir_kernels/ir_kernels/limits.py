@@ -1,0 +1,98 @@
+"""Exact extremes of the interpolant: how far, how fast, how hard every joint moves, between the points as
+well.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ir_kernels import data
+from ir_kernels.arguments import Array, checked
+from ir_kernels.errors import InputError
+from ir_kernels.reference import limits as reference
+
+
+@dataclass(frozen=True)
+class Extrema:
+    """Smallest and largest values of polynomials (S,n) and when they are taken, s from the start of the
+    segment.
+    """
+
+    minimum: Array
+    maximum: Array
+    time_of_minimum: Array
+    time_of_maximum: Array
+
+
+@dataclass(frozen=True)
+class MotionExtrema:
+    """Of a whole trajectory, per joint (n,): positions, and the largest |qd|, |qdd|, |qddd| with their times.
+
+    rad, rad/s, rad/s^2, rad/s^3; times in s from the start of the trajectory.
+    """
+
+    position_min: Array
+    position_max: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    time_of_position_min: Array
+    time_of_position_max: Array
+    time_of_velocity: Array
+    time_of_acceleration: Array
+    time_of_jerk: Array
+
+
+def _segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[Array, Array]:
+    c = checked("coefficients", coefficients, None, None, None)
+    T = checked("durations", durations, len(c))
+    if (T <= 0.0).any():
+        raise InputError(f"durations[{int(T.argmin())}] is {T.min()} s: segments have to be longer than 0")
+    return c, T
+
+
+def polynomial_extrema(coefficients: ArrayLike, durations: ArrayLike, derivative: int = 0) -> Extrema:
+    """Extremes of the `derivative`-th derivative of q(t) = sum_k c_k t^k, t in [0, duration], to rounding.
+
+    coefficients (S,n,d+1), durations (S,) s. Raises InputError.
+    """
+    c, T = _segments(coefficients, durations)
+    if derivative < 0:
+        raise InputError(f"derivative is {derivative}: it has to be 0 or more")
+    for _ in range(derivative):
+        c = reference.derivative(c) if c.shape[2] > 1 else 0.0 * c
+    result = reference.polynomial_extrema(c, T)
+    return Extrema(*(data.read_only(array) for array in result))
+
+
+def motion_extrema(coefficients: ArrayLike, durations: ArrayLike) -> MotionExtrema:
+    """Extremes of q, |qd|, |qdd|, |qddd| per joint over all segments: coefficients (S,n,d+1), durations
+    (S,) s.
+    """
+    c, T = _segments(coefficients, durations)
+    starts = np.concatenate([[0.0], np.cumsum(T)[:-1]])[:, None]
+    joints = np.arange(c.shape[1])
+    position = polynomial_extrema(c, T)
+    low, high = position.minimum.argmin(axis=0), position.maximum.argmax(axis=0)
+    largest, when = [], []
+    for order in (1, 2, 3):
+        e = polynomial_extrema(c, T, order)
+        downwards = -e.minimum > e.maximum
+        size = np.where(downwards, -e.minimum, e.maximum)
+        time = np.where(downwards, e.time_of_minimum, e.time_of_maximum) + starts
+        segment = size.argmax(axis=0)
+        largest.append(np.abs(size[segment, joints]))
+        when.append(time[segment, joints])
+    return MotionExtrema(
+        position_min=position.minimum[low, joints],
+        position_max=position.maximum[high, joints],
+        velocity=largest[0],
+        acceleration=largest[1],
+        jerk=largest[2],
+        time_of_position_min=(position.time_of_minimum + starts)[low, joints],
+        time_of_position_max=(position.time_of_maximum + starts)[high, joints],
+        time_of_velocity=when[0],
+        time_of_acceleration=when[1],
+        time_of_jerk=when[2],
+    )
