@@ -22,6 +22,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "ir_recorder = ir_recorder.node:main",
             "ir-record = ir_recorder.node:main",
             "ir-play = ir_recorder.play.node:main",
             "ir-report = ir_recorder.report.command:main",

