@@ -128,7 +128,7 @@ def stages(python_version: str) -> list[Stage]:
         *KERNELS.glob("*.cfg"),
     ]
     pip = (str(PYTHON), *PIP)
-    local = (*pip, "install", "--no-deps", "--no-build-isolation")
+    local = (*pip, "install", "--no-deps", "--no-build-isolation", "--use-pep517")
     editable = tuple(word for package in packages() for word in ("--editable", str(package)))
     metadata = [f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")]
     site = VENV / "lib" / f"python{python_version}" / "site-packages"

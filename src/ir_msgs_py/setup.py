@@ -17,6 +17,6 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="Shared vocabulary in Python: value types, names, conversions, a client for scripts, fixtures",
+    description="Shared vocabulary in Python: value types, names, conversions, client for scripts, fixtures",
     license="Apache-2.0",
 )
