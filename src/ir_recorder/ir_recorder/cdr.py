@@ -1,8 +1,9 @@
 """Columns out of many CDR messages of one type at once, without ROS.
 
-A topic at 500 Hz has messages of one layout: the offsets are found by walking the first one, then every field of all
-messages is one strided view. Messages of another layout (a longer text, an empty array) form their own group.
-Source: OMG CDR (XCDR1, little endian), alignment counted after the four bytes of the encapsulation header.
+A topic at 500 Hz has messages of one layout: the offsets are found by walking the first one, then every
+field of all messages is one strided view. Messages of another layout (a longer text, an empty array) form
+their own group. Source: OMG CDR (XCDR1, little endian), alignment counted after the four bytes of the
+encapsulation header.
 """
 
 from __future__ import annotations
@@ -17,15 +18,14 @@ from numpy.typing import NDArray
 from ir_recorder.definition import Field, definitions_of, short_name
 from ir_recorder.errors import ReadError
 
-_DTYPES = {
-    "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2", "int32": "<i4",
-    "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4", "float64": "<f8",
-}  # fmt: skip
+_DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"} | {
+    f"{kind}{bits}": f"<{kind[0]}{bits // 8}" for kind in ("int", "uint", "float") for bits in (16, 32, 64)
+}
 _HEADER = 4
 _LITTLE_ENDIAN = 1
 _LENGTH = struct.Struct("<I")
 
-type Numbers = NDArray[np.float64]
+Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,9 @@ class Columns:
         sizes = np.array([len(message) for message in messages], dtype=np.int64)
         for size in np.unique(sizes):
             open_rows = np.flatnonzero(sizes == size)
-            block = np.frombuffer(b"".join(messages[i] for i in open_rows), dtype=np.uint8).reshape(-1, size)
+            block = np.frombuffer(b"".join(messages[int(i)] for i in open_rows), dtype=np.uint8).reshape(
+                -1, size
+            )
             while len(open_rows):
                 layout = _layout(bytes(block[0]), definitions, short_name(type_name))
                 words = [o + k for o in layout.lengths for k in range(4)]
@@ -114,7 +116,9 @@ def _layout(data: bytes, definitions: dict[str, tuple[Field, ...]], name: str) -
     try:
         walker.structure(name, "")
     except (struct.error, KeyError) as error:
-        raise ReadError(f"a message of type {name} with {len(data)} bytes doesn't fit its definition: {error!r}") from error
+        raise ReadError(
+            f"a message of type {name} with {len(data)} bytes doesn't fit its definition: {error!r}"
+        ) from error
     return _Layout(walker.leaves, tuple(walker.lengths))
 
 

@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ir_description import DescriptionError, cell_to_yaml, load_cell, robot_urdf
 from ir_recorder.errors import PathError
-
-
-@dataclass(frozen=True)
-class CellFiles:
-    """The cell in its own file format, and the robot's URDF."""
-
-    cell_yaml: str
-    urdf: str
+from ir_recorder.session import CellFiles
 
 
 def cell_files(name_or_path: str) -> CellFiles:

@@ -26,11 +26,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 
 from ir_msgs_py import names
-from ir_recorder.cell_files import CellFiles, cell_files
+from ir_recorder.cell_files import cell_files
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
 from ir_recorder.parameters import declare_settings
 from ir_recorder.qos import QosOffer, request_for
-from ir_recorder.session import RecordingSession
+from ir_recorder.session import CellFiles, RecordingSession
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.topics import TopicSelection, single_type
 from ir_recorder.writer import RecordingWriter

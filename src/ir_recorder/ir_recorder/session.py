@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
-from ir_recorder.cell_files import CellFiles
 from ir_recorder.qos import QosOffer
 from ir_recorder.writer import RecordingSummary, RecordingWriter
 
 CELL_ATTACHMENT = "cell.yaml"
 URDF_ATTACHMENT = "robot.urdf"
 FACTS_RECORD = "ir_recorder"
+
+
+@dataclass(frozen=True)
+class CellFiles:
+    """The cell in its own file format, and the robot's URDF."""
+
+    cell_yaml: str
+    urdf: str
 
 
 class RecordingSession:

@@ -1,0 +1,68 @@
+"""Values out of decoded messages: the same fields, checked, whatever library decoded them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
+from numpy.typing import NDArray
+
+
+def movement_from(message: Any) -> PlannedMovement:
+    """A PlannedMovement of its decoded message, without the points; ValueError where a field makes no
+    sense.
+    """
+    return PlannedMovement(
+        kind=message.kind,
+        from_station=message.from_station,
+        to_station=message.to_station,
+        trajectory_id=message.trajectory_id,
+        report=report_from(message.report),
+        duration=message.duration,
+        power_mode=message.power_mode,
+        attach=message.attach,
+        detach=message.detach,
+        load=message.load,
+        wait_for=tuple(message.wait_for),
+        set_signals=tuple(message.set_signals),
+    )
+
+
+def report_from(message: Any) -> TrajectoryReport:
+    """A TrajectoryReport of its decoded message."""
+    return TrajectoryReport(
+        duration=message.duration,
+        movement_cost=message.movement_cost,
+        energy=message.energy,
+        joint_energy=message.joint_energy,
+        base_energy=message.base_energy,
+        burnt_energy=message.burnt_energy,
+        peak_power=message.peak_power,
+        min_clearance=message.min_clearance,
+        closest=_pair_from(message.closest) if message.closest.body_a else None,
+        closest_time=message.closest_time,
+        velocity_ratio=message.velocity_ratio,
+        acceleration_ratio=message.acceleration_ratio,
+        jerk_ratio=message.jerk_ratio,
+        torque_ratio=message.torque_ratio,
+        path_length=message.path_length,
+        certified=message.certified,
+        contacts=tuple(_pair_from(pair) for pair in message.contacts),
+    )
+
+
+def _pair_from(message: Any) -> DistancePair:
+    return DistancePair(
+        kind=message.kind,
+        body_a=message.body_a,
+        body_b=message.body_b,
+        distance=message.distance,
+        point_a=_point(message.point_a),
+        point_b=_point(message.point_b),
+        allowed_contact=message.allowed_contact,
+    )
+
+
+def _point(point: Any) -> NDArray[np.float64]:
+    return np.array([point.x, point.y, point.z], dtype=np.float64)

@@ -1,0 +1,237 @@
+"""Reads a recording into typed series, without ROS: what is damaged or missing becomes a sentence, not a
+refusal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from ir_msgs_py.errors import MsgsError
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+from numpy.typing import NDArray
+
+from ir_msgs_py import names
+from ir_recorder.cdr import Columns
+from ir_recorder.decoded import movement_from
+from ir_recorder.errors import ReadError
+from ir_recorder.raw import RawChannel, RawRecording, read_raw
+from ir_recorder.recording import (
+    BitSeries,
+    ControllerSeries,
+    JointSeries,
+    PowerSeries,
+    ProgramEvent,
+    Recording,
+    TextEvent,
+    TopicSummary,
+)
+from ir_recorder.session import CELL_ATTACHMENT, URDF_ATTACHMENT
+
+_T = TypeVar("_T")
+_WARN = 30  # rcl_interfaces/Log
+_IN_BITS = ("ab", "hib", "ks", "emergency_stop", "drives_on", "drives_off", "conf_mess", "move_enable")
+_OUT_BITS = ("ab", "bbs", "drives_ready", "alarm_stop", "in_home", "moving")
+
+
+def read_recording(path: str | Path) -> Recording:
+    """The recording in a file; ReadError when the file is no MCAP or holds nothing."""
+    return _Reader(read_raw(path)).recording()
+
+
+class _Reader:
+    def __init__(self, raw: RawRecording) -> None:
+        self._raw = raw
+        self._problems = list(raw.problems)
+        times = [channel.log_time for channel in raw.channels if len(channel.log_time)]
+        self._start = int(min(t.min() for t in times)) if times else 0
+        self._end = int(max(t.max() for t in times)) if times else 0
+        self._prefix = self._namespace()
+
+    def recording(self) -> Recording:
+        raw = self._raw
+        for channel in raw.channels:
+            if channel.message_encoding != "cdr" and channel.messages:
+                self._problems.append(f"{channel.topic} is {channel.message_encoding}, not cdr: left out")
+        return Recording(
+            path=raw.path,
+            start_ns=self._start,
+            duration=(self._end - self._start) * 1e-9,
+            topics=tuple(
+                TopicSummary(c.topic, c.type, len(c.messages), c.message_encoding) for c in raw.channels
+            ),
+            joints=self._series(names.JOINT_STATES, self._joints),
+            power=self._series(names.POWER_STATE, self._power),
+            controller=self._series(names.CONTROLLER_STATE, self._controller),
+            plc_inputs=self._series(names.PLC_INPUTS, self._bits(_IN_BITS, stamped=False), needed=False),
+            plc_outputs=self._series(names.PLC_OUTPUTS, self._bits(_OUT_BITS, stamped=True), needed=False),
+            events=tuple(self._events()),
+            loads=tuple(self._loads()),
+            signals=tuple(self._signals()),
+            warnings=tuple(self._warnings()),
+            cell_yaml=self._attached(CELL_ATTACHMENT),
+            urdf=self._attached(URDF_ATTACHMENT) or self._description(),
+            facts=raw.facts,
+            problems=tuple(self._problems),
+        )
+
+    def _namespace(self) -> str:
+        """The cell's namespace: what stands before "/joint_states" or the mains meter's topic."""
+        for name in (names.POWER_STATE, names.JOINT_STATES):
+            for channel in self._raw.channels:
+                if channel.topic.endswith(f"/{name}"):
+                    return channel.topic.removesuffix(name)
+        return "/"
+
+    def _channel(self, name: str) -> RawChannel | None:
+        channel = self._raw.channel(name if name.startswith("/") else self._prefix + name)
+        return channel if channel is not None and channel.message_encoding == "cdr" else None
+
+    def _series(
+        self, name: str, build: Callable[[Columns, RawChannel], _T], needed: bool = True
+    ) -> _T | None:
+        channel = self._channel(name)
+        if channel is None:
+            if needed:
+                self._problems.append(f"{self._prefix}{name} isn't in the recording")
+            return None
+        try:
+            return build(Columns(channel.messages, channel.type, channel.schema_text), channel)
+        except ReadError as error:
+            self._problems.append(f"{channel.topic} can't be read: {error}")
+            return None
+
+    def _seconds(self, stamps: NDArray[np.int64]) -> NDArray[np.float64]:
+        return np.asarray((stamps - self._start) * 1e-9, dtype=np.float64)
+
+    def _joints(self, columns: Columns, channel: RawChannel) -> JointSeries:
+        first = next(self._decoded(channel), None)
+        if first is None:
+            raise ReadError("no message can be decoded")
+        joint_names = tuple(first[1].name)
+        n = len(joint_names)
+        stamps = columns.stamps()
+        return JointSeries(
+            joint_names,
+            stamps,
+            self._seconds(stamps),
+            columns.numbers("position", n),
+            columns.numbers("velocity", n),
+            columns.numbers("effort", n),
+        )
+
+    def _power(self, columns: Columns, channel: RawChannel) -> PowerSeries:
+        return PowerSeries(
+            self._seconds(columns.stamps()),
+            columns.integers("mode"),
+            columns.integers("target_mode"),
+            columns.numbers("power"),
+            columns.numbers("energy"),
+            columns.numbers("base_power"),
+            columns.numbers("bus_voltage"),
+            columns.numbers("burnt_power"),
+            columns.numbers("joint_power", len(names.JOINT_NAMES)),
+            columns.numbers("joint_torque", len(names.JOINT_NAMES)),
+        )
+
+    def _controller(self, columns: Columns, channel: RawChannel) -> ControllerSeries:
+        return ControllerSeries(
+            self._seconds(columns.stamps()),
+            tuple(columns.texts("trajectory_id")),
+            columns.numbers("path_time"),
+            columns.numbers("speed_scaling"),
+            columns.numbers("tool_deviation"),
+        )
+
+    def _bits(self, bits: tuple[str, ...], stamped: bool) -> Callable[[Columns, RawChannel], BitSeries]:
+        def build(columns: Columns, channel: RawChannel) -> BitSeries:
+            times = columns.stamps() if stamped else channel.log_time
+            levels = np.stack([columns.integers(bit) for bit in bits], axis=1)
+            return BitSeries(self._seconds(times), bits, levels)
+
+        return build
+
+    def _events(self) -> Iterator[ProgramEvent]:
+        broken = 0
+        for time, message in self._messages(names.PROGRAM_STATE, needed=True):
+            try:
+                movement = movement_from(message.movement)
+            except MsgsError as error:
+                broken += 1
+                if broken == 1:
+                    self._problems.append(f"a program event at {time:.2f} s makes no sense: {error}")
+                continue
+            yield ProgramEvent(
+                self._stamp(message.header.stamp),
+                message.program_id,
+                int(message.index),
+                int(message.total),
+                message.event,
+                movement,
+                message.note,
+            )
+
+    def _loads(self) -> Iterator[TextEvent]:
+        """What is attached, as the driver's diagnostics say it: key "load"."""
+        for _, message in self._messages(names.DIAGNOSTICS):
+            for status in message.status:
+                if names.SIM_DRIVER not in status.name:
+                    continue
+                for pair in status.values:
+                    if pair.key == "load":
+                        yield TextEvent(self._stamp(message.header.stamp), "load", pair.value)
+
+    def _signals(self) -> Iterator[TextEvent]:
+        for name in (names.SIGNALS, names.MACHINE_SIGNALS):
+            for time, message in self._messages(name):
+                yield TextEvent(time, message.name, "1" if message.value else "0")
+
+    def _warnings(self) -> Iterator[TextEvent]:
+        for time, message in self._messages("/rosout"):
+            if message.level >= _WARN:
+                yield TextEvent(time, message.name, message.msg)
+
+    def _description(self) -> str:
+        for _, message in self._messages(names.ROBOT_DESCRIPTION):
+            return str(message.data)
+        return ""
+
+    def _messages(self, name: str, needed: bool = False) -> Iterator[tuple[float, Any]]:
+        channel = self._channel(name)
+        if channel is not None:
+            yield from self._decoded(channel)
+        elif needed:
+            self._problems.append(f"{self._prefix}{name} isn't in the recording")
+
+    def _decoded(self, channel: RawChannel) -> Iterator[tuple[float, Any]]:
+        """Messages one by one with their log time [s]; undecodable ones are counted."""
+        schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
+        try:
+            decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
+        except Exception as error:  # a damaged schema makes the parser raise nearly anything
+            self._problems.append(f"{channel.topic}: definition of {channel.type} can't be read ({error})")
+            return
+        failed = 0
+        for stamp, data in zip(channel.log_time.tolist(), channel.messages, strict=True):
+            try:
+                message = decode(data) if decode else None
+            except Exception:  # damaged bytes: the decoder raises nearly anything
+                message = None
+            if message is None:
+                failed += 1
+            else:
+                yield (stamp - self._start) * 1e-9, message
+        if failed:
+            self._problems.append(
+                f"{channel.topic}: {failed} of {len(channel.messages)} messages can't be decoded"
+            )
+
+    def _stamp(self, stamp: Any) -> float:
+        return float((stamp.sec * 1_000_000_000 + stamp.nanosec - self._start) * 1e-9)
+
+    def _attached(self, name: str) -> str:
+        data = self._raw.attachment(name)
+        return data.decode(errors="replace") if data is not None else ""

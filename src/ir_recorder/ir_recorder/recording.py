@@ -1,0 +1,142 @@
+"""What a recording holds, as typed values on one time axis. Times are seconds since the first message."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ir_msgs_py.report import PlannedMovement
+from numpy.typing import NDArray
+
+from ir_recorder.cdr import Numbers
+
+
+class _ReadOnlyArrays:
+    """Makes the arrays of a frozen dataclass read-only."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):  # type: ignore[arg-type]
+            value: Any = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+
+@dataclass(frozen=True)
+class TopicSummary:
+    """A topic of the file: its type, how many messages, and how it is encoded."""
+
+    name: str
+    type: str
+    count: int
+    encoding: str
+
+
+@dataclass(frozen=True, eq=False)
+class JointSeries(_ReadOnlyArrays):
+    """/joint_states: stamp_ns (N,), time (N,) s, position (N, n) rad, velocity (N, n) rad/s, effort (N, n)
+    Nm.
+    """
+
+    names: tuple[str, ...]
+    stamp_ns: NDArray[np.int64]
+    time: Numbers
+    position: Numbers
+    velocity: Numbers
+    effort: Numbers
+
+
+@dataclass(frozen=True, eq=False)
+class PowerSeries(_ReadOnlyArrays):
+    """The mains meter, N readings: mode and target numbers of ir_msgs/PowerMode; power, base_power,
+    burnt_power (N,) W; energy (N,) J since the meter's start; bus_voltage (N,) V; joint_power (N, n) W at
+    the DC bus, joint_torque (N, n) Nm.
+
+    A power is the mean since the reading before.
+    """
+
+    time: Numbers
+    mode: NDArray[np.int64]
+    target_mode: NDArray[np.int64]
+    power: Numbers
+    energy: Numbers
+    base_power: Numbers
+    bus_voltage: Numbers
+    burnt_power: Numbers
+    joint_power: Numbers
+    joint_torque: Numbers
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerSeries(_ReadOnlyArrays):
+    """The trajectory executor, N states: trajectory_id ("" while holding), path_time (N,) s along the
+    trajectory, speed_scaling (N,), tool_deviation (N,) m between commanded and simulated tcp.
+    """
+
+    time: Numbers
+    trajectory_id: tuple[str, ...]
+    path_time: Numbers
+    speed_scaling: Numbers
+    tool_deviation: Numbers
+
+
+@dataclass(frozen=True, eq=False)
+class BitSeries(_ReadOnlyArrays):
+    """Levels by name: names (B,), levels (N, B)."""
+
+    time: Numbers
+    names: tuple[str, ...]
+    levels: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramEvent:
+    """A movement or pause started, ended, failed or was cancelled."""
+
+    time: float
+    program_id: str
+    index: int
+    total: int
+    event: str
+    movement: PlannedMovement
+    note: str
+
+
+@dataclass(frozen=True)
+class TextEvent:
+    """Something said at a time: a load attached, a signal, a warning of a log."""
+
+    time: float
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All that could be read; a series is None where its topic is missing, `problems` says what is wrong.
+
+    start_ns: node clock of time 0. cell_yaml and urdf are "" where none is attached. facts: texts by key.
+    """
+
+    path: Path
+    start_ns: int
+    duration: float
+    topics: tuple[TopicSummary, ...]
+    joints: JointSeries | None
+    power: PowerSeries | None
+    controller: ControllerSeries | None
+    plc_inputs: BitSeries | None
+    plc_outputs: BitSeries | None
+    events: tuple[ProgramEvent, ...]
+    loads: tuple[TextEvent, ...]
+    signals: tuple[TextEvent, ...]
+    warnings: tuple[TextEvent, ...]
+    cell_yaml: str
+    urdf: str
+    facts: tuple[tuple[str, str], ...]
+    problems: tuple[str, ...]
+
+    def fact(self, key: str) -> str:
+        """A fact of the file, "" where it isn't told."""
+        return next((value for name, value in reversed(self.facts) if name == key), "")
