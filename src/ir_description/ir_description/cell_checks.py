@@ -5,7 +5,7 @@ The rules are small objects and functions so that the reader of cell files can a
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
 from ir_description.body import Body
@@ -46,9 +46,8 @@ def shape_register(robot: RobotModel) -> NameRegister:
     return NameRegister("capsule or body", [*(capsule.name for capsule in robot.capsules), "floor"])
 
 
-def check_contact(contact: AllowedContact, capsules: Iterable[str], bodies: Iterable[str]) -> None:
+def check_contact(contact: AllowedContact, capsules: Collection[str], bodies: Collection[str]) -> None:
     """Refuse an allowed contact whose names nobody has, or without a capsule of robot, tool or part."""
-    capsules, bodies = set(capsules), set(bodies)
     for name in (contact.body_a, contact.body_b):
         if name not in capsules and name not in bodies:
             raise UnknownNameError("capsule or body", name, sorted(capsules) + sorted(bodies))
@@ -60,10 +59,9 @@ def check_contact(contact: AllowedContact, capsules: Iterable[str], bodies: Iter
 
 
 def check_step(
-    step: ProgramStep, before: PartPlaces, stations: Iterable[str], signals: Iterable[str]
+    step: ProgramStep, before: PartPlaces, stations: Collection[str], signals: Collection[str]
 ) -> PartPlaces:
     """Return where the parts are after a step; refuse unknown names and what can't be done."""
-    stations, signals = tuple(stations), tuple(signals)
     if step.kind == "STATION" and step.target not in stations:
         raise UnknownNameError("station", step.target, stations)
     for signal in (*step.wait_for, *step.set_signals):
@@ -86,7 +84,7 @@ def check_part_mass(robot: RobotModel, tool: Load | None, part: Load | None = No
 def check_follows(signals: Iterable[CellSignal]) -> None:
     """Refuse a signal that follows one nobody has."""
     signals = tuple(signals)
-    names = [signal.name for signal in signals]
+    names = dict.fromkeys(signal.name for signal in signals)
     for signal in signals:
         if signal.follows and signal.follows not in names:
             raise UnknownNameError(f"signal that {signal.name} follows", signal.follows, names)
@@ -109,8 +107,8 @@ def check_names(cell: Cell) -> None:
         register = NameRegister(what)
         for thing in things:
             register.add(thing.name)
-    stations = [station.name for station in cell.stations]
-    machines = [machine.name for machine in cell.equipment]
+    stations = dict.fromkeys(station.name for station in cell.stations)
+    machines = dict.fromkeys(machine.name for machine in cell.equipment)
     for part in cell.parts:
         if part.station and part.station not in stations:
             raise UnknownNameError(f"station of part {part.name}", part.station, stations)
@@ -140,20 +138,20 @@ def check_contacts(cell: Cell) -> None:
         check_base_contact(cell.robot, capsule, body, bodies)
 
 
-def check_base_contact(robot: RobotModel, capsule: str, body: str, bodies: Iterable[str]) -> None:
+def check_base_contact(robot: RobotModel, capsule: str, body: str, bodies: Collection[str]) -> None:
     """Refuse a base contact that is not a capsule of base_link with a body."""
     base = [c.name for c in robot.capsules if c.link == 0]
     if capsule not in base:
         raise UnknownNameError("capsule of base_link", capsule, base)
-    if body not in (bodies := tuple(bodies)):
+    if body not in bodies:
         raise UnknownNameError("body", body, bodies)
 
 
 def check_program(cell: Cell) -> None:
     """Refuse a program with unknown names or with parts where they can't be."""
     state = cell.parts_at_start()
-    stations = [station.name for station in cell.stations]
-    signals = [signal.name for signal in cell.signals]
+    stations = dict.fromkeys(station.name for station in cell.stations)
+    signals = dict.fromkeys(signal.name for signal in cell.signals)
     for step in cell.program:
         state = check_step(step, state, stations, signals)
 

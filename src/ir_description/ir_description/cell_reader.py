@@ -159,7 +159,7 @@ class _CellReader:
         return tuple(machines), placed
 
     def _check_part_stations(self, parts: tuple[Part, ...], stations: tuple[Station, ...]) -> None:
-        known = [station.name for station in stations]
+        known = dict.fromkeys(station.name for station in stations)
         taken = NameRegister("a part at station")
         for item, part in zip(self._list("parts", 1000), parts, strict=True):
             if part.station:
@@ -231,8 +231,8 @@ class _CellReader:
     def _program(
         self, stations: tuple[Station, ...], parts: tuple[Part, ...], signals: tuple[CellSignal, ...]
     ) -> tuple[ProgramStep, ...]:
-        station_names = [station.name for station in stations]
-        signal_names = [signal.name for signal in signals]
+        station_names = dict.fromkeys(station.name for station in stations)
+        signal_names = dict.fromkeys(signal.name for signal in signals)
         places = PartPlaces("", {part.name: part.station for part in parts})
         steps = []
         for item in self._list("program", 10_000):
