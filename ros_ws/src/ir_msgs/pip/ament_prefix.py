@@ -1,4 +1,4 @@
-"""Print the prefix below which the ROS 2 wheels of the running interpreter have put share/, lib/ and include/."""
+"""Print the prefix below which the ROS 2 wheels of this interpreter have put share/, lib/ and include/."""
 
 import importlib.util
 import pathlib

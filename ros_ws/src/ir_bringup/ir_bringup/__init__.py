@@ -1,0 +1,1 @@
+"""Launch file, parameters and views of the cell; the nodes themselves need none of them."""

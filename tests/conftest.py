@@ -1,0 +1,35 @@
+"""Every test process talks in a ROS domain of its own, finds its peers fast and leaves no logs behind.
+
+Two sessions on one machine, and the workers of one session (pytest-xdist), must not hear each other. The
+settings are environment variables because the tests' own subprocesses inherit them.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+DOMAINS = 100  # 1 to 100: the ports of higher domains lie among those that Linux hands out to clients
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose domain and discovery before any test module imports rclpy."""
+    session = int(os.environ.setdefault("IR_TEST_SESSION", str(os.getpid())))
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    os.environ["ROS_DOMAIN_ID"] = str(1 + (7 * session + worker) % DOMAINS)
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ["RCUTILS_COLORIZED_OUTPUT"] = "0"
+    os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+    spec = importlib.util.find_spec("ir_msgs_py")
+    if spec is not None and spec.origin is not None:
+        profile = Path(spec.origin).parent / "ros" / "fast_discovery.xml"
+        os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(profile))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _ros_logs(tmp_path_factory: pytest.TempPathFactory) -> None:
+    os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("ros_log"))

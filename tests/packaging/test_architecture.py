@@ -1,0 +1,125 @@
+"""Who knows whom: dependencies point one way, and ROS and PyBullet stay behind their doors."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+SRC = Path(__file__).resolve().parents[2] / "src"
+
+BASE = {"ir_description", "ir_kernels", "ir_msgs_py"}
+ROOMS = {"ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder"}
+KNOWS = {
+    **{package: set() for package in BASE},
+    **dict.fromkeys(ROOMS, BASE),
+    "ir_cli": BASE | ROOMS,
+}
+PROJECT = set(KNOWS)
+CORE_READS_NO_CLOCK = {"ir_kernels", "ir_description", "ir_planner"}
+
+
+def modules(package: str) -> list[Path]:
+    """All modules of a package."""
+    return sorted((SRC / package / package).rglob("*.py"))
+
+
+def imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Names that a module imports, also inside functions and under TYPE_CHECKING, each with its line."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.module, node.lineno
+
+
+def is_ros(name: str) -> bool:
+    """True for rclpy and generated messages, ir_msgs among them."""
+    top = name.partition(".")[0]
+    return top in ("rclpy", "ir_msgs", "std_srvs", "builtin_interfaces", "rcl_interfaces") or top.endswith(
+        "_msgs"
+    )
+
+
+def may_know_ros(package: str, module: Path) -> bool:
+    """Nodes, parameters, and the ROS side of the shared vocabulary; the command line knows all."""
+    inside = module.relative_to(SRC / package / package)
+    if package == "ir_cli":
+        return True
+    if package == "ir_msgs_py":
+        return inside.parts[0] == "ros"
+    return module.name in ("node.py", "parameters.py")
+
+
+def violations(package: str, forbidden: object) -> list[str]:
+    """Imports of the package for which forbidden(module, name) holds, as file:line name."""
+    assert callable(forbidden)
+    return [
+        f"{module.relative_to(SRC)}:{line} {name}"
+        for module in modules(package)
+        for name, line in imports(ast.parse(module.read_text(encoding="utf-8")))
+        if forbidden(module, name)
+    ]
+
+
+def test_every_package_has_a_place_in_the_architecture() -> None:
+    assert {setup.parent.name for setup in SRC.glob("*/setup.py")} == PROJECT
+
+
+@pytest.mark.parametrize("package", sorted(PROJECT))
+def test_package_knows_only_those_below_it(package: str) -> None:
+    allowed = KNOWS[package] | {package}
+
+    def forbidden(module: Path, name: str) -> bool:
+        top = name.partition(".")[0]
+        return top in PROJECT and top not in allowed
+
+    assert modules(package), f"{package} has no modules: nothing was checked"
+    assert violations(package, forbidden) == []
+
+
+@pytest.mark.parametrize("package", sorted(PROJECT))
+def test_ros_appears_only_in_nodes_and_parameters(package: str) -> None:
+    assert violations(package, lambda module, name: is_ros(name) and not may_know_ros(package, module)) == []
+
+
+@pytest.mark.parametrize("package", sorted(PROJECT))
+def test_pybullet_appears_in_one_file(package: str) -> None:
+    backend = SRC / "ir_sim_driver" / "ir_sim_driver" / "pybullet_backend.py"
+
+    def forbidden(module: Path, name: str) -> bool:
+        return name.partition(".")[0] in ("pybullet", "pybullet_data") and module != backend
+
+    assert violations(package, forbidden) == []
+
+
+@pytest.mark.parametrize("package", sorted(CORE_READS_NO_CLOCK))
+def test_the_core_is_handed_time_and_randomness(package: str) -> None:
+    def forbidden(module: Path, name: str) -> bool:
+        return name.partition(".")[0] in ("time", "datetime", "random", "secrets") and not may_know_ros(
+            package, module
+        )
+
+    assert violations(package, forbidden) == []
+
+
+@pytest.mark.parametrize("package", sorted(PROJECT))
+def test_nobody_draws_from_the_global_generator(package: str) -> None:
+    seeded = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64", "Philox"}
+    drawn = [
+        f"{module.relative_to(SRC)}:{node.lineno} {ast.unparse(node)}"
+        for module in modules(package)
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Attribute)
+        and ast.unparse(node.value) in ("np.random", "numpy.random")
+        and node.attr not in seeded
+    ]
+    assert drawn == []
+
+
+def test_the_walk_sees_imports_in_functions_and_under_type_checking() -> None:
+    source = "import a.b\nfrom c import d\ndef f():\n    from e.f import g\nif TYPE_CHECKING:\n    import h\n"
+    assert [name for name, _ in imports(ast.parse(source))] == ["a.b", "c", "e.f", "h"]
