@@ -11,7 +11,7 @@ import numpy as np
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
-from ir_planner.time_law import GRID_NS, TimeLaw
+from ir_planner.time_law import GRID_NS, StepLaws
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -19,10 +19,10 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class TimedPath:
-    """Waypoints (M, n) rad, a law for each of the M-1 steps, and how long neighbours overlap [grid steps] (M-2)."""
+    """Waypoints (M, n) rad, the laws of each of the M-1 steps, and how long neighbours overlap [grid steps] (M-2)."""
 
     waypoints: FloatArray
-    laws: tuple[TimeLaw, ...]
+    laws: tuple[StepLaws, ...]
     overlaps: tuple[int, ...]
 
     @property
@@ -42,7 +42,7 @@ class TimedPath:
         return begin, begin + self.overlaps[corner]
 
 
-def largest_overlaps(laws: tuple[TimeLaw, ...]) -> tuple[int, ...]:
+def largest_overlaps(laws: tuple[StepLaws, ...]) -> tuple[int, ...]:
     """Overlap in which one movement brakes while the next speeds up; never more than two laws at a time."""
     return tuple(min(before.ramp_down, after.ramp_up) for before, after in zip(laws, laws[1:], strict=False))
 
@@ -59,9 +59,9 @@ def blended(path: TimedPath, joint_names: tuple[str, ...]) -> JointTrajectory:
     for k, (law, begin) in enumerate(zip(path.laws, starts, strict=True)):
         s, sd, sdd = law.at(knots - begin)
         delta = path.waypoints[k + 1] - path.waypoints[k]
-        q += s[:, None] * delta
-        qd += sd[:, None] * delta
-        qdd += sdd[:, None] * delta
+        q += s * delta
+        qd += sd * delta
+        qdd += sdd * delta
     q[0], q[-1] = path.waypoints[0], path.waypoints[-1]
     qd[0] = qd[-1] = qdd[0] = qdd[-1] = 0.0
     return JointTrajectory(joint_names, knots * GRID_NS, q, qd, qdd)

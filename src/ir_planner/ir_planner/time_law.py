@@ -148,3 +148,35 @@ class TimeLaw:
         s0, v0, a0 = states.s[0, anchor], states.sd[0, anchor], states.sdd[0, anchor]
         s = s0 + tau * (v0 + tau * (a0 / 2 + j * tau / 6))
         return s, v0 + tau * (a0 + j * tau / 2), a0 + j * tau
+
+
+@dataclass(frozen=True)
+class StepLaws:
+    """Laws of one straight step: one for all joints (synchronous), or one for each (asynchronous)."""
+
+    laws: tuple[TimeLaw, ...]
+
+    @property
+    def total(self) -> int:
+        """Duration in grid steps."""
+        return max(law.total for law in self.laws)
+
+    @property
+    def ramp_up(self) -> int:
+        """Grid steps at the start in which the next-door movement may still brake; none where joints differ."""
+        return self.laws[0].ramp_up if len(self.laws) == 1 else 0
+
+    @property
+    def ramp_down(self) -> int:
+        """Grid steps at the end in which the next movement may already start; none where joints differ."""
+        return self.laws[0].ramp_down if len(self.laws) == 1 else 0
+
+    def switches(self) -> IntArray:
+        """Grid steps at which a phase of any joint starts or ends, ascending without doubles."""
+        return np.unique(np.concatenate([law.switches() for law in self.laws]))
+
+    def at(self, steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """s, sd, sdd (M, 1 or n) at grid steps (M,)."""
+        states = [law.at(steps) for law in self.laws]
+        s, sd, sdd = (np.stack([state[k] for state in states], axis=1) for k in range(3))
+        return s, sd, sdd

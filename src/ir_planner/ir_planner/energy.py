@@ -1,0 +1,68 @@
+"""Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is always drawn.
+
+Energy = base + sum of the axes (signed) + burnt + change of the capacitor. The power is taken at the middles of steps
+of at most 1 ms. Each movement starts with an empty capacitor; what is left in it at the end is not credited.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from ir_kernels import dc_bus
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_planner.scene import PlanningScene
+
+FloatArray = NDArray[np.float64]
+STEP_S = 1e-3
+
+
+@dataclass(frozen=True)
+class MovementEnergy:
+    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), burnt, capacitor.
+
+    peak [W] at the mains; times (N,) s (middles of the steps) and watts (N,) at the mains: its profile.
+    """
+
+    total: float
+    base: float
+    joints: FloatArray
+    burnt: float
+    capacitor: float
+    peak: float
+    times: FloatArray
+    watts: FloatArray
+
+
+def movement_energy(trajectory: JointTrajectory, scene: PlanningScene, step: float = STEP_S) -> MovementEnergy:
+    """Energy of a trajectory (as it is interpolated) with the loads of the scene."""
+    begin = float(trajectory.times[0])
+    span = trajectory.duration - begin
+    count = max(int(np.ceil(span / step - 1e-9)), 1)
+    dt = span / count
+    times = begin + (np.arange(count) + 0.5) * dt
+    motion = trajectory.sample(times)
+    torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
+    axes = scene.dynamics.axis_power(motion.qd, torque)
+    if dt <= 0.0:  # a single point: nothing lasts
+        nothing = np.zeros(0)
+        return MovementEnergy(0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, 0.0, nothing, nothing)
+    bus = dc_bus(axes, dt, scene.dc_bus)
+    watts = bus.mains + scene.base_watts
+    return MovementEnergy(
+        total=float(watts.sum() * dt),
+        base=scene.base_watts * span,
+        joints=axes.sum(axis=0) * dt,
+        burnt=float(bus.burnt.sum() * dt),
+        capacitor=float(bus.stored[-1]),
+        peak=float(watts.max()),
+        times=times,
+        watts=watts,
+    )
+
+
+def holding_watts(q: FloatArray, scene: PlanningScene) -> float:
+    """Mains power [W] while the motors hold the arm still at q (n,): base load and copper losses."""
+    rest = np.zeros((1, len(q)))
+    torque = scene.dynamics.inverse_dynamics(q[None], rest, rest)
+    return scene.base_watts + float(scene.dynamics.axis_power(rest, torque).sum())

@@ -1,0 +1,129 @@
+"""What a person types as a goal: a station, a posture, joint values in degrees, or a pose of the tcp.
+
+"lathe" | "park" | "home" | "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0" | "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m and degrees, KUKA's
+A, B, C: Z-Y'-X'').
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from ir_description import Cell
+from ir_description.poses import rotation_from_abc
+from ir_msgs_py.status import StatusCode
+from numpy.typing import NDArray
+
+from ir_planner.errors import RequestError, UnknownNameError
+
+FloatArray = NDArray[np.float64]
+POSTURES = ("home", "park")
+_POSE_KEYS = ("X", "Y", "Z", "A", "B", "C")
+_WORDS = re.compile(r"[A-Za-z]+\d*|\S+")
+_TEXT_MAX = 300
+_LENGTH_MAX = 100.0  # m
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Exactly one of configuration (n,) rad and pose (4, 4) of the tcp in the cell; station: its name, "" for none."""
+
+    configuration: FloatArray | None = None
+    pose: FloatArray | None = None
+    station: str = ""
+    text: str = ""
+
+
+def one_goal(
+    text: str, configuration: FloatArray | None, pose: FloatArray | None, cell: Cell
+) -> Goal:
+    """The goal that a request gives in exactly one of three forms."""
+    given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not None),
+                                      ("goal_pose", pose is not None)) if there]  # fmt: skip
+    if len(given) != 1:
+        which = " and ".join(given) or "none"
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"exactly one of goal, goal_state and goal_pose must be given, it is {which}",
+        )
+    if text:
+        return parse_goal(text, cell)
+    if configuration is not None:
+        return Goal(configuration=within_limits(configuration, cell, "goal", StatusCode.GOAL_STATE_INVALID))
+    return Goal(pose=pose)
+
+
+def parse_goal(text: str, cell: Cell) -> Goal:
+    """The goal of a text. Raises RequestError: what is wrong, and what may stand there."""
+    stripped = text.strip()
+    if len(stripped) > _TEXT_MAX or not stripped.isprintable():
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS, f"goal has {len(text)} characters: it must be one line of 1 to 300"
+        )
+    for station in cell.stations:
+        if station.name == stripped:
+            return Goal(pose=station.pose, station=station.name, text=stripped)
+    if stripped.lower() in POSTURES:
+        return Goal(configuration=cell.posture(stripped.lower()), text=stripped.lower())
+    words = _WORDS.findall(stripped.replace(",", " ").replace("=", " "))
+    keys = [word.upper() for word in words[::2]]
+    joints = [f"A{i + 1}" for i in range(cell.robot.n)]
+    if len(words) > 1 and keys[0] in joints:
+        values = _numbers(keys, words[1::2], joints, "deg")
+        return Goal(
+            configuration=within_limits(np.radians(values), cell, "goal", StatusCode.GOAL_STATE_INVALID), text=stripped
+        )
+    if len(words) > 1 and keys[0] in _POSE_KEYS:
+        x, y, z, *abc = _numbers(keys, words[1::2], list(_POSE_KEYS), "")
+        if max(abs(x), abs(y), abs(z)) > _LENGTH_MAX:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"goal lies at ({x:g}, {y:g}, {z:g}) m: X, Y and Z must be in [-{_LENGTH_MAX:g}, {_LENGTH_MAX:g}] m",
+            )
+        pose = np.eye(4)
+        pose[:3, :3] = rotation_from_abc(abc)
+        pose[:3, 3] = x, y, z
+        return Goal(pose=pose, text=stripped)
+    raise UnknownNameError(
+        "goal",
+        stripped,
+        [*(s.name for s in cell.stations), *POSTURES, '"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"'],
+    )
+
+
+def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> FloatArray:
+    """Joint values (n,) rad within the robot's limits; else RequestError with joint, value and bounds in degrees."""
+    robot = cell.robot
+    for i, value in enumerate(q):
+        low, high = float(robot.position_min[i]), float(robot.position_max[i])
+        if not math.isfinite(value):
+            raise RequestError(code, f"{what}: {robot.joint_names[i]} is {value}: it must be finite")
+        if not low - 1e-9 <= value <= high + 1e-9:
+            raise RequestError(
+                code,
+                f"{what}: {robot.joint_names[i]} is {np.degrees(value):g} deg: it must be in "
+                f"[{np.degrees(low):g}, {np.degrees(high):g}] deg",
+            )
+    return np.clip(q, robot.position_min, robot.position_max)
+
+
+def _numbers(keys: list[str], values: list[str], expected: list[str], unit: str) -> list[float]:
+    """Numbers in the order of `expected`; every key once."""
+    if sorted(keys) != sorted(expected) or len(values) != len(keys):
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"goal names {' '.join(keys)[:80]}: it must give each of {' '.join(expected)} once, with a number",
+        )
+    numbers: dict[str, float] = {}
+    for key, value in zip(keys, values, strict=True):
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"goal: {key} is {ascii(value[:20])}: it must be a finite number {unit}".rstrip(),
+            )
+        numbers[key] = number
+    return [numbers[key] for key in expected]
