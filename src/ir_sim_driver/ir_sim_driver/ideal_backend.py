@@ -27,6 +27,10 @@ class IdealBackend:
         self._brake_step: Array = BRAKE_FACTOR * dt * np.array(robot.acceleration_max)
         self.disturbance: Array | None = None
         self._rows: list[tuple[Array, Array, Array] | None] = []
+        n = len(robot.joint_names)
+        self._last: Array = np.zeros(n)
+        self._speeds: Array = np.empty((0, n))
+        self._torques: Array = np.empty((0, n))
         self.set_load(())
         self.reset(np.array(robot.machine_home))
 
@@ -75,15 +79,9 @@ class IdealBackend:
         self._speeds = self._torques = np.empty((0, len(self.q)))
         return Work(speed, torque)
 
-    _last: Array = np.zeros(0)
-    _speeds: Array = np.empty((0, 0))
-    _torques: Array = np.empty((0, 0))
-
     def _settle(self) -> None:
         n = len(self.q)
         if not self._rows:
-            if self._last.size == 0:
-                self._last = np.zeros(n)
             return
         driven = [k for k, row in enumerate(self._rows) if row is not None]
         speed, torque = np.zeros((2, len(self._rows), n))

@@ -26,10 +26,11 @@ _SAME = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A path and the path time [s] at which its trajectory starts."""
+    """A path and the path time [s] at which its trajectory starts; the first `lead` segments are not the trajectory's."""
 
     path: Path
     offset: float
+    lead: int
 
 
 def route_onto(
@@ -40,7 +41,7 @@ def route_onto(
     first = float(trajectory.times[0])
     if first > 0.0:
         lead = quintic(now, _motion_at_point(trajectory, 0), first)
-        return Route(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0)
+        return Route(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0, 1)
     _check_start(trajectory, now, acceleration_max, settings)
     delta = np.abs(trajectory.positions[0] - now.q)
     if now.qd.any():
@@ -51,13 +52,13 @@ def route_onto(
         k = min(int(np.searchsorted(trajectory.times, settings.bridge_time)), len(durations))
         bridge = quintic(now, _motion_at_point(trajectory, k), float(trajectory.times[k]))
         pieces = [bridge, coefficients[k:]], [trajectory.times[k : k + 1], durations[k:]]
-        return Route(_path(*pieces, now.q), 0.0)
+        return Route(_path(*pieces, now.q), 0.0, 1)
     if delta.max() <= _SAME:
-        return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0)
+        return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
     T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / _GENTLE)
     still = np.zeros_like(delta)
     closing = quintic(Motion(now.q, still, still), Motion(trajectory.positions[0], still, still), T)
-    return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T)
+    return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
 
 
 def _path(coefficients: list[Array], durations: list[Array], rest: Array) -> Path:

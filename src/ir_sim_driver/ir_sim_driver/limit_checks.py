@@ -11,22 +11,28 @@ from ir_sim_driver.arrays import Array
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.goal import ErrorCode
-from ir_sim_driver.lead_in import Route
 
 _CHUNK = 4096
 _SAMPLES_MAX = 400_000
 
 
 def check_limits(
-    route: Route, robot: Any, dynamics: Any, settings: ExecutionSettings, dt: float
+    coefficients: Array,
+    durations: Array,
+    start: float,
+    robot: Any,
+    dynamics: Any,
+    settings: ExecutionSettings,
+    dt: float,
 ) -> None:
     """Raise TrajectoryRefusedError naming joint, time, value, limit and excess of the first violation.
 
-    dynamics: an ir_kernels DynamicsModel with the present load. Samples every dt [s], coarser for paths of more than
-    400 000 steps, and every point.
+    Segments (S, n, 6) with durations (S,) [s], the first at time `start` [s] of the trajectory. dynamics: an
+    ir_kernels DynamicsModel with the present load. Samples every dt [s], coarser for paths of more than 400 000
+    steps, and every point.
     """
     slack = 1.0 + settings.limit_slack
-    for t, q, qd, qdd in _samples(route, dt):
+    for t, q, qd, qdd in _samples(coefficients, durations, start, dt):
         beyond = np.maximum(q - robot.position_max, robot.position_min - q)
         bound = np.where(q > robot.position_max, robot.position_max, robot.position_min)
         _refuse_first(robot, t, q, bound, beyond - settings.position_slack, beyond, "is at", "rad")
@@ -42,15 +48,14 @@ def check_limits(
         limits = dynamics.torque_limit(qd)
         excess = np.abs(torque) - limits
         _refuse_first(robot, t, torque, limits, excess - limits * (slack - 1.0), excess, "needs", "Nm")
-    _check_jumps(route, robot, settings)
 
 
-def _samples(route: Route, dt: float) -> Iterator[tuple[Array, Array, Array, Array]]:
+def _samples(
+    coefficients: Array, durations: Array, start: float, dt: float
+) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Times (M,), q, qd, qdd (M, n) of stretches of the path, ends of segments included."""
-    path = route.path
-    dt = max(dt, path.duration / _SAMPLES_MAX)
-    start = 0.0
-    for c, length in zip(path.coefficients, path.durations.tolist(), strict=True):
+    dt = max(dt, float(durations.sum()) / _SAMPLES_MAX)
+    for c, length in zip(coefficients, durations.tolist(), strict=True):
         count = max(2, int(np.ceil(length / dt)) + 1)
         for first in range(0, count, _CHUNK):
             t = np.linspace(0.0, length, count)[first : first + _CHUNK]
@@ -59,7 +64,7 @@ def _samples(route: Route, dt: float) -> Iterator[tuple[Array, Array, Array, Arr
             twice = np.zeros_like(powers)
             once[:, 1:] = np.arange(1.0, 6.0) * powers[:, :5]
             twice[:, 2:] = np.arange(2.0, 6.0) * np.arange(1.0, 5.0) * powers[:, :4]
-            yield start - route.offset + t, powers @ c.T, once @ c.T, twice @ c.T
+            yield start + t, powers @ c.T, once @ c.T, twice @ c.T
         start += length
 
 
@@ -78,9 +83,11 @@ def _refuse_first(
     )
 
 
-def _check_jumps(route: Route, robot: Any, settings: ExecutionSettings) -> None:
+def check_jumps(
+    coefficients: Array, durations: Array, start: float, robot: Any, settings: ExecutionSettings
+) -> None:
     """Velocity may jump at a point, and at the end, only by what the drives can follow at once."""
-    c, T = route.path.coefficients, route.path.durations[:, None]
+    c, T = coefficients, durations[:, None]
     if len(c) == 0:
         return
     final = c[:, :, 1] + T * (2.0 * c[:, :, 2] + T * (3.0 * c[:, :, 3] + T * (4.0 * c[:, :, 4] + T * 5.0 * c[:, :, 5])))
@@ -91,7 +98,7 @@ def _check_jumps(route: Route, robot: Any, settings: ExecutionSettings) -> None:
     if (over > 0.0).any():
         k = int((over > 0.0).any(axis=1).argmax())
         j = int(over[k].argmax())
-        time = float(route.path.durations[: k + 1].sum()) - route.offset
+        time = start + float(durations[: k + 1].sum())
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
             f"the velocity of {robot.joint_names[j]} jumps by {jump[k, j]:+.4f} rad/s at {time:.4f} s: at most "

@@ -59,6 +59,8 @@ class PyBulletBackend:
         self._speed: Array = self._still
         self._speeds: list[Array] = []
         self._torques: list[Array] = []
+        self._loads: tuple[Any, ...] = ()
+        self._stale = False  # whether Bullet's state is older than ours
         self._body = -1
         self.set_load(())
         self.reset(self.q)
@@ -68,14 +70,19 @@ class PyBulletBackend:
         self._bullet.disconnect(physicsClientId=self._client)
 
     def reset(self, q: Array) -> None:
-        """Stand still at q."""
+        """Stand still at q; starts the physics server again when it is gone."""
+        if not self._bullet.isConnected(self._client):
+            self._bullet, self._client = _connect(self._dt)
+            self._body = -1
+            self.set_load(self._loads)
         self.q, self.qd, self._speed = np.array(q, dtype=np.float64), self._still, self._still
         self._follower.reset(self.q)
         self._write_state()
 
     def set_load(self, loads: Sequence[Any]) -> None:
         """Rebuild the robot with these loads, in the same motion."""
-        text = self._urdf(self._robot, tuple(loads))
+        self._loads = tuple(loads)
+        text = self._urdf(self._robot, self._loads)
         bullet, client = self._bullet, self._client
         if self._body >= 0:
             bullet.removeBody(self._body, physicsClientId=client)
@@ -100,6 +107,8 @@ class PyBulletBackend:
 
     def track(self, q_next: Array) -> None:
         """Follow the command with the torque that the envelope allows."""
+        if self._stale:
+            self._write_state()
         speed, drives = self._speed, self._drives
         qdd = self._follower.acceleration(q_next, self.q, speed)
         now = speed + (0.5 * self._dt) * qdd  # the state's speed lags half a step: explicit steps of Bullet
@@ -128,7 +137,8 @@ class PyBulletBackend:
         """Stay where the closed brakes hold the robot."""
         if self._speed.any():
             self._speed = self.qd = self._still
-            self._write_state()
+            self._follower.reset(self.q)
+            self._stale = True
         self.torque = self._still
         self._speeds.append(self._still)
         self._torques.append(self._still)
@@ -200,6 +210,7 @@ class PyBulletBackend:
             del self._speeds[:_CHUNK], self._torques[:_CHUNK]
 
     def _write_state(self) -> None:
+        self._stale = False
         for joint, q, speed in zip(self._joints, self.q.tolist(), self._speed.tolist(), strict=True):
             self._bullet.resetJointState(self._body, joint, q, speed, physicsClientId=self._client)
 

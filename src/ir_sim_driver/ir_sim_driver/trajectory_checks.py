@@ -13,7 +13,7 @@ from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.goal import ErrorCode, JointTolerance, TrajectoryGoal
 from ir_sim_driver.lead_in import Route, route_onto
-from ir_sim_driver.limit_checks import check_limits
+from ir_sim_driver.limit_checks import check_jumps, check_limits
 from ir_sim_driver.path import Motion
 
 _REST = 1e-6  # rad/s that still counts as standing
@@ -46,16 +46,49 @@ def check_goal(goal: TrajectoryGoal, joint_names: tuple[str, ...], settings: Exe
     )
 
 
-def checked_route(
-    goal: TrajectoryGoal, now: Motion, robot: Any, dynamics: Any, settings: ExecutionSettings, dt: float
-) -> Route:
-    """Path from the commanded motion `now` along a goal that passed check_goal. Raises TrajectoryRefusedError."""
+def check_trajectory(
+    trajectory: JointTrajectory, robot: Any, dynamics: Any, settings: ExecutionSettings, dt: float
+) -> None:
+    """Check every instant of a trajectory against the limits, whatever state the robot is in.
+
+    May take a while for long ones. Raises TrajectoryRefusedError.
+    """
+    _check_points(trajectory, robot, settings)
     with np.errstate(over="ignore", invalid="ignore"):
-        route = route_onto(goal.trajectory, now, robot.acceleration_max, settings)
-        if not np.isfinite(route.path.coefficients).all():
-            raise _invalid("the points lie so close in time that their interpolation is not finite")
-    check_limits(route, robot, dynamics, settings, dt)
+        coefficients, durations = trajectory.coefficients()
+        if not np.isfinite(coefficients).all():
+            raise _invalid("points lie too close in time: the polynomial between them is not finite")
+    first = float(trajectory.times[0])
+    check_limits(coefficients, durations, first, robot, dynamics, settings, dt)
+    check_jumps(coefficients, durations, first, robot, settings)
+
+
+def checked_route(
+    trajectory: JointTrajectory, now: Motion, robot: Any, dynamics: Any, settings: ExecutionSettings, dt: float
+) -> Route:
+    """Path from the commanded motion `now` along a trajectory that passed check_trajectory.
+
+    Only what leads in is checked here. Raises TrajectoryRefusedError.
+    """
+    route = route_onto(trajectory, now, robot.acceleration_max, settings)
+    lead = slice(0, route.lead)
+    coefficients, durations = route.path.coefficients[lead], route.path.durations[lead]
+    check_limits(coefficients, durations, -route.offset, robot, dynamics, settings, dt)
     return route
+
+
+def _check_points(trajectory: JointTrajectory, robot: Any, settings: ExecutionSettings) -> None:
+    """Name the point that is outside: more use to its sender than the instant between points."""
+    q = trajectory.positions
+    over = np.maximum(q - robot.position_max, robot.position_min - q) > settings.position_slack
+    if over.any():
+        k, j = (int(i) for i in np.argwhere(over)[0])
+        low, high = robot.position_min[j], robot.position_max[j]
+        excess = max(q[k, j] - high, low - q[k, j])
+        raise _invalid(
+            f"point {k} joint {j} ({trajectory.joint_names[j]}) is at {q[k, j]:.6f} rad: the limits are "
+            f"[{low:.6f}, {high:.6f}] rad, exceeded by {excess:.3g} rad"
+        )
 
 
 def _check_stamp(goal: TrajectoryGoal, trajectory: JointTrajectory, settings: ExecutionSettings, now_ns: int) -> None:

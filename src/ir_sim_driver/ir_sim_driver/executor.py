@@ -1,0 +1,237 @@
+"""Trajectory execution, stepped: path time with speed scaling, hold, stop along the path, tolerances and the tube.
+
+The semantics are those of ros2_controllers' joint_trajectory_controller; what it leaves open is in docs/driver.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ir_sim_driver.arrays import Array
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.lead_in import Route
+from ir_sim_driver.path import Motion, Path
+from ir_sim_driver.path_speed import PathSpeed
+from ir_sim_driver.tolerances import Tolerances
+from ir_sim_driver.tool_point import ToolPoint
+
+
+@dataclass(eq=False)
+class _Run:
+    """The goal that is executed and how far it is."""
+
+    outcome: Outcome  # as it would end now
+    route: Route
+    path_tolerance: Tolerances
+    goal_tolerance: Tolerances
+    goal_time: float
+    label: str
+    wait: int  # steps until it may start
+    s: float = 0.0
+    settling: int = 0
+    stopping: bool = False
+    deviation: float = 0.0
+
+
+class Executor:
+    """Follows one goal at a time; commands (n,) once per step of dt [s].
+
+    robot: ir_description RobotModel. dynamics: ir_kernels DynamicsModel with the present load.
+    """
+
+    def __init__(
+        self, robot: Any, dynamics: Any, tool: ToolPoint, settings: ExecutionSettings, dt: float, q: Array
+    ) -> None:
+        self._names: tuple[str, ...] = tuple(robot.joint_names)
+        self._settings, self._dt, self._tool = settings, dt, tool
+        self._speed = PathSpeed(dynamics, np.array(robot.acceleration_max), settings.stop_time, dt)
+        self._still: Array = np.zeros(len(q))
+        self._run: _Run | None = None
+        self._fresh = False
+        self._outcomes: list[Outcome] = []
+        self.command: Array = np.array(q)
+        self.deviation = 0.0
+
+    @property
+    def active(self) -> bool:
+        """Whether a goal is executed (or still stopping)."""
+        return self._run is not None
+
+    @property
+    def goal_id(self) -> int | None:
+        """The goal that is executed."""
+        return None if self._run is None else self._run.outcome.goal_id
+
+    @property
+    def label(self) -> str:
+        """Name of the trajectory that is executed; "" while holding."""
+        return "" if self._run is None else self._run.label
+
+    @property
+    def path_time(self) -> float:
+        """Time [s] along the trajectory; negative in its lead-in."""
+        return 0.0 if self._run is None else self._run.s - self._run.route.offset
+
+    @property
+    def path_speed(self) -> float:
+        """Present speed of path time."""
+        return self._speed.value if self._run is not None else 0.0
+
+    @property
+    def path(self) -> Path | None:
+        """The path of the goal that is executed."""
+        return None if self._run is None else self._run.route.path
+
+    @property
+    def path_parameter(self) -> float:
+        """Time [s] along the path, lead-in included."""
+        return 0.0 if self._run is None else self._run.s
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the goal is being stopped."""
+        return self._run is not None and self._run.stopping
+
+    def set_dynamics(self, dynamics: Any) -> None:
+        """Use the dynamics of another load."""
+        self._speed.dynamics = dynamics
+
+    def set_tool(self, tool: ToolPoint) -> None:
+        """Watch another tool point."""
+        self._tool = tool
+
+    def motion(self) -> Motion:
+        """The commanded motion now."""
+        run, v = self._run, self.path_speed
+        if run is None or v == 0.0:
+            return Motion(self.command, self._still, self._still)
+        path = run.route.path.motion(run.s)
+        return Motion(self.command, path.qd * v, path.qdd * v**2)
+
+    def unscaled(self) -> Motion:
+        """The motion at the present place of the path at full path speed."""
+        run = self._run
+        return Motion(self.command, self._still, self._still) if run is None else run.route.path.motion(run.s)
+
+    def start(self, goal_id: int, goal: TrajectoryGoal, route: Route, delay: float = 0.0) -> None:
+        """Follow the route, which starts at the commanded motion; a running goal ends as preempted."""
+        moving = self.motion().qd.any()
+        if self._run is not None:
+            if not self._run.stopping:
+                self._will_end(ErrorCode.INVALID_GOAL, "preempted by another trajectory", canceled=False)
+            self._finish()
+        s = self._settings
+        self._run = _Run(
+            Outcome(goal_id, ErrorCode.SUCCESSFUL, ""),
+            route,
+            Tolerances.of(self._names, goal.path_tolerance, s.path_tolerance),
+            Tolerances.of(self._names, goal.goal_tolerance, s.goal_tolerance),
+            goal.goal_time or s.goal_time,
+            goal.label or goal.trajectory.trajectory_id,
+            max(0, round(delay / self._dt)),
+        )
+        # a route from rest starts with speed zero, so path time may start at once; one in motion carries on
+        self._speed.value = 1.0 if moving else 0.0
+        self._fresh = not moving
+
+    def stop(self, code: ErrorCode, sentence: str, canceled: bool = False) -> None:
+        """Stop along the path; the goal ends so when the robot stands. A stop that is already on its way stays."""
+        if self._run is not None and not self._run.stopping:
+            self._will_end(code, sentence, canceled)
+            self._run.stopping = True
+
+    def drop(self, sentence: str) -> None:
+        """End the goal at once: nobody follows the command any more."""
+        if self._run is not None:
+            if not self._run.stopping:
+                self._will_end(ErrorCode.INVALID_GOAL, sentence, canceled=False)
+            self._finish()
+
+    def hold(self, q: Array) -> None:
+        """Command to stay at q (n,). Only while no goal is executed."""
+        self.command = np.array(q)
+        self.deviation = 0.0
+
+    def take_outcomes(self) -> list[Outcome]:
+        """Goals that have ended since the last call."""
+        outcomes, self._outcomes = self._outcomes, []
+        return outcomes
+
+    def advance(self, scaling: float, ready: bool = True) -> Array:
+        """Command (n,) for the end of this step. scaling in [0, 1]; not ready: the robot cannot move yet."""
+        run = self._run
+        if run is None:
+            return self.command
+        if run.wait > 0:
+            run.wait -= 1
+            if run.stopping:
+                self._finish()
+            return self.command
+        target = 0.0 if run.stopping else scaling
+        if not ready:
+            if run.stopping:
+                self._finish()
+            return self.command
+        if self._fresh:
+            self._speed.value, self._fresh = target, False
+        speed, path = self._speed, run.route.path
+        if run.s < path.duration:
+            motion = path.motion(run.s) if speed.value != target else None
+            run.s = min(run.s + speed.advance(target, motion), path.duration)
+            self.command = path.position(run.s)
+        if run.stopping and (speed.value == 0.0 or run.s >= path.duration):
+            self._finish()
+        return self.command
+
+    def supervise(self, q: Array, qd: Array) -> None:
+        """Compare the robot with the command after the step: tube, tolerances, end."""
+        error = self.command - q
+        self.deviation = self._tool.deviation(self.command, q)
+        run = self._run
+        if run is None:
+            return
+        run.deviation = max(run.deviation, self.deviation)
+        if not run.stopping:
+            sentence = self._broken(run, error, qd)
+            if sentence:
+                self.stop(ErrorCode.PATH_TOLERANCE_VIOLATED, sentence)
+            elif run.s >= run.route.path.duration and run.wait == 0:
+                self._settle(run, error, qd)
+
+    def _broken(self, run: _Run, error: Array, qd: Array) -> str:
+        if self.deviation > self._settings.tube:
+            return (
+                f"the tool is {self.deviation * 1e3:.2f} mm from the commanded path at {self.path_time:.3f} s: at most "
+                f"{self._settings.tube * 1e3:g} mm; worst is {self._names[int(np.abs(error).argmax())]} with "
+                f"{error[int(np.abs(error).argmax())]:+.6f} rad; stopped on the path"
+            )
+        sentence = run.path_tolerance.broken_position(self._names, error)
+        if not sentence and run.path_tolerance.has_velocity:
+            sentence = run.path_tolerance.broken_velocity(self._names, self.motion().qd - qd)
+        return f"{sentence} at {self.path_time:.3f} s; stopped on the path" if sentence else ""
+
+    def _settle(self, run: _Run, error: Array, qd: Array) -> None:
+        sentence = run.goal_tolerance.broken_position(self._names, error)
+        if not sentence:
+            sentence = run.goal_tolerance.broken_velocity(self._names, qd)
+        if not sentence:
+            self._finish()
+            return
+        run.settling += 1
+        if run.settling * self._dt > run.goal_time:
+            self._will_end(ErrorCode.GOAL_TOLERANCE_VIOLATED, f"{sentence} {run.goal_time:g} s after the end", False)
+            self._finish()
+
+    def _will_end(self, code: ErrorCode, sentence: str, canceled: bool) -> None:
+        assert self._run is not None
+        self._run.outcome = replace(self._run.outcome, code=code, sentence=sentence, canceled=canceled)
+
+    def _finish(self) -> None:
+        assert self._run is not None
+        self._outcomes.append(replace(self._run.outcome, max_tool_deviation=self._run.deviation))
+        self._run = None
+        self._speed.value = 0.0

@@ -1,0 +1,103 @@
+"""What the flange carries: named loads of the cell joined by "+", or one that is described by numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ir_description.load import Load
+from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
+from ir_msgs_py.status import StatusCode
+
+from ir_sim_driver.arrays import Array
+from ir_sim_driver.errors import RequestRefusedError
+
+CUSTOM = "custom"
+_PAYLOAD_CODE = StatusCode.PLANNING_FAILED  # -1, as controllers answer an impossible payload
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Loads in the frame of the last link, and the text that names them."""
+
+    text: str
+    loads: tuple[Load, ...]
+
+    @property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        return float(sum(load.mass for load in self.loads))
+
+    @property
+    def watts_always(self) -> float:
+        """Electrical power [W] whatever the mode."""
+        return float(sum(load.watts_always for load in self.loads))
+
+    @property
+    def watts_drive_bus(self) -> float:
+        """Electrical power [W] more while the drive bus is up."""
+        return float(sum(load.watts_drive_bus for load in self.loads))
+
+
+def carried(cell: Any, text: str) -> Carried:
+    """Loads that `text` names: "gripper+part", or "none". Raises RequestRefusedError."""
+    if text in ("", NO_LOAD):
+        return Carried(NO_LOAD, ())
+    known = {part.name: part.held(cell.tcp) for part in cell.parts}
+    if cell.tool is not None:
+        known[cell.tool.name] = cell.tool
+    names = text.split(LOAD_SEPARATOR)
+    for name in names:
+        if name not in known:
+            raise RequestRefusedError(
+                StatusCode.INVALID_OBJECT_NAME,
+                f"load {name[:80]!r} is unknown: known are {', '.join((*sorted(known), NO_LOAD, CUSTOM))}",
+            )
+        if names.count(name) > 1:
+            raise RequestRefusedError(StatusCode.INVALID_OBJECT_NAME, f"load {name!r} is named more than once")
+    return _within_payload(Carried(text, tuple(known[name] for name in names)), cell.robot)
+
+
+def custom_load(cell: Any, mass: float, com: Array, inertia: Array, always: float, drive_bus: float) -> Carried:
+    """A load from numbers [kg, m, kg m^2 (ixx ixy ixz iyy iyz izz or none), W]. Raises RequestRefusedError."""
+    limit = cell.robot.rated_payload
+    if not (math.isfinite(mass) and 0.0 <= mass <= limit):
+        raise RequestRefusedError(_PAYLOAD_CODE, f"mass is {mass:g} kg: it must be in [0, {limit:g}] kg")
+    if inertia.size not in (0, 6):
+        raise RequestRefusedError(_PAYLOAD_CODE, f"inertia has {inertia.size} values: it must have 6, or none")
+    if mass == 0.0:
+        return Carried(CUSTOM, ())
+    matrix = np.zeros((3, 3))
+    if inertia.size:
+        matrix[np.triu_indices(3)] = inertia
+        matrix = matrix + np.triu(matrix, 1).T
+    else:
+        matrix = np.eye(3) * (1e-6 * mass)  # a point; exactly zero is no rigid body
+    try:
+        load = Load(CUSTOM, "tool", mass, com, matrix, (), always, drive_bus)
+    except ValueError as error:
+        raise RequestRefusedError(_PAYLOAD_CODE, str(error)) from error
+    return Carried(CUSTOM, (load,))
+
+
+def combined(loads: tuple[Load, ...]) -> Load | None:
+    """One load with mass, centre of mass and inertia of all."""
+    if len(loads) < 2:
+        return loads[0] if loads else None
+    mass = sum(load.mass for load in loads)
+    com = sum(load.mass * np.array(load.com) for load in loads) / mass
+    inertia = np.zeros((3, 3))
+    for load in loads:
+        arm = np.array(load.com) - com
+        inertia += load.inertia + load.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return Load(LOAD_SEPARATOR.join(load.name for load in loads), "tool", float(mass), com, inertia)
+
+
+def _within_payload(what: Carried, robot: Any) -> Carried:
+    if what.mass > robot.rated_payload:
+        raise RequestRefusedError(
+            _PAYLOAD_CODE, f"{what.text} weighs {what.mass:g} kg: the robot carries at most {robot.rated_payload:g} kg"
+        )
+    return what

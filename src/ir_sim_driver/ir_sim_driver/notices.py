@@ -1,0 +1,44 @@
+"""What the driver wants to tell a person: kept in order until somebody takes it."""
+
+from __future__ import annotations
+
+from collections import deque
+from enum import IntEnum
+from typing import NamedTuple
+
+
+class Level(IntEnum):
+    """How bad it is; numbers of diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+class Notice(NamedTuple):
+    """One sentence."""
+
+    level: Level
+    sentence: str
+
+
+class Notices:
+    """A bounded list of notices; an immediate repetition is kept once."""
+
+    def __init__(self, capacity: int = 200) -> None:
+        self._pending: deque[Notice] = deque(maxlen=capacity)
+        self.last: Notice | None = None
+
+    def add(self, level: Level, sentence: str) -> None:
+        """Keep the notice."""
+        notice = Notice(level, sentence)
+        if not self._pending or self._pending[-1] != notice:
+            self._pending.append(notice)
+        self.last = notice
+
+    def take(self) -> list[Notice]:
+        """Return what has come since the last call."""
+        pending = list(self._pending)
+        self._pending.clear()
+        return pending

@@ -1,0 +1,149 @@
+"""The PLC's side of the controller: debounced levels, interlocks of AB, HIB and KS, and the mode switch.
+
+Rules of the KR C4 power management: the three bits count only in operating mode EXT, only one at a time, and never
+together with a PROFIenergy pause; a contradiction is ignored with a warning. A bit that is already 1 when the
+controller starts or wakes is ignored until it has been 0 once.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from ir_msgs_py.power import Mode
+
+from ir_sim_driver.errors import SettingsError
+from ir_sim_driver.notices import Level, Notices
+from ir_sim_driver.plc_bits import BITS, POWER_BITS, OperatingMode, PlcInputs
+
+_BIT_OF_REST = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib"}
+
+
+@dataclass(frozen=True)
+class PlcSettings:
+    """How levels become facts.
+
+    debounce [s]: a level has to stay that long to count (emergency stop counts at once).
+    startup_window [s]: levels of the first full set count as "already 1 at the start" when it comes within this time.
+    """
+
+    debounce: float = 0.02
+    startup_window: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("debounce", "startup_window"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0.0 <= value <= 60.0):
+                raise SettingsError(f"{name} is {value:g} s: it must be in [0, 60] s")
+
+
+class Plc:
+    """Levels in, wishes out; `step` lets time pass.
+
+    levels: what counts now (debounced, without stuck bits). rest: BUS_POWER_OFF, HIBERNATION or None.
+    drives_on, confirm, restart: rising edges seen in this step.
+    """
+
+    def __init__(self, settings: PlcSettings, notices: Notices, mode: OperatingMode = OperatingMode.EXT) -> None:
+        self._settings, self._notices = settings, notices
+        self.raw = PlcInputs(operating_mode=mode)
+        self.levels = PlcInputs(operating_mode=mode)
+        self.operating_mode = mode
+        self.rest: Mode | None = None
+        self.drives_on = self.confirm = self.restart = False
+        self._ages: dict[str, float] = {}
+        self._stuck: frozenset[str] = frozenset()
+        self._uptime = 0.0
+        self._greeted = False
+        self._judged: tuple[object, ...] = ()
+
+    def set_all(self, inputs: PlcInputs) -> None:
+        """Take all levels at once, as the topic and the field bus do."""
+        if not self._greeted and self._uptime < self._settings.startup_window:
+            stuck = frozenset(bit for bit in POWER_BITS if getattr(inputs, bit))
+            self._stick(stuck)
+        self._greeted = True
+        for bit in BITS:
+            self._set(bit, getattr(inputs, bit))
+        if inputs.operating_mode is not None:
+            self.set_operating_mode(inputs.operating_mode)
+
+    def set_bit(self, bit: str, level: bool) -> None:
+        """Set one level, the others stay; `bit` is one of BITS."""
+        self._greeted = True
+        self._set(bit, level)
+
+    def set_operating_mode(self, mode: OperatingMode) -> None:
+        """Turn the mode switch."""
+        self.operating_mode = mode
+        self.raw = replace(self.raw, operating_mode=mode)
+        self.levels = replace(self.levels, operating_mode=mode)
+
+    def wake(self) -> None:
+        """The controller starts again: power bits that are 1 now are ignored until they have been 0."""
+        self._stick(frozenset(bit for bit in POWER_BITS if getattr(self.raw, bit)))
+        self._ages.clear()
+        self.levels = replace(self.raw, **dict.fromkeys(POWER_BITS, False))
+        self.rest = None
+
+    def step(self, dt: float, pause_active: bool = False) -> None:
+        """Let dt [s] pass; pause_active: a PROFIenergy pause is on."""
+        self._uptime += dt
+        self.drives_on = self.confirm = self.restart = False
+        if self._ages:
+            self._debounce(dt)
+        judged = (self.levels, pause_active)
+        if judged != self._judged:
+            self._judged = judged
+            self._judge(pause_active)
+
+    def _set(self, bit: str, level: bool) -> None:
+        if level == getattr(self.raw, bit):
+            return
+        self.raw = replace(self.raw, **{bit: level})
+        if not level and bit in self._stuck:
+            self._stuck -= {bit}
+            return
+        self._ages[bit] = 0.0
+
+    def _stick(self, bits: frozenset[str]) -> None:
+        self._stuck |= bits
+        if bits:
+            names = ", ".join(sorted(bit.upper() for bit in bits))
+            self._notices.add(Level.WARN, f"PLC bit {names} is already 1 at the start: ignored until it has been 0")
+
+    def _debounce(self, dt: float) -> None:
+        for bit in list(self._ages):
+            level = getattr(self.raw, bit)
+            if level == getattr(self.levels, bit) or bit in self._stuck:
+                del self._ages[bit]
+                continue
+            self._ages[bit] += dt
+            urgent = bit == "emergency_stop" and level
+            if urgent or self._ages[bit] >= self._settings.debounce - 1e-9:
+                del self._ages[bit]
+                self.levels = replace(self.levels, **{bit: level})
+                if level:
+                    self.drives_on |= bit == "drives_on"
+                    self.confirm |= bit == "conf_mess"
+                    self.restart |= bit == "ks"
+
+    def _judge(self, pause_active: bool) -> None:
+        """Decide what AB, HIB and KS mean together; what is refused leaves `rest` as it was."""
+        on = [bit for bit in POWER_BITS if getattr(self.levels, bit)]
+        names = " and ".join(bit.upper() for bit in on)
+        refusal = ""
+        if self.operating_mode is not OperatingMode.EXT:
+            refusal = f"operating mode is {self.operating_mode.name}, must be EXT"
+        elif pause_active and on:
+            refusal = "a PROFIenergy pause is on, end it first"
+        elif len(on) > 1:
+            refusal = "only one of AB, HIB and KS may be 1"
+        if not refusal:
+            self.rest = Mode.BUS_POWER_OFF if on == ["ab"] else Mode.HIBERNATION if on == ["hib"] else None
+            return
+        self.restart = False
+        if on:
+            self._notices.add(Level.WARN, f"PLC bit {names} ignored: {refusal}")
+        if self.operating_mode is OperatingMode.EXT and self.rest is not None and _BIT_OF_REST[self.rest] not in on:
+            self.rest = None

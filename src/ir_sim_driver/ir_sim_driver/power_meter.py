@@ -1,0 +1,116 @@
+"""The mains meter: base load by mode, axes through the common DC bus, energy that is the integral of the power.
+
+P = P_controller(mode) + P_tool(mode) + P_drives + max(0, bus); axis power at the bus is torque times speed plus the
+copper loss (design of the drives: ir_kernels.power).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
+from ir_msgs_py.power import Mode
+
+from ir_sim_driver.arrays import Array
+from ir_sim_driver.backend import Work
+
+
+class BasePower:
+    """Watts of controller, drives and tool in a mode; `data` is ir_description's PowerData."""
+
+    def __init__(self, data: Any) -> None:
+        self._controller = {Mode[mode.name]: mode.controller_watts for mode in data.modes}
+        self._drives = float(data.drives_and_brake_release)
+        self.set_tool(0.0, 0.0)
+
+    def set_tool(self, always: float, drive_bus: float) -> None:
+        """Take the tool's watts: always, and more while the drive bus is up."""
+        self._always, self._drive_bus = always, drive_bus
+
+    def of(self, level: Mode) -> float:
+        """Watts in STAND_ON_MOTORS or a rest, without holding torque."""
+        watts = self._controller[level] + self._always
+        if level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
+            watts += self._drive_bus
+        return watts + self._drives if level is Mode.STAND_ON_MOTORS else watts
+
+
+@dataclass(frozen=True, eq=False)
+class MeterReading:
+    """Since the meter started, and in the last steps.
+
+    time [s], energy [J] at the mains, burnt_energy [J], axis_energy (n,) [J] at the DC bus, base_energy [J];
+    base_power [W], bus_voltage [V], joint_power (n,) [W] and joint_torque (n,) [Nm] of the last step.
+    """
+
+    time: float
+    energy: float
+    burnt_energy: float
+    base_energy: float
+    axis_energy: Array
+    capacitor_energy: float
+    base_power: float
+    bus_voltage: float
+    joint_power: Array
+    joint_torque: Array
+
+
+class PowerMeter:
+    """Counts steps of dt [s] for `robot`; `data` is PowerData."""
+
+    def __init__(self, robot: Any, data: Any, dt: float, regeneration: Regeneration = "shared") -> None:
+        self._dt = dt
+        self._copper: Array = np.array(robot.copper_loss) / np.array(robot.gear_ratio) ** 2
+        self._bus = DcBusParameters(data.dc_link_capacity_energy, regeneration)
+        self._voltage, self._capacitance = data.dc_link.voltage, data.dc_link.capacitance
+        n = len(robot.joint_names)
+        self._base: list[float] = []
+        self._steps = 0
+        self._stored = 0.0
+        self._energy = self._burnt = self._base_energy = 0.0
+        self._axes: Array = np.zeros(n)
+        self._power: Array = np.zeros(n)
+        self._torque: Array = np.zeros(n)
+        self._last_base = 0.0
+
+    def add(self, base_power: float) -> None:
+        """Count one step with this base load [W]."""
+        self._base.append(base_power)
+
+    def pending(self) -> int:
+        """Steps that are counted but not yet settled."""
+        return len(self._base)
+
+    def settle(self, work: Work) -> None:
+        """Take what the motors did in the steps that were added since the last call, one row per step."""
+        if not self._base:
+            return
+        base = np.array(self._base)
+        self._base.clear()
+        axes = work.torque * work.speed + self._copper * work.torque**2
+        bus = dc_bus(axes, self._dt, self._bus, self._stored)
+        self._stored = float(bus.stored[-1])
+        self._steps += len(base)
+        self._energy += self._dt * float((base + bus.mains).sum())
+        self._burnt += self._dt * float(bus.burnt.sum())
+        self._base_energy += self._dt * float(base.sum())
+        self._axes = self._axes + self._dt * axes.sum(axis=0)
+        self._power, self._torque, self._last_base = axes[-1], work.torque[-1], float(base[-1])
+
+    def reading(self) -> MeterReading:
+        """What the meter shows."""
+        return MeterReading(
+            self._steps * self._dt,
+            self._energy,
+            self._burnt,
+            self._base_energy,
+            self._axes,
+            self._stored,
+            self._last_base,
+            math.sqrt(self._voltage**2 + 2.0 * self._stored / self._capacitance),
+            self._power,
+            self._torque,
+        )

@@ -1,0 +1,447 @@
+"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains meter. No ROS.
+
+One `step` is dt of plant time. Whoever steps it decides how fast time passes; nothing here sleeps or asks a clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from ir_kernels.dynamics import DynamicsModel
+from ir_kernels.power import Regeneration
+from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.status import StatusCode
+
+from ir_sim_driver.arrays import Array
+from ir_sim_driver.backend import Backend
+from ir_sim_driver.emergency import Excursion
+from ir_sim_driver.errors import BackendError, RequestRefusedError, SettingsError, TrajectoryRefusedError
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.executor import Executor
+from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.loads import Carried
+from ir_sim_driver.notices import Level, Notices
+from ir_sim_driver.pause import best_mode, mode_table
+from ir_sim_driver.plc import Plc, PlcSettings
+from ir_sim_driver.plc_bits import ALL_OFF, OperatingMode, PlcOutputs
+from ir_sim_driver.power_meter import BasePower, PowerMeter
+from ir_sim_driver.power_modes import OFF_THE_NETWORK, PowerModes, TransitionSettings, Wish
+from ir_sim_driver.tool_point import ToolPoint
+from ir_sim_driver.trajectory_checks import check_goal, check_trajectory, checked_route
+
+METER_STEPS = 10
+_STANDING = 1e-3  # rad/s
+_HOME = 0.01  # rad
+_T1_SPEED = 0.25 * 0.98  # m/s at the tool; a margin because the path speed follows with bounded deceleration
+_MANUAL = (OperatingMode.T1, OperatingMode.T2)
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """dt [s]: step of plant and controller. start_mode: STAND_ON_MOTORS, STAND_ON_BRAKES, BUS_POWER_OFF or HIBERNATION.
+
+    enabling_switch: somebody holds it, so that programs may run in T1 and T2.
+    """
+
+    dt: float = 0.001
+    start_mode: Mode = Mode.STAND_ON_MOTORS
+    operating_mode: OperatingMode = OperatingMode.EXT
+    enabling_switch: bool = False
+    regeneration: Regeneration = "shared"
+    execution: ExecutionSettings = field(default_factory=ExecutionSettings)
+    transitions: TransitionSettings = field(default_factory=TransitionSettings)
+    plc: PlcSettings = field(default_factory=PlcSettings)
+
+    def __post_init__(self) -> None:
+        if not 1e-4 <= self.dt <= 0.01:
+            raise SettingsError(f"dt is {self.dt:g} s: it must be in [0.0001, 0.01] s")
+
+
+@dataclass(frozen=True, eq=False)
+class VettedGoal:
+    """A goal whose trajectory was found executable with the dynamics of one load."""
+
+    goal: TrajectoryGoal
+    dynamics: Any
+
+
+class Simulation:
+    """cell: ir_description Cell; data: PowerData; backend: a robot of the same kind with the same dt.
+
+    Raises nothing in `step`: a backend that fails is stopped, told in `notices`, and restarted by `recover`.
+    """
+
+    def __init__(
+        self, cell: Any, data: Any, backend: Backend, load: Carried, settings: SimulationSettings | None = None
+    ) -> None:
+        self.settings = settings = settings or SimulationSettings()
+        self.cell, self.robot, self.backend = cell, cell.robot, backend
+        self.notices = Notices()
+        self.plc = Plc(settings.plc, self.notices, settings.operating_mode)
+        self.modes = PowerModes(settings.transitions, settings.start_mode)
+        self.base = BasePower(data)
+        self.meter = PowerMeter(cell.robot, data, settings.dt, settings.regeneration)
+        self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
+        self._pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
+        backend.reset(np.array(cell.machine_home))
+        self.dynamics = DynamicsModel(self.robot, (), cell.base_pose)
+        self.executor = Executor(
+            self.robot, self.dynamics, self.tool, settings.execution, settings.dt, np.array(cell.machine_home)
+        )
+        self.load = load
+        self._carry(load)
+        self.steps = 0
+        self.speed_scaling = 1.0
+        self.pause: Mode | None = None
+        self.fault = ""
+        self.last_excursion = 0.0
+        self._goals = 0
+        self._outcomes: list[Outcome] = []
+        self._goal_energy = 0.0
+        self._drives_off = False
+        self._wanted_on = self._wake = self._recover = self._confirmed = self._restart = False
+        self._excursion: Excursion | None = None
+        self._last_mode = self.modes.mode
+        self._last_operating_mode = self.plc.operating_mode
+
+    @property
+    def time(self) -> float:
+        """Plant time [s] since the start."""
+        return self.steps * self.settings.dt
+
+    @property
+    def on_the_network(self) -> bool:
+        """Whether the controller answers; the mains meter always does."""
+        return self.modes.mode not in OFF_THE_NETWORK
+
+    # -- what may be asked -------------------------------------------------------------------------------------------
+
+    def vet(self, goal: TrajectoryGoal, now_ns: int) -> VettedGoal:
+        """Check all of a goal that does not depend on the robot's state. Takes its time, may run beside `step`.
+
+        Raises TrajectoryRefusedError.
+        """
+        dynamics, settings = self.dynamics, self.settings.execution
+        checked = check_goal(goal, tuple(self.robot.joint_names), settings, now_ns)
+        check_trajectory(checked.trajectory, self.robot, dynamics, settings, self.settings.dt)
+        return VettedGoal(checked, dynamics)
+
+    def execute(self, vetted: VettedGoal, now_ns: int) -> int:
+        """Start a vetted goal and return its id; the goal that runs is preempted. Raises TrajectoryRefusedError."""
+        refusal = self._refusal()
+        if refusal:
+            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
+        if vetted.dynamics is not self.dynamics:
+            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "the load changed while the trajectory was checked")
+        goal, s = vetted.goal, self.settings
+        route = checked_route(
+            goal.trajectory, self.executor.motion(), self.robot, self.dynamics, s.execution, s.dt
+        )
+        self._goals += 1
+        delay = 0.0 if goal.stamp_ns == 0 else max(0.0, (goal.stamp_ns - now_ns) * 1e-9)
+        self.executor.start(self._goals, goal, route, delay)
+        self._collect_outcomes()
+        self.settle_meter()
+        self._goal_energy = self.meter.reading().energy
+        return self._goals
+
+    def cancel(self, goal_id: int) -> bool:
+        """Stop this goal along its path; False when it does not run."""
+        if self.executor.goal_id != goal_id:
+            return False
+        self.executor.stop(ErrorCode.SUCCESSFUL, "canceled; stopped on the path", canceled=True)
+        return True
+
+    def abort(self, sentence: str) -> None:
+        """Stop whatever runs along its path, for this reason."""
+        self.executor.stop(ErrorCode.INVALID_GOAL, sentence)
+
+    def take_outcomes(self) -> list[Outcome]:
+        """Goals that ended since the last call."""
+        outcomes, self._outcomes = self._outcomes, []
+        return outcomes
+
+    def set_speed_scaling(self, factor: float) -> float:
+        """Take the factor into [0, 1] and return it; NaN and negative ones are ignored with a warning."""
+        if not factor >= 0.0:
+            self.notices.add(Level.WARN, f"speed scaling {factor:g} ignored: it must be in [0, 1]")
+        else:
+            self.speed_scaling = min(factor, 1.0)
+        return self.speed_scaling
+
+    def start_pause(self, pause: float) -> PowerMode:
+        """PROFIenergy Start_Pause of `pause` [s]: go to the mode that takes least energy. Raises RequestRefusedError."""
+        if not (np.isfinite(pause) and pause > 0.0):
+            raise RequestRefusedError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS, f"pause is {pause:g} s: it must be finite and above 0 s"
+            )
+        reason = ""
+        if self.plc.operating_mode is not OperatingMode.EXT:
+            reason = f"operating mode is {self.plc.operating_mode.name}, must be EXT"
+        elif self.plc.levels.ab or self.plc.levels.hib or self.plc.levels.ks:
+            reason = "a power bit of the PLC is 1: PROFIenergy and AB, HIB, KS exclude each other"
+        elif self.executor.active:
+            reason = "the robot is executing a trajectory"
+        elif self.modes.mode not in (Mode.STAND_ON_MOTORS, Mode.MOVING, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES):
+            reason = f"the mode is {self.modes.mode.name}, must be STAND_ON_MOTORS or STAND_ON_BRAKES"
+        if reason:
+            raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, f"no pause: {reason}")
+        chosen = best_mode(self.query_modes(), pause)
+        self.pause = None if chosen.mode is Mode.STAND_ON_MOTORS else chosen.mode
+        return chosen
+
+    def end_pause(self) -> float:
+        """PROFIenergy End_Pause: back to motors; returns the seconds it takes, rest of the minimum stay included."""
+        self.pause = None
+        self._wanted_on = True
+        return self.modes.time_to_ready()
+
+    def query_modes(self) -> tuple[PowerMode, ...]:
+        """All modes with the present load and posture, entered from where the robot is now."""
+        source = self.modes.level
+        if source not in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
+            source = Mode.STAND_ON_MOTORS
+        return mode_table(self.modes.rests, self.standing_power, self._pe_ids, source)
+
+    def standing_power(self, level: Mode) -> float:
+        """Watts at the mains when standing in a mode at the present posture."""
+        watts = self.base.of(level)
+        if level is Mode.STAND_ON_MOTORS:
+            q = self.backend.q[None]
+            hold = self.dynamics.gravity(q) - self.dynamics.counterbalance(q)
+            watts += float(self.dynamics.axis_power(np.zeros_like(q), hold).sum())
+        return watts
+
+    def set_load(self, load: Carried) -> None:
+        """Carry this from now on. Raises RequestRefusedError while the robot moves."""
+        if self.executor.active or not self._standing():
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE, "the robot moves: a load changes only while it stands"
+            )
+        self.settle_meter()
+        self._carry(load)
+
+    def wake(self) -> None:
+        """A Wake-on-LAN packet for this controller came in. Does nothing unless it hibernates."""
+        if self.modes.mode is Mode.HIBERNATION:
+            self._wake = True
+
+    def recover(self) -> str:
+        """Leave the emergency stop: release the brakes where the robot stands. Never moves or resumes anything.
+
+        Returns a remark. Raises RequestRefusedError.
+        """
+        if self.modes.mode is not Mode.EMERGENCY_STOP and not self.fault:
+            return f"nothing to recover from: the mode is {self.modes.mode.name}"
+        if self.plc.raw.emergency_stop or self.plc.levels.emergency_stop:
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE, "the emergency stop is still pressed: release it first"
+            )
+        if self.fault:
+            self.backend.reset(self.executor.command)
+            self.fault = ""
+        self._recover = True
+        return "the brakes open where the robot stands; nothing resumes"
+
+    def disturb(self, torque: Array | None) -> None:
+        """Let an outside torque (n,) [Nm] act on the joints until the next call; None ends it."""
+        self.backend.disturbance = torque
+
+    # -- what may be read --------------------------------------------------------------------------------------------
+
+    def outputs(self) -> PlcOutputs:
+        """Levels to the PLC; all off while the controller is off the network."""
+        if not self.on_the_network:
+            return replace(ALL_OFF, operating_mode=self.plc.operating_mode)
+        mode = self.modes.mode
+        return PlcOutputs(
+            ab=mode in (Mode.BUS_POWER_OFF, Mode.TO_HIBERNATION),
+            bbs=mode in (Mode.STAND_ON_MOTORS, Mode.MOVING, Mode.STAND_ON_BRAKES) and not self._drives_off,
+            drives_ready=self.modes.motors_on,
+            alarm_stop=not self.plc.levels.emergency_stop and mode is not Mode.EMERGENCY_STOP,
+            in_home=bool(np.abs(self.backend.q - self.cell.machine_home).max() < _HOME),
+            moving=mode is Mode.MOVING,
+            operating_mode=self.plc.operating_mode,
+        )
+
+    def settle_meter(self) -> None:
+        """Bring the meter's reading up to the last step."""
+        self.meter.settle(self.backend.work())
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def step(self) -> None:
+        """Let dt pass."""
+        dt = self.settings.dt
+        self.plc.step(dt, self.pause is not None)
+        self._react_to_plc()
+        self.modes.step(dt, self._wish())
+        if self.modes.mode is not self._last_mode:
+            self._mode_changed(self._last_mode, self.modes.mode)
+            self._last_mode = self.modes.mode
+        try:
+            self._move()
+        except BackendError as error:
+            self._fail(error)
+        self.meter.add(self.base.of(self.modes.level))
+        self._collect_outcomes()
+        if self.meter.pending() >= METER_STEPS:
+            self.settle_meter()
+        self.steps += 1
+
+    def run(self, seconds: float) -> None:
+        """Step until `seconds` have passed."""
+        for _ in range(round(seconds / self.settings.dt)):
+            self.step()
+
+    def _move(self) -> None:
+        backend, executor = self.backend, self.executor
+        mode = self.modes.mode
+        if mode is Mode.EMERGENCY_STOP:
+            if self.fault or not self.backend.qd.any():
+                backend.rest()
+            else:
+                self._brake()
+        elif self.modes.level is Mode.STAND_ON_MOTORS:
+            backend.track(executor.advance(self._scaling(), self.modes.motors_on))
+            executor.supervise(backend.q, backend.qd)
+        else:
+            backend.rest()
+
+    def _brake(self) -> None:
+        self.backend.brake()
+        if self._excursion is not None:
+            self._excursion.add(self.backend.q)
+        if np.abs(self.backend.qd).max() < 1e-9:
+            self._brakes_hold()
+
+    def _brakes_hold(self) -> None:
+        self.backend.reset(self.backend.q)
+        self.executor.hold(self.backend.q)
+        if self._excursion is not None:
+            self.last_excursion = self._excursion.distance()
+            self._excursion = None
+            self.notices.add(
+                Level.WARN, f"emergency stop: the tool left its path by {self.last_excursion * 1e3:.1f} mm; recover to go on"
+            )
+
+    def _scaling(self) -> float:
+        scaling = self.speed_scaling if self.plc.levels.move_enable else 0.0
+        if self.plc.operating_mode is OperatingMode.T1 and self.executor.active:
+            speed = self.tool.speed(*self.executor.unscaled()[:2])
+            scaling = min(scaling, _T1_SPEED / speed if speed > _T1_SPEED else 1.0)
+        return scaling
+
+    def _wish(self) -> Wish:
+        plc, executor = self.plc, self.executor
+        rest = plc.rest or self.pause
+        if rest is None:
+            if self._drives_off:
+                rest = Mode.STAND_ON_BRAKES
+            elif self._wanted_on:
+                rest = Mode.STAND_ON_MOTORS
+        if rest not in (None, Mode.STAND_ON_MOTORS) and executor.active:
+            self.abort(f"{_name(rest)} was requested during the movement; stopped on the path")
+        wish = Wish(
+            rest,
+            executor.active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
+            self._standing(),
+            self._wake,
+            plc.levels.emergency_stop or bool(self.fault),
+            self._recover,
+            self._restart,
+            plc.operating_mode in _MANUAL,
+        )
+        self._wake = False
+        return wish
+
+    def _standing(self) -> bool:
+        return self.executor.path_speed == 0.0 and bool(np.abs(self.backend.qd).max() < _STANDING)
+
+    def _react_to_plc(self) -> None:
+        plc = self.plc
+        if plc.levels.drives_off and not self._drives_off:
+            self._drives_off = True
+        if plc.drives_on and not plc.levels.drives_off:
+            self._drives_off = False
+            self._wanted_on = True
+            self._recover = self._recover or (self._confirmed and not plc.levels.emergency_stop)
+        if plc.confirm and not plc.levels.emergency_stop:
+            self._confirmed = True
+        self._restart = self._restart or plc.restart
+        if plc.operating_mode is not self._last_operating_mode:
+            self._last_operating_mode = plc.operating_mode
+            self.abort(f"the operating mode changed to {plc.operating_mode.name}; stopped on the path")
+
+    def _mode_changed(self, before: Mode, now: Mode) -> None:
+        if now is Mode.EMERGENCY_STOP:
+            self._start_emergency_stop()
+        elif before is Mode.EMERGENCY_STOP:
+            self._recover = self._confirmed = False
+            self.executor.hold(self.backend.q)
+        if now is Mode.STAND_ON_MOTORS:
+            self._wanted_on = False
+            if before is Mode.FROM_HIBERNATION:
+                self.plc.wake()
+        if now in OFF_THE_NETWORK:
+            self.pause = None
+            self._restart = self._drives_off = False
+        if now is not Mode.MOVING and before is not Mode.MOVING:
+            self.notices.add(Level.OK, f"{before.name} -> {now.name}")
+
+    def _start_emergency_stop(self) -> None:
+        executor = self.executor
+        path, s = executor.path, executor.path_parameter
+        self._recover = self._confirmed = False
+        self._wanted_on = False
+        self._excursion = None if self._standing() else Excursion(self.tool, path, s, self.backend.q)
+        executor.drop(self.fault or "emergency stop")
+        if self._excursion is None:
+            executor.hold(self.backend.q)
+
+    def _fail(self, error: BackendError) -> None:
+        self.fault = str(error)
+        self.notices.add(Level.ERROR, self.fault)
+        self.executor.drop(self.fault)
+        self.backend.rest()
+
+    def _refusal(self) -> str:
+        """Why no movement may start now; "" when it may."""
+        mode, plc = self.modes.mode, self.plc
+        if self.fault:
+            return f"the simulation has failed: {self.fault}"
+        if mode is Mode.EMERGENCY_STOP or plc.levels.emergency_stop:
+            return "emergency stop: release it and recover first"
+        if mode not in (*_READY, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES, Mode.FROM_BRAKES):
+            return f"drives not powered ({mode.name})"
+        rest = plc.rest or self.pause
+        if rest is not None:
+            return f"drives not powered: {_name(rest)} is requested"
+        if self._drives_off:
+            return "drives not powered: drives_off was given, drives_on is needed"
+        if plc.operating_mode in _MANUAL and not self.settings.enabling_switch:
+            return f"operating mode is {plc.operating_mode.name}: programs need EXT or AUT, or the enabling switch"
+        return ""
+
+    def _carry(self, load: Carried) -> None:
+        self.backend.set_load(load.loads)
+        self.load = load
+        self.base.set_tool(load.watts_always, load.watts_drive_bus)
+        self.dynamics = DynamicsModel(self.robot, load.loads, self.cell.base_pose)
+        self.executor.set_dynamics(self.dynamics)
+
+    def _collect_outcomes(self) -> None:
+        outcomes = self.executor.take_outcomes()
+        if outcomes:
+            self.settle_meter()
+            energy = self.meter.reading().energy - self._goal_energy
+            self._outcomes += [replace(outcome, energy=energy) for outcome in outcomes]
+
+
+_READY = (Mode.STAND_ON_MOTORS, Mode.MOVING)
+
+
+def _name(rest: Mode | None) -> str:
+    return "" if rest is None else rest.name.replace("_", " ").capitalize()

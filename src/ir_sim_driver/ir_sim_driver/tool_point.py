@@ -1,0 +1,45 @@
+"""How far the tool is from where it was commanded: a cheap bound first, the exact distance when it matters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from ir_kernels.chain import Chain
+
+from ir_sim_driver.arrays import Array
+
+EXACT_FROM = 1e-4
+"""Bound [m] below which the exact deviation is not worth its time."""
+
+
+class ToolPoint:
+    """The tcp (4, 4 in the last link's frame) of `robot` standing at `base_pose` (4, 4)."""
+
+    def __init__(self, robot: Any, base_pose: Array, tcp: Array) -> None:
+        self.chain = Chain(robot, base_pose, tcp)
+        arms = np.linalg.norm(np.array(robot.joint_origin)[1:, :3, 3], axis=1)
+        lengths = np.concatenate((arms, [np.linalg.norm(tcp[:3, 3])]))
+        self._reach: Array = np.cumsum(lengths[::-1])[::-1].copy()  # (n,) farthest the tcp gets from axis i
+
+    def position(self, q: Array) -> Array:
+        """Position (3,) [m] in the world at q (n,)."""
+        position: Array = self.chain.tcp_poses(q[None])[0, :3, 3]
+        return position
+
+    def positions(self, q: Array) -> Array:
+        """Positions (N, 3) at q (N, n)."""
+        positions: Array = self.chain.tcp_poses(q)[:, :3, 3]
+        return positions
+
+    def deviation(self, commanded: Array, q: Array) -> float:
+        """Distance [m] of the tcp at q from that at `commanded`; an upper bound where it is below EXACT_FROM."""
+        bound = float(self._reach @ np.abs(commanded - q))
+        if bound <= EXACT_FROM:
+            return bound
+        both = self.positions(np.array((commanded, q)))
+        return float(np.linalg.norm(both[0] - both[1]))
+
+    def speed(self, q: Array, qd: Array) -> float:
+        """Speed [m/s] of the tcp."""
+        return float(np.linalg.norm(self.chain.jacobian(q[None])[0, :3] @ qd))
