@@ -1,0 +1,104 @@
+"""An executor that spins in its own thread, so that scripts and tests can call and wait.
+
+Whatever touches a node's entities is handed over with `run`: clients, and action clients above all, race
+when they are used from two threads.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+
+T = TypeVar("T")
+_POLL = 0.005  # s, for conditions that nobody announces, as the discovery of a service
+
+
+class BackgroundExecutor:
+    """Spins the nodes of one context until it is closed; also a context manager.
+
+    What a callback raises is raised where somebody waits, and spinning goes on.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self._executor = SingleThreadedExecutor(context=context)
+        self._nodes: list[Node] = []
+        self._failure: BaseException | None = None
+        self._thread = threading.Thread(target=self._spin, name="ros_spin", daemon=True)
+        self._thread.start()
+
+    def add_node(self, node: Node) -> Node:
+        """Spin this node too; it is destroyed with the executor."""
+        self._nodes.append(node)
+        self._executor.add_node(node)
+        return node
+
+    def run(self, function: Callable[[], T], timeout: float = 10.0) -> T:
+        """Call the function on the spinning thread and return what it returns."""
+        if threading.current_thread() is self._thread:
+            return function()
+        task = self._executor.create_task(function)
+        if not self.wait(task, timeout):
+            raise TimeoutError(f"the spinning thread did not take up the call within {timeout:g} s")
+        result: T = task.result()
+        return result
+
+    def wait(self, future: Future, timeout: float) -> bool:
+        """Wait until the future is done; False after `timeout` [s]."""
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        deadline = time.monotonic() + timeout
+        # in slices, so that a failed callback ends the wait as well
+        while not (future.done() or done.wait(min(0.1, max(0.0, deadline - time.monotonic())))):
+            self._raise_failure()
+            if time.monotonic() >= deadline:
+                return False
+        return True
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Wait until the condition holds; False after `timeout` [s]."""
+        deadline = time.monotonic() + timeout
+        while not condition():
+            self._raise_failure()
+            if time.monotonic() >= deadline:
+                return False
+            time.sleep(_POLL)
+        return True
+
+    def close(self) -> None:
+        """Stop spinning and destroy the nodes; raises what a callback raised and nobody has heard of yet."""
+        self._executor.shutdown(timeout_sec=5.0)
+        self._thread.join(5.0)
+        for node in self._nodes:
+            node.destroy_node()
+        self._nodes.clear()
+        self._raise_failure()
+
+    def __enter__(self) -> BackgroundExecutor:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+
+    def _spin(self) -> None:
+        while True:
+            try:
+                self._executor.spin()
+            except (ExternalShutdownException, ShutdownException):
+                return
+            except Exception as failure:  # of somebody's callback: it belongs to whoever waits
+                self._failure = failure
+            else:
+                return

@@ -1,0 +1,73 @@
+"""Goals sent from the spinning thread: an ActionClient races with its executor when used from another one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.task import Future
+
+from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
+from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.ros.types import owner_of
+from ir_msgs_py.status import StatusCode
+
+
+class GoalSender:
+    """Sends goals of one node and waits for their results."""
+
+    def __init__(self, node: Node, executor: BackgroundExecutor) -> None:
+        self._node = node
+        self._executor = executor
+        self._clients: dict[tuple[str, Any], ActionClient] = {}
+
+    def send(
+        self,
+        action: str,
+        goal: Any,
+        feedback: Callable[[Any], None] | None,
+        response_timeout: float,
+        result_timeout: float,
+        cancel_grace: float,
+    ) -> Any:
+        """Send the goal and return its result; cancel it on timeout [s] and on an exception while waiting."""
+        action_type = owner_of(goal, "Goal", "action")
+        client = self._executor.run(lambda: self._client(action, action_type))
+        if not self._executor.wait_until(client.server_is_ready, response_timeout):
+            raise ServiceUnavailableError(
+                f"nobody offers the action {action} (waited {response_timeout:g} s)"
+            )
+        told = None if feedback is None else lambda message: feedback(message.feedback)
+        sent: Future = self._executor.run(lambda: client.send_goal_async(goal, feedback_callback=told))
+        if not self._executor.wait(sent, response_timeout):
+            raise CallTimedOutError(f"{action} did not take the goal within {response_timeout:g} s")
+        handle = sent.result()
+        if not handle.accepted:
+            raise RequestRefusedError(f"{action} rejected the goal", int(StatusCode.FAILURE))
+        result: Future = self._executor.run(handle.get_result_async)
+        try:
+            if self._executor.wait(result, result_timeout):
+                return result.result().result
+        except BaseException:  # Ctrl-C in a script must not leave the robot moving
+            self._cancel(handle, result, cancel_grace)
+            raise
+        self._cancel(handle, result, cancel_grace)
+        raise CallTimedOutError(f"{action} had no result within {result_timeout:g} s: the goal was canceled")
+
+    def destroy(self) -> None:
+        """Let go of the action clients; call it on the spinning thread."""
+        for client in self._clients.values():
+            client.destroy()
+        self._clients.clear()
+
+    def _cancel(self, handle: Any, result: Future, grace: float) -> None:
+        self._executor.run(handle.cancel_goal_async)
+        self._executor.wait(result, grace)
+
+    def _client(self, action: str, action_type: Any) -> ActionClient:
+        key = (action, action_type)
+        if key not in self._clients:
+            self._clients[key] = ActionClient(self._node, action_type, action)
+        return self._clients[key]

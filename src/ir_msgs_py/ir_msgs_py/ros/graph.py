@@ -1,0 +1,54 @@
+"""Who offers what: services, actions and topics with their types, and how publishers offer them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.action import get_action_names_and_types
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+_DEPTH = 100
+
+
+class Graph:
+    """The graph as one node sees it; it fills up within moments after the node has started."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+
+    def services(self) -> dict[str, str]:
+        """Service names with their type, without those of actions."""
+        return {
+            name: types[0]
+            for name, types in self._node.get_service_names_and_types()
+            if "/_action/" not in name
+        }
+
+    def actions(self) -> dict[str, str]:
+        """Action names with their type."""
+        return {name: types[0] for name, types in get_action_names_and_types(self._node)}
+
+    def topics(self) -> dict[str, str]:
+        """Topic names with their type, without those of actions."""
+        return {
+            name: types[0]
+            for name, types in self._node.get_topic_names_and_types()
+            if "/_action/" not in name
+        }
+
+    def publishers(self, topic: str) -> list[Any]:
+        """End points that publish the topic."""
+        infos: list[Any] = self._node.get_publishers_info_by_topic(topic)
+        return infos
+
+    def qos_of_publishers(self, topic: str) -> QoSProfile:
+        """Quality of service with which all present publishers are heard, as `ros2 topic echo` chooses it."""
+        offered = [info.qos_profile for info in self.publishers(topic)]
+        reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered)
+        kept = bool(offered) and all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered)
+        return QoSProfile(
+            depth=_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
+        )

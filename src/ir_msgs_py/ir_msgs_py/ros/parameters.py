@@ -1,0 +1,129 @@
+"""A frozen settings class as ROS parameters: described, with ranges, and never half changed.
+
+A change that a range or the class itself refuses is answered with the reason, and the old values stay.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, Generic, TypeVar
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ir_msgs_py.errors import MsgsError, ParameterError
+from ir_msgs_py.settings import Setting, describe
+
+T = TypeVar("T")
+_INT64 = 2**63
+
+
+class Parameters(Generic[T]):
+    """The parameters of one settings class on a node; `value` is what they say now.
+
+    prefix: put before each name ("search."). refuse: asked with the names to be changed, returns the reason
+    why not now ("" = go on), for changes that must wait until the robot stands. on_change: called with the
+    new settings.
+
+    Raises ParameterError when a value that the node was started with is refused.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        settings_class: type[T],
+        *,
+        prefix: str = "",
+        refuse: Callable[[tuple[str, ...]], str] = lambda names: "",
+        on_change: Callable[[T], None] = lambda settings: None,
+    ) -> None:
+        self._prefix = prefix
+        self._refuse = refuse
+        self._on_change = on_change
+        self._settings = {each.name: each for each in describe(settings_class)}
+        started_with = {each.name: self._declare(node, each) for each in self._settings.values()}
+        self._value = settings_class(**started_with)
+        self._check(started_with.items())
+        node.add_on_set_parameters_callback(self._answer)
+        node.add_post_set_parameters_callback(self._take)
+
+    @property
+    def value(self) -> T:
+        """The settings in force."""
+        return self._value
+
+    def _declare(self, node: Node, each: Setting) -> Any:
+        try:
+            parameter = node.declare_parameter(self._prefix + each.name, _default(each), _descriptor(each))
+        except InvalidParameterTypeException as error:
+            raise ParameterError(f"{self._prefix}{each.name}: {error}") from error
+        except InvalidParameterValueException as error:
+            raise ParameterError(f"{self._prefix}{each.name} must be {each.bounds}: {error}") from error
+        return _plain(parameter.value)
+
+    def _mine(self, parameters: Iterable[Parameter]) -> dict[str, Any]:
+        mine = {}
+        for parameter in parameters:
+            name = parameter.name.removeprefix(self._prefix)
+            if parameter.name.startswith(self._prefix) and name in self._settings:
+                mine[name] = _plain(parameter.value)
+        return mine
+
+    def _check(self, values: Iterable[tuple[str, Any]]) -> None:
+        for name, value in values:
+            self._settings[name].check(value)
+
+    def _answer(self, parameters: list[Parameter]) -> SetParametersResult:
+        changes = self._mine(parameters)
+        if not changes:
+            return SetParametersResult(successful=True)
+        reason = self._refuse(tuple(changes))
+        if reason:
+            return SetParametersResult(successful=False, reason=reason)
+        try:
+            self._check(changes.items())
+            replace(self._value, **changes)  # type: ignore[type-var]
+        except (MsgsError, ValueError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take(self, parameters: list[Parameter]) -> None:
+        changes = self._mine(parameters)
+        if changes:
+            self._value = replace(self._value, **changes)  # type: ignore[type-var]
+            self._on_change(self._value)
+
+
+def _descriptor(each: Setting) -> ParameterDescriptor:
+    unit = f" [{each.unit}]" if each.unit else ""
+    descriptor = ParameterDescriptor(
+        description=each.sentence + unit, additional_constraints=each.bounds, read_only=each.read_only
+    )
+    bounded = each.minimum is not None or each.maximum is not None
+    low = -math.inf if each.minimum is None else each.minimum
+    high = math.inf if each.maximum is None else each.maximum
+    if bounded and each.type is float:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high))]
+    elif bounded and each.type is int:
+        ends = (int(max(low, -_INT64)), int(min(high, _INT64 - 1)))
+        descriptor.integer_range = [IntegerRange(from_value=ends[0], to_value=ends[1])]
+    return descriptor
+
+
+def _default(each: Setting) -> Any:
+    if each.type == tuple[float, ...]:
+        return array("d", each.default)
+    if isinstance(each.default, tuple):
+        if not each.default:
+            raise ParameterError(f"{each.name} is an empty list of texts: ROS can't tell its type")
+        return list(each.default)
+    return each.default
+
+
+def _plain(value: Any) -> Any:
+    return tuple(value) if isinstance(value, (list, array)) else value

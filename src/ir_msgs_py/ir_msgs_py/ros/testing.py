@@ -1,0 +1,94 @@
+"""Fixtures for tests of nodes without launch files: a context of their own, a spinning executor, waiting.
+
+A pytest plugin (entry point `ir_msgs_py`); every test is alone on its context, and without discovery, so
+tests run in parallel. A test over processes overrides `ros_discovery_range` with "LOCALHOST".
+
+    def test_my_node_answers(ros_context, ros_executor, ros_node, wait_for):
+        ros_executor.add_node(MyNode(context=ros_context))
+        client = ros_node.create_client(Trigger, "/my_node/trigger")
+        wait_for(client.service_is_ready)
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Protocol
+
+import pytest
+
+if TYPE_CHECKING:  # importing rclpy costs 0.2 s, and tests of a core don't need it
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+    from ir_msgs_py.ros.background import BackgroundExecutor
+
+_DOMAINS = 101  # ids above need other ports than the system leaves free
+_POLL = 0.005
+
+
+class WaitFor(Protocol):
+    """Wait until the condition holds and return what it gave; fail the test after `timeout` [s]."""
+
+    def __call__(self, condition: Callable[[], Any], timeout: float = 5.0, what: str = "") -> Any:
+        """Wait."""
+
+
+@pytest.fixture(scope="session")
+def ros_domain_id() -> int:
+    """Domain of this test process, 1 to 101: by process, so that parallel sessions don't meet."""
+    return 1 + os.getpid() % _DOMAINS
+
+
+@pytest.fixture
+def ros_discovery_range() -> str:
+    """Range of discovery: "OFF" keeps the nodes of this process to themselves."""
+    return "OFF"
+
+
+@pytest.fixture
+def ros_context(
+    ros_domain_id: int, ros_discovery_range: str, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Context]:
+    """A context of its own: hand it to every node of the test."""
+    import rclpy
+    from rclpy.context import Context
+
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", ros_discovery_range)
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain_id)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def ros_executor(ros_context: Context) -> Iterator[BackgroundExecutor]:
+    """An executor that spins in the background; it destroys the nodes that were added to it."""
+    from ir_msgs_py.ros.background import BackgroundExecutor
+
+    with BackgroundExecutor(ros_context) as executor:
+        yield executor
+
+
+@pytest.fixture
+def ros_node(ros_context: Context, ros_executor: BackgroundExecutor) -> Node:
+    """A plain node of the test, for its own clients, publishers and subscriptions."""
+    from rclpy.node import Node
+
+    return ros_executor.add_node(Node("test", context=ros_context))
+
+
+@pytest.fixture
+def wait_for() -> WaitFor:
+    """Wait for a condition, never for a duration: `wait_for(lambda: received, timeout=2.0)`."""
+
+    def wait(condition: Callable[[], Any], timeout: float = 5.0, what: str = "") -> Any:
+        deadline = time.monotonic() + timeout
+        while not (value := condition()):
+            if time.monotonic() >= deadline:
+                pytest.fail(f"{what or 'the condition'} did not come true within {timeout:g} s")
+            time.sleep(_POLL)
+        return value
+
+    return wait

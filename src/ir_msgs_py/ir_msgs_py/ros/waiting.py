@@ -1,0 +1,56 @@
+"""Waiting in a callback without blocking it: `await waiting.until(condition, timeout)`.
+
+For coroutines on a SingleThreadedExecutor. A condition is looked at whenever something arrives (`look`) and
+at least every `period`; time is the steady clock, so a jump of /clock neither ends nor prolongs a wait.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+
+
+@dataclass(eq=False)
+class _Wait:
+    condition: Callable[[], bool]
+    deadline: float
+    future: Future = field(default_factory=Future)
+
+
+class Waiting:
+    """Waits of one node's coroutines; the timer runs only while somebody waits."""
+
+    def __init__(self, node: Node, period: float = 0.02) -> None:
+        self._waits: list[_Wait] = []
+        self._timer = node.create_timer(period, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer.cancel()
+
+    async def until(self, condition: Callable[[], bool], timeout: float = float("inf")) -> bool:
+        """Wait until the condition holds; False when `timeout` [s] went by first."""
+        if condition():
+            return True
+        wait = _Wait(condition, time.monotonic() + timeout)
+        self._waits.append(wait)
+        self._timer.reset()
+        return bool(await wait.future)
+
+    async def answer(self, future: Future, timeout: float) -> bool:
+        """Wait for a service's or action's future; False when it is not done within `timeout` [s]."""
+        future.add_done_callback(lambda done: self.look())
+        return await self.until(future.done, timeout)
+
+    def look(self) -> None:
+        """Look at all conditions again; call it where something arrives that a condition depends on."""
+        now = time.monotonic()
+        for wait in list(self._waits):
+            met = wait.condition()
+            if met or now >= wait.deadline:
+                self._waits.remove(wait)
+                wait.future.set_result(met)
+        if not self._waits:
+            self._timer.cancel()

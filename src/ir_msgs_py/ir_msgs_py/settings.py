@@ -1,0 +1,111 @@
+"""Settings of a stage: one frozen dataclass whose fields carry default, unit, range and a sentence.
+
+ROS parameters and the tables of the documentation derive from it; a core that never meets ROS reads the same
+class.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, TypeVar, get_type_hints
+
+from ir_msgs_py.errors import ParameterError
+
+T = TypeVar("T")
+_KEY = "setting"
+SETTING_TYPES = (bool, int, float, str, tuple[float, ...], tuple[str, ...])
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What one field promises; minimum and maximum are inclusive and count for each element of a tuple."""
+
+    name: str
+    type: Any
+    default: Any
+    sentence: str
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[str, ...] = ()
+    read_only: bool = False
+
+    @property
+    def bounds(self) -> str:
+        """The range as text with its unit, "" where there is none."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.choices:
+            return ", ".join(self.choices)
+        if self.minimum is not None and self.maximum is not None:
+            return f"{self.minimum:g} .. {self.maximum:g}{unit}"
+        if self.minimum is not None:
+            return f"at least {self.minimum:g}{unit}"
+        return f"at most {self.maximum:g}{unit}" if self.maximum is not None else ""
+
+    def check(self, value: Any) -> None:
+        """Raise ParameterError with the value, its bound and the unit."""
+        for element in value if isinstance(value, tuple) else (value,):
+            if isinstance(element, float) and not math.isfinite(element):
+                raise ParameterError(f"{self.name} is {element}: it must be finite")
+            if self.choices and element not in self.choices:
+                raise ParameterError(f'{self.name} is "{element}": known are {self.bounds}')
+            below = self.minimum is not None and element < self.minimum
+            above = self.maximum is not None and element > self.maximum
+            if below or above:
+                unit = f" {self.unit}" if self.unit else ""
+                raise ParameterError(f"{self.name} is {element:g}{unit}: it must be {self.bounds}")
+
+
+def setting(
+    default: T,
+    sentence: str,
+    *,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: tuple[str, ...] = (),
+    read_only: bool = False,
+) -> T:
+    """Describe a field of a settings class: `timeout: float = setting(2.0, "Longest wait.", unit="s")`."""
+    metadata = {
+        "sentence": sentence,
+        "unit": unit,
+        "minimum": minimum,
+        "maximum": maximum,
+        "choices": choices,
+        "read_only": read_only,
+    }
+    return field(default=default, metadata={_KEY: metadata})
+
+
+def describe(settings_class: type[Any]) -> tuple[Setting, ...]:
+    """All settings of the class, in order; ParameterError for a field that no parameter can stand for."""
+    types = get_type_hints(settings_class)
+    settings = []
+    for each in fields(settings_class):
+        where = f"{settings_class.__name__}.{each.name}"
+        if _KEY not in each.metadata or each.default is MISSING:
+            raise ParameterError(f"{where} has no description: use setting(default, sentence, ...)")
+        if types[each.name] not in SETTING_TYPES:
+            raise ParameterError(f"{where} is a {types[each.name]}: a parameter is one of {SETTING_TYPES}")
+        settings.append(Setting(each.name, types[each.name], each.default, **each.metadata[_KEY]))
+    return tuple(settings)
+
+
+def check_settings(settings: Any) -> None:
+    """Check each value against its range; for the __post_init__ of a settings class."""
+    for each in describe(type(settings)):
+        each.check(getattr(settings, each.name))
+
+
+def settings_table(settings_class: type[Any], prefix: str = "") -> str:
+    """Write the settings as a Markdown table for the documentation."""
+    rows = ["| Parameter | Default | Unit | Range | Meaning |", "|---|---|---|---|---|"]
+    for each in describe(settings_class):
+        fixed = " Fixed at start." if each.read_only else ""
+        default = str(each.default).lower() if isinstance(each.default, bool) else str(each.default)
+        rows.append(
+            f"| `{prefix}{each.name}` | {default} | {each.unit} | {each.bounds} | {each.sentence}{fixed} |"
+        )
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,173 @@
+"""The client of scripts: answers, refusals, timeouts and goals, against nodes in this process."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+from ir_msgs.action import ExecuteTrajectory, RunProgram
+from ir_msgs.msg import PowerState, Station, Status
+from ir_msgs.srv import GetTrajectory, SetCell
+from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
+from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.waiting import Waiting
+from ir_msgs_py.trajectory import JointTrajectory
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**9], np.zeros((2, 6)))
+
+
+class FakeCell(Node):
+    """Answers as planner, runner and driver would, at once."""
+
+    def __init__(self, context):
+        super().__init__("cell", context=context)
+        self.waiting = Waiting(self)
+        self.canceled = threading.Event()
+        self.create_service(SetCell, "ir_planner/set_cell", self.set_cell)
+        self.create_service(GetTrajectory, "ir_planner/get_trajectory", self.get_trajectory)
+        ActionServer(
+            self, RunProgram, "ir_program_runner/run_program", self.run_program, cancel_callback=self.cancel
+        )
+        ActionServer(self, ExecuteTrajectory, "ir_sim_driver/execute_trajectory", self.execute)
+        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.create_publisher(PowerState, "meter", kept).publish(PowerState(power=420.0))
+
+    def set_cell(self, request, response):
+        known = request.cell_file == "demo" or "\n" in request.cell_yaml
+        response.status = Status(code=1) if known else Status(code=-19, message='cell "mars": known are demo')
+        response.stations = [Station(name="lathe"), Station(name="table")]
+        return response
+
+    def get_trajectory(self, request, response):
+        response.status = Status(code=1)
+        response.trajectory = trajectory_to_msg(TRAJECTORY)
+        return response
+
+    def cancel(self, goal_handle):
+        self.canceled.set()
+        return CancelResponse.ACCEPT
+
+    async def run_program(self, goal_handle):
+        goal_handle.publish_feedback(RunProgram.Feedback(movement=1, total=2, phase="moving"))
+        if goal_handle.request.program_id == "endless":
+            await self.waiting.until(lambda: goal_handle.is_cancel_requested)
+            goal_handle.canceled()
+            return RunProgram.Result(status=Status(code=-7))
+        goal_handle.succeed()
+        return RunProgram.Result(status=Status(code=1), executed=2, duration=3.0, energy=400.0)
+
+    def execute(self, goal_handle):
+        if goal_handle.request.trajectory_id != TRAJECTORY.trajectory_id:
+            goal_handle.abort()
+            return ExecuteTrajectory.Result(
+                error_code=-1, error_string="point 0 joint 0 position is not finite"
+            )
+        goal_handle.succeed()
+        return ExecuteTrajectory.Result(max_tool_deviation=0.001, energy=12.0)
+
+
+@pytest.fixture
+def cell(ros_context, ros_executor):
+    return ros_executor.add_node(FakeCell(ros_context))
+
+
+@pytest.fixture
+def client(cell, ros_context):
+    with Client(context=ros_context, timeout=5.0) as client:
+        yield client
+
+
+class TestOnAContextOfItsOwn:
+    @pytest.fixture
+    def ros_discovery_range(self):
+        return "LOCALHOST"  # two contexts are two participants: without discovery they never meet
+
+    def test_the_cell_is_found(self, cell, ros_domain_id):
+        with Client(domain_id=ros_domain_id) as client:
+            assert client.set_cell("demo") == ("lathe", "table")
+
+
+def test_a_request_is_answered(client):
+    assert client.set_cell("demo") == ("lathe", "table")
+    assert client.set_cell("name: demo\n") == ("lathe", "table")
+    assert client.get_trajectory("id") == TRAJECTORY
+
+
+def test_a_refusal_raises_its_sentence_and_code(client):
+    with pytest.raises(
+        RequestRefusedError, match=r'INVALID_OBJECT_NAME.*cell "mars": known are demo'
+    ) as caught:
+        client.set_cell("mars")
+    assert caught.value.code == -19
+    response = client.call("/ir_planner/set_cell", SetCell.Request(cell_file="mars"))
+    assert response.status.code == -19
+
+
+def test_a_service_that_nobody_offers_is_named(client):
+    with pytest.raises(
+        ServiceUnavailableError, match=r"nobody offers the service /nowhere \(waited 0.05 s\)"
+    ):
+        client.call("/nowhere", SetCell.Request(), timeout=0.05)
+
+
+def test_a_service_that_does_not_answer_is_named(client, cell, ros_executor):
+    heard = threading.Event()
+
+    def stay_silent(request, response):
+        heard.wait(5.0)
+        return response
+
+    ros_executor.run(lambda: cell.create_service(SetCell, "silent", stay_silent))
+    with pytest.raises(CallTimedOutError, match=r"/silent did not answer within 0\.3 s"):
+        client.call("/silent", SetCell.Request(), timeout=0.3)
+    heard.set()
+
+
+def test_a_program_is_run_with_its_progress(client):
+    phases = []
+    run = client.run_program("abc", progress=lambda at: phases.append(at.phase))
+    assert (run.executed, run.duration, run.energy) == (2, 3.0, 400.0)
+    assert phases == ["moving"]
+
+
+def test_a_goal_that_takes_too_long_is_canceled(client, cell):
+    with pytest.raises(CallTimedOutError, match=r"had no result within 0.1 s: the goal was canceled"):
+        client.run_program("endless", timeout=0.1)
+    assert cell.canceled.is_set()
+
+
+def test_a_failing_progress_callback_reaches_the_script_and_cancels_the_goal(client, cell, wait_for):
+    def fail(at):
+        raise KeyError("my own mistake")
+
+    with pytest.raises(KeyError, match="my own mistake"):
+        client.run_program("endless", progress=fail)
+    assert cell.canceled.is_set()
+
+
+def test_a_trajectory_is_driven_or_refused(client):
+    assert client.execute(TRAJECTORY).max_tool_deviation == 0.001
+    other = JointTrajectory(JOINT_NAMES, [0, 2 * 10**9], np.zeros((2, 6)))
+    with pytest.raises(RequestRefusedError, match="point 0 joint 0 position is not finite") as caught:
+        client.execute(other)
+    assert caught.value.code == -1
+
+
+def test_a_kept_message_is_heard_later(client):
+    assert client.next_message("/meter", PowerState).power == 420.0
+    with pytest.raises(CallTimedOutError, match=r"no message on /silence within 0.05 s"):
+        client.next_message("/silence", PowerState, timeout=0.05)
+
+
+def test_the_graph_names_services_actions_and_topics(client, wait_for):
+    wait_for(lambda: "/ir_planner/set_cell" in client.graph.services())
+    assert client.graph.services()["/ir_planner/set_cell"] == "ir_msgs/srv/SetCell"
+    assert client.graph.actions()["/ir_program_runner/run_program"] == "ir_msgs/action/RunProgram"
+    assert client.graph.topics()["/meter"] == "ir_msgs/msg/PowerState"
+    assert not any("_action" in name for name in client.graph.services())

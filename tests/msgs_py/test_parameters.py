@@ -1,0 +1,109 @@
+"""A settings class as ROS parameters: a bad change is refused with its reason and nothing changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+from ir_msgs_py.errors import ParameterError
+from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.settings import setting
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+
+@dataclass(frozen=True)
+class Search:
+    speed: float = setting(0.5, "Speed of the search.", unit="m/s", minimum=0.0, maximum=2.0)
+    samples: int = setting(100, "Samples to draw.", minimum=1)
+    method: str = setting("tree", "Which search.", choices=("tree", "grid"))
+    weights: tuple[float, ...] = setting((1.0, 2.0), "Weight per joint.", minimum=0.0)
+    address: str = setting("127.0.0.1", "Where it listens.", read_only=True)
+
+    def __post_init__(self) -> None:
+        if self.method == "grid" and self.samples > 1000:
+            raise ValueError(f"samples is {self.samples}: a grid takes at most 1000")
+
+
+@pytest.fixture
+def node(ros_context):
+    node = Node("searcher", context=ros_context)
+    yield node
+    node.destroy_node()
+
+
+def test_the_defaults_are_those_of_the_class_and_described(node):
+    parameters = Parameters(node, Search, prefix="search.")
+    assert parameters.value == Search()
+    descriptor = node.describe_parameter("search.speed")
+    assert descriptor.description == "Speed of the search. [m/s]"
+    assert descriptor.floating_point_range[0].to_value == 2.0
+    assert node.describe_parameter("search.address").read_only
+
+
+def test_a_good_change_is_taken_and_told(node):
+    told = []
+    parameters = Parameters(node, Search, on_change=told.append)
+    results = node.set_parameters(
+        [
+            Parameter("speed", value=1.5),
+            Parameter("weights", value=[3.0]),
+            Parameter("use_sim_time", value=False),
+        ]
+    )
+    assert all(result.successful for result in results)
+    assert parameters.value == Search(speed=1.5, weights=(3.0,))
+    assert told[-1] == parameters.value
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("speed", 3.0, "out of range"),
+        ("speed", float("nan"), "out of range"),
+        ("speed", "fast", "type"),
+        ("samples", 0, "out of range"),
+        ("method", "luck", 'method is "luck": known are tree, grid'),
+        ("weights", [1.0, -2.0], "weights is -2: it must be at least 0"),
+        ("address", "0.0.0.0", "read-only"),
+    ],
+)
+def test_a_bad_change_is_refused_with_its_reason_and_nothing_changes(node, name, value, reason):
+    parameters = Parameters(node, Search)
+    result = node.set_parameters([Parameter(name, value=value)])[0]
+    assert not result.successful
+    assert reason in result.reason.lower() or reason in result.reason
+    assert parameters.value == Search()
+    assert node.get_parameter("speed").value == 0.5
+
+
+def test_what_the_class_refuses_as_a_whole_is_refused(node):
+    parameters = Parameters(node, Search)
+    result = node.set_parameters_atomically(
+        [Parameter("method", value="grid"), Parameter("samples", value=5000)]
+    )
+    assert result.reason == "samples is 5000: a grid takes at most 1000"
+    assert parameters.value == Search()
+
+
+def test_a_change_can_be_refused_for_the_moment(node):
+    moving = ["the robot moves: speed can be changed when it stands"]
+    parameters = Parameters(node, Search, refuse=lambda names: moving[0] if "speed" in names else "")
+    assert node.set_parameters([Parameter("speed", value=1.0)])[0].reason == moving[0]
+    assert node.set_parameters([Parameter("samples", value=7)])[0].successful
+    assert parameters.value == Search(samples=7)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("speed", 9.0, r"speed must be 0 \.\. 2 m/s: .*value: 9"),
+        ("method", "luck", 'method is "luck": known are tree, grid'),
+        ("samples", "many", "samples: .*type"),
+    ],
+)
+def test_a_node_started_with_a_bad_value_says_so(ros_context, name, value, sentence):
+    node = Node("searcher", context=ros_context, parameter_overrides=[Parameter(name, value=value)])
+    with pytest.raises(ParameterError, match=sentence):
+        Parameters(node, Search)
+    node.destroy_node()
