@@ -1,0 +1,1 @@
+"""The `ir` command: demonstration, service calls, cells and reports."""

@@ -1,0 +1,1 @@
+"""`ir demo`: plan, drive, record and explain a cell, with real nodes in processes of their own."""

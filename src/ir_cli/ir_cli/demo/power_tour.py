@@ -1,0 +1,100 @@
+"""A tour through the power modes at machine home: what the paper's Table II measured, by PLC bits and one packet.
+
+For each load the robot rests on motors, on brakes, with the drive bus off and in hibernation, long enough for the
+mains meter to show a plateau. Hibernation takes the controller off the network: only Wake-on-LAN brings it back.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from ir_msgs.msg import PlcInputs, PowerMode, PowerState
+from ir_msgs.srv import SetLoad, SetPlcInput
+from ir_msgs_py import names
+from ir_msgs_py.ros.client import Client
+
+from ir_cli.errors import DemonstrationError
+
+MODE_SECONDS = 30.0
+"""Longest wait for a mode [s]; transitions of the demonstration take a few seconds."""
+
+
+class PowerWatch:
+    """The last message of the mains meter, and waiting for a mode or for time on the meter's own clock."""
+
+    def __init__(self, client: Client) -> None:
+        self._changed = threading.Condition()
+        self._state: PowerState | None = None
+        client.subscribe("/" + names.POWER_STATE, PowerState, self._take)
+
+    def wait_for_mode(self, mode: int) -> None:
+        """Wait until the controller rests in a mode; DemonstrationError after MODE_SECONDS."""
+        self._wait(lambda state: state.mode == mode, f"power mode {mode}")
+
+    def stay(self, seconds: float) -> None:
+        """Wait until the meter's stamps have gone on by this."""
+        self._wait(lambda state: True, "the mains meter")
+        began = _seconds(self._last())
+        self._wait(lambda state: _seconds(state) >= began + seconds, f"{seconds:g} s on the mains meter")
+
+    def _wait(self, condition: Callable[[PowerState], bool], what: str) -> None:
+        with self._changed:
+            if not self._changed.wait_for(
+                lambda: self._state is not None and condition(self._state), MODE_SECONDS
+            ):
+                mode = "nothing" if self._state is None else f"mode {self._state.mode}"
+                raise DemonstrationError(f"waited {MODE_SECONDS:g} s for {what}; the mains meter says {mode}")
+
+    def _last(self) -> PowerState:
+        with self._changed:
+            assert self._state is not None
+            return self._state
+
+    def _take(self, state: PowerState) -> None:
+        with self._changed:
+            self._state = state
+            self._changed.notify_all()
+
+
+def _seconds(state: PowerState) -> float:
+    return float(state.header.stamp.sec) + float(state.header.stamp.nanosec) * 1e-9
+
+
+def tour(
+    client: Client,
+    watch: PowerWatch,
+    loads: Sequence[str],
+    stay: float,
+    wake: Callable[[], None],
+    progress: Callable[[str], None],
+) -> None:
+    """Visit the four modes with each load (load texts), staying `stay` seconds in each; ends on motors."""
+    for load in loads:
+        progress(f"load {load}: on motors")
+        watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
+        client.ask("/" + names.SET_LOAD, SetLoad.Request(load=load))
+        watch.stay(stay)
+        progress(f"load {load}: on brakes")
+        set_bit(client, "drives_off", True)
+        watch.wait_for_mode(PowerMode.STAND_ON_BRAKES)
+        watch.stay(stay)
+        set_bit(client, "drives_off", False)
+        progress(f"load {load}: drive bus off")
+        set_bit(client, "ab", True)
+        watch.wait_for_mode(PowerMode.BUS_POWER_OFF)
+        watch.stay(stay)
+        set_bit(client, "ab", False)
+        watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
+        progress(f"load {load}: hibernation")
+        set_bit(client, "hib", True)
+        watch.wait_for_mode(PowerMode.HIBERNATION)
+        watch.stay(stay)
+        wake()
+        watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
+        set_bit(client, "hib", False)
+
+
+def set_bit(client: Client, name: str, value: bool) -> PlcInputs:
+    """Set one level of the PLC, the others stay."""
+    return client.ask("/" + names.SET_PLC_INPUT, SetPlcInput.Request(name=name, value=value)).inputs

@@ -1,0 +1,33 @@
+"""The environment that nodes run in: only this machine, discovered fast."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from importlib.resources import files
+
+DEMONSTRATION_DOMAINS = range(1, 101)
+"""ROS domain ids that leave room for all participants below the ephemeral ports of Linux."""
+
+
+def ros_defaults() -> dict[str, str]:
+    """Variables for nodes on this machine, without those that the user has set."""
+    wanted = {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(files("ir_msgs_py") / "ros" / "fast_discovery.xml"),
+        "AMENT_PREFIX_PATH": sys.prefix,
+    }
+    return {name: value for name, value in wanted.items() if name not in os.environ}
+
+
+def apply(variables: Mapping[str, str]) -> None:
+    """Put the variables into this process before rclpy reads them."""
+    os.environ.update(variables)
+
+
+def own_domain() -> dict[str, str]:
+    """Return a ROS domain of this process's own, unless the user chose one."""
+    if "ROS_DOMAIN_ID" in os.environ:
+        return {}
+    return {"ROS_DOMAIN_ID": str(DEMONSTRATION_DOMAINS[os.getpid() % len(DEMONSTRATION_DOMAINS)])}

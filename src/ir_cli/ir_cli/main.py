@@ -1,0 +1,63 @@
+"""The `ir` command: reads the command line and hands over."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from .environment import apply, ros_defaults
+from .errors import CommandError
+
+COMMAND_MODULES = {
+    "demo": "ir_cli.demo.command",
+    "up": "ir_cli.up_command",
+    "call": "ir_cli.graph_commands",
+    "echo": "ir_cli.graph_commands",
+    "list": "ir_cli.graph_commands",
+    "cell": "ir_cli.cell_commands",
+    "report": "ir_cli.report_command",
+}
+"""Only the module that is needed is imported: `ir cell check` does not wait for rclpy."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code, 1 with one sentence on stderr when it failed."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    apply(ros_defaults())
+    chosen = next((word for word in words if not word.startswith("-")), "")
+    parser = _parser(chosen)
+    parsed = parser.parse_args(words)
+    try:
+        code: int = parsed.run(parsed)
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        return 0
+    except _expected_errors() as error:
+        sys.stderr.write(f"ir: {error}\n")
+        return 1
+    return code
+
+
+def _parser(chosen: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="ir", description="Energy-aware planning for a robot among machines.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    modules = [COMMAND_MODULES[chosen]] if chosen in COMMAND_MODULES else dict.fromkeys(COMMAND_MODULES.values())
+    for module in modules:
+        import_module(module).add_commands(commands)
+    return parser
+
+
+def _expected_errors() -> tuple[type[Exception], ...]:
+    """Errors that carry a sentence for people; anything else is a fault of ours and shows its trace."""
+    from ir_description.errors import DescriptionError
+    from ir_msgs_py.errors import MsgsError
+    from ir_recorder.errors import RecorderError
+
+    return (CommandError, DescriptionError, MsgsError, RecorderError)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""Nodes as child processes: started without a launch file, watched, and stopped by their own process id."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+
+from .errors import ProcessError
+
+STOP_SECONDS = 10.0
+"""How long a node may take to end after SIGINT before it is killed."""
+
+
+@dataclass(frozen=True)
+class NodeCommand:
+    """A node to start: the module that runs it, and its ROS parameters."""
+
+    module: str
+    parameters: Mapping[str, object] = field(default_factory=dict)
+
+    def arguments(self) -> list[str]:
+        """Return the command line; strings are quoted so that YAML keeps them strings."""
+        line = [sys.executable, "-m", self.module, "--ros-args", "--log-level", "warn"]
+        for name, value in self.parameters.items():
+            line += ["-p", f"{name}:={_yaml(value)}"]
+        return line
+
+
+def _yaml(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return repr(value)
+
+
+class NodeProcesses:
+    """A group of node processes; leaving the context stops all that were started."""
+
+    def __init__(self, log_folder: Path, environment: Mapping[str, str]) -> None:
+        self._log_folder = log_folder
+        self._environment = {**os.environ, **environment, "ROS_LOG_DIR": str(log_folder)}
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def __enter__(self) -> NodeProcesses:
+        self._log_folder.mkdir(parents=True, exist_ok=True)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def start(self, commands: Sequence[NodeCommand]) -> None:
+        """Start the nodes side by side; their output goes to `<module>.log` in the log folder."""
+        for command in commands:
+            name = command.module
+            with self._log(name).open("wb") as log:
+                self._running[name] = subprocess.Popen(
+                    command.arguments(),
+                    env=self._environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                )
+
+    def check(self) -> None:
+        """Raise ProcessError when a node has ended on its own, with the end of what it printed."""
+        for name, process in self._running.items():
+            code = process.poll()
+            if code is not None:
+                last = self._log(name).read_text(errors="replace").splitlines()[-12:]
+                raise ProcessError(f"{name} ended with exit code {code}:\n  " + "\n  ".join(last))
+
+    def stop(self) -> dict[str, int]:
+        """Interrupt all nodes, wait for them, kill what does not end; return the exit codes."""
+        for process in self._running.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        deadline = time.monotonic() + STOP_SECONDS
+        codes = {}
+        for name, process in self._running.items():
+            try:
+                codes[name] = process.wait(max(0.1, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                codes[name] = process.wait()
+        self._running.clear()
+        return codes
+
+    def _log(self, name: str) -> Path:
+        return self._log_folder / f"{name}.log"
