@@ -41,7 +41,8 @@ def own_laws(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics
         if use.max() > limits.torque_share:
             joint = int(np.argmax(use.max(axis=0)))
             raise TimingError(
-                f"joint {joint + 1} needs {use[:, joint].max():.2f} times its torque at a tenth of its acceleration", joint
+                f"joint {joint + 1} needs {use[:, joint].max():.2f} times its torque at a tenth of its acceleration",
+                joint,
             )
     return best
 
@@ -59,7 +60,9 @@ def _laws(delta: FloatArray, limits: MotionLimits, factor: float) -> StepLaws:
 
 
 def _torque(start: FloatArray, delta: FloatArray, laws: StepLaws, dynamics: Dynamics) -> FloatArray:
-    at = np.unique(np.concatenate([np.arange(0, laws.total, _SAMPLE), laws.switches(), laws.switches()[1:] - 1]))
+    at = np.unique(
+        np.concatenate([np.arange(0, laws.total, _SAMPLE), laws.switches(), laws.switches()[1:] - 1])
+    )
     s, sd, sdd = laws.at(at.astype(np.int64))
     return torque_use(dynamics, start + s * delta, sd * delta, sdd * delta)
 

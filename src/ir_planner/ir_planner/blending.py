@@ -29,7 +29,9 @@ class TimedPath:
     def starts(self) -> IntArray:
         """Grid steps (M-1,) at which each movement begins."""
         lasting = np.array([law.total for law in self.laws[:-1]], dtype=np.int64)
-        return np.concatenate([[0], np.cumsum(lasting - np.array(self.overlaps, dtype=np.int64))]).astype(np.int64)
+        return np.concatenate([[0], np.cumsum(lasting - np.array(self.overlaps, dtype=np.int64))]).astype(
+            np.int64
+        )
 
     @property
     def total(self) -> int:

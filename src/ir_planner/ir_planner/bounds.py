@@ -20,7 +20,9 @@ def bounded(value: float, low: float, high: float, name: str, unit: str = "") ->
     number = float(value)
     suffix = f" {unit}" if unit else ""
     if not math.isfinite(number):
-        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, f"{name} is {number}{suffix}: it must be finite")
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS, f"{name} is {number}{suffix}: it must be finite"
+        )
     if not low <= number <= high:
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
@@ -34,7 +36,7 @@ def chosen(value: str, known: tuple[str, ...], name: str) -> str:
     if value not in known:
         listed = ", ".join(word or '""' for word in known)
         raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS, f"{name} {ascii(value[:60])} is unknown: known are {listed}"
+            StatusCode.INVALID_GOAL_CONSTRAINTS, f"{name} {value[:60]!a} is unknown: known are {listed}"
         )
     return value
 

@@ -49,7 +49,9 @@ def pair_value(scene: PlanningScene, q: FloatArray, z: int, allowed: bool = Fals
     return _pair(scene, scene.collision.witnesses(q[None], np.array([z])), 0, allowed)
 
 
-def nearest_pair(scene: PlanningScene, q: FloatArray, offset: FloatArray | None = None) -> DistancePair | None:
+def nearest_pair(
+    scene: PlanningScene, q: FloatArray, offset: FloatArray | None = None
+) -> DistancePair | None:
     """The pair nearest to violating its distance `offset` (Z,) at q (n,); None where there is no pair."""
     near = scene.collision.min_distance(q[None], offset)
     return _pair(scene, near, 0, False) if near.pair[0] >= 0 else None
@@ -68,7 +70,9 @@ def nearest_pairs(
     return tuple(_pair(scene, near, row, bool(allowed[z])) for row, z in enumerate(order))
 
 
-def clearance_profile(trajectory: JointTrajectory, scene: PlanningScene, station: str = "") -> ClearanceProfile:
+def clearance_profile(
+    trajectory: JointTrajectory, scene: PlanningScene, station: str = ""
+) -> ClearanceProfile:
     """Distances along a trajectory, sampled every 10 ms or finer, the smallest one refined."""
     begin, span = float(trajectory.times[0]), trajectory.duration - float(trajectory.times[0])
     count = int(np.clip(np.ceil(span / 0.01), 32, 2000)) + 1

@@ -45,7 +45,12 @@ def drawn_back(start: FloatArray, goal: FloatArray, postures: list[FloatArray]) 
 
 
 def scattered(
-    start: FloatArray, goal: FloatArray, low: FloatArray, high: FloatArray, count: int, rng: np.random.Generator
+    start: FloatArray,
+    goal: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    count: int,
+    rng: np.random.Generator,
 ) -> list[FloatArray]:
     """`count` paths (3, n) over vias scattered around the straight movement, within the limits."""
     along = rng.uniform(0.2, 0.8, (count, 1))

@@ -7,10 +7,10 @@ of at most 1 ms. Each movement starts with an empty capacitor; what is left in i
 from dataclasses import dataclass
 
 import numpy as np
-from ir_kernels import dc_bus
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
+from ir_kernels import dc_bus
 from ir_planner.scene import PlanningScene
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +34,9 @@ class MovementEnergy:
     watts: FloatArray
 
 
-def movement_energy(trajectory: JointTrajectory, scene: PlanningScene, step: float = STEP_S) -> MovementEnergy:
+def movement_energy(
+    trajectory: JointTrajectory, scene: PlanningScene, step: float = STEP_S
+) -> MovementEnergy:
     """Energy of a trajectory (as it is interpolated) with the loads of the scene."""
     begin = float(trajectory.times[0])
     span = trajectory.duration - begin

@@ -9,11 +9,11 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-from ir_description import Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.status import StatusCode
 from numpy.typing import NDArray
 
+from ir_description import Cell
 from ir_planner.errors import RequestError, UnknownNameError
 
 FloatArray = NDArray[np.float64]
@@ -34,9 +34,7 @@ class Goal:
     text: str = ""
 
 
-def one_goal(
-    text: str, configuration: FloatArray | None, pose: FloatArray | None, cell: Cell
-) -> Goal:
+def one_goal(text: str, configuration: FloatArray | None, pose: FloatArray | None, cell: Cell) -> Goal:
     """The goal that a request gives in exactly one of three forms."""
     given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not None),
                                       ("goal_pose", pose is not None)) if there]  # fmt: skip
@@ -58,7 +56,8 @@ def parse_goal(text: str, cell: Cell) -> Goal:
     stripped = text.strip()
     if len(stripped) > _TEXT_MAX or not stripped.isprintable():
         raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS, f"goal has {len(text)} characters: it must be one line of 1 to 300"
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"goal has {len(text)} characters: it must be one line of 1 to 300",
         )
     for station in cell.stations:
         if station.name == stripped:
@@ -71,7 +70,8 @@ def parse_goal(text: str, cell: Cell) -> Goal:
     if len(words) > 1 and keys[0] in joints:
         values = _numbers(keys, words[1::2], joints, "deg")
         return Goal(
-            configuration=within_limits(np.radians(values), cell, "goal", StatusCode.GOAL_STATE_INVALID), text=stripped
+            configuration=within_limits(np.radians(values), cell, "goal", StatusCode.GOAL_STATE_INVALID),
+            text=stripped,
         )
     if len(words) > 1 and keys[0] in _POSE_KEYS:
         x, y, z, *abc = _numbers(keys, words[1::2], list(_POSE_KEYS), "")
@@ -87,7 +87,12 @@ def parse_goal(text: str, cell: Cell) -> Goal:
     raise UnknownNameError(
         "goal",
         stripped,
-        [*(s.name for s in cell.stations), *POSTURES, '"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"'],
+        [
+            *(s.name for s in cell.stations),
+            *POSTURES,
+            '"A1 0 A2 -90 ..." in degrees',
+            '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"',
+        ],
     )
 
 
@@ -123,7 +128,7 @@ def _numbers(keys: list[str], values: list[str], expected: list[str], unit: str)
         if not math.isfinite(number):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"goal: {key} is {ascii(value[:20])}: it must be a finite number {unit}".rstrip(),
+                f"goal: {key} is {value[:20]!a}: it must be a finite number {unit}".rstrip(),
             )
         numbers[key] = number
     return [numbers[key] for key in expected]

@@ -61,7 +61,9 @@ def timed_movement(
         return TimedMovement(waypoints, trajectory, evaluation, "the goal is the start")
     for share in _TORQUE_SHARES:
         budget.check()
-        limits = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling).with_torque_share(share)
+        limits = scene.limits.scaled(
+            options.velocity_scaling, options.acceleration_scaling
+        ).with_torque_share(share)
         fastest, note = _fastest(waypoints, scene, options, limits, budget, station)
         trajectory = _stretched_to_wish(fastest, scene, options)
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
@@ -168,7 +170,9 @@ def _guilty_corners(
     return guilty
 
 
-def _stretched_to_wish(fastest: JointTrajectory, scene: PlanningScene, options: PlanOptions) -> JointTrajectory:
+def _stretched_to_wish(
+    fastest: JointTrajectory, scene: PlanningScene, options: PlanOptions
+) -> JointTrajectory:
     if options.duration > 0.0:
         if options.duration < fastest.duration * (1.0 - _DURATION_SLACK):
             raise RequestError(

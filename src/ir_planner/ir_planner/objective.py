@@ -29,9 +29,7 @@ def objective_value(report: TrajectoryReport, objective: str, time_value: float)
     return values[objective]
 
 
-def best_stretch(
-    fastest: JointTrajectory, scene: PlanningScene, objective: str, time_value: float
-) -> float:
+def best_stretch(fastest: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
     """Factor >= 1 on the duration of the fastest movement that minimises the objective."""
     if objective in ("time", "movement_cost"):
         return 1.0

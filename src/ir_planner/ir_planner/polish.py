@@ -29,7 +29,9 @@ def fewest_corners(path: FloatArray, space: FreeSpace, weights: FloatArray) -> F
     cost[0] = 0.0
     came = np.zeros(count, dtype=int)
     for k in range(1, count):
-        through = np.where(free[:k, k], cost[:k] + movement_cost(weights, points[:k], points[k]) + corner, np.inf)
+        through = np.where(
+            free[:k, k], cost[:k] + movement_cost(weights, points[:k], points[k]) + corner, np.inf
+        )
         came[k] = int(np.argmin(through))
         cost[k] = through[came[k]]
     chosen = [count - 1]

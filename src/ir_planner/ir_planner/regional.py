@@ -158,7 +158,9 @@ def _best_of(
             journal.reject(f"not proved: {found.violation.what}")
             continue
         value = objective_value(found.evaluation.report, options.objective, options.time_value)
-        if best is None or value < objective_value(best.evaluation.report, options.objective, options.time_value):
+        if best is None or value < objective_value(
+            best.evaluation.report, options.objective, options.time_value
+        ):
             best = found
     return best
 
@@ -196,7 +198,8 @@ def _blocked_status(
     if found.verdict[0] == FREE:
         reasons = "; ".join(f"{reason} ({count})" for reason, count in journal.rejected.items())
         return Status(
-            StatusCode.PLANNING_FAILED, f"the straight way is free but no movement could be certified: {reasons}"
+            StatusCode.PLANNING_FAILED,
+            f"the straight way is free but no movement could be certified: {reasons}",
         )
     share = float(found.t1[0])
     q = start + share * (goal - start)

@@ -67,7 +67,9 @@ def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ..
         duration=sum(report.duration for report in reports),
         movement_cost=sum(report.movement_cost for report in reports),
         energy=sum(report.energy for report in reports),
-        joint_energy=np.sum([r.joint_energy if len(r.joint_energy) else np.zeros(n) for r in reports], axis=0),
+        joint_energy=np.sum(
+            [r.joint_energy if len(r.joint_energy) else np.zeros(n) for r in reports], axis=0
+        ),
         base_energy=sum(report.base_energy for report in reports),
         burnt_energy=sum(report.burnt_energy for report in reports),
         peak_power=max(report.peak_power for report in reports),

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station
-from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
 from ir_kernels.power import Regeneration
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from numpy.typing import NDArray
 
+from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station
+from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.movement_cost import movement_weights
 from ir_planner.timing import MotionLimits
@@ -61,7 +61,12 @@ class PlanningScene:
         robot = self.cell.robot
         capsules = (*robot.capsules, *(capsule for load in self.loads for capsule in load.capsules))
         pairs = (
-            *((c.name, other) for load in self.loads for c in load.capsules for other in robot.load_self_capsules),
+            *(
+                (c.name, other)
+                for load in self.loads
+                for c in load.capsules
+                for other in robot.load_self_capsules
+            ),
             *robot.self_pairs,
         )
         bodies = self.cell.bodies()
@@ -158,5 +163,6 @@ def _check_load(cell: Cell, names: Iterable[str], held: list[str]) -> None:
     if len(held) > 1 or len(set(names)) < len(names):
         listed = LOAD_SEPARATOR.join(names)
         raise RequestError(
-            StatusCode.INVALID_OBJECT_NAME, f"load {listed!r}: the robot holds one part at a time, each load once"
+            StatusCode.INVALID_OBJECT_NAME,
+            f"load {listed!r}: the robot holds one part at a time, each load once",
         )

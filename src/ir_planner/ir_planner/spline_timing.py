@@ -62,7 +62,9 @@ def _spline(points: FloatArray, steps: IntArray, joint_names: tuple[str, ...]) -
     at = np.concatenate([[0], np.cumsum(steps)])
     knots = np.rint(virtual_knots(at)).astype(np.int64)
     spline = spline_through(points, at * GRID_S, knots * GRID_S)
-    return JointTrajectory(joint_names, knots * GRID_NS, spline.positions, spline.velocities, spline.accelerations)
+    return JointTrajectory(
+        joint_names, knots * GRID_NS, spline.positions, spline.velocities, spline.accelerations
+    )
 
 
 def _torque(trajectory: JointTrajectory, dynamics: Dynamics) -> FloatArray:

@@ -42,7 +42,10 @@ class MotionLimits:
     def scaled(self, velocity: float, acceleration: float) -> "MotionLimits":
         """Bounds times the request's scalings; acceleration scaling holds for the jerk as well."""
         return MotionLimits(
-            self.velocity * velocity, self.acceleration * acceleration, self.jerk * acceleration, self.torque_share
+            self.velocity * velocity,
+            self.acceleration * acceleration,
+            self.jerk * acceleration,
+            self.torque_share,
         )
 
     def with_torque_share(self, share: float) -> "MotionLimits":
@@ -113,7 +116,12 @@ def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynam
 
 
 def _refined(
-    best: TimeLaw, start: FloatArray, delta: FloatArray, aj: tuple[float, float], share: float, dynamics: Dynamics
+    best: TimeLaw,
+    start: FloatArray,
+    delta: FloatArray,
+    aj: tuple[float, float],
+    share: float,
+    dynamics: Dynamics,
 ) -> TimeLaw:
     speed = float(law_states(np.array([best.steps])).sd[0, 3])
     better = _best_law(start, delta, speed * (1.0 + _REFINED), aj, share, dynamics)

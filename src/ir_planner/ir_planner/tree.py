@@ -84,9 +84,7 @@ def _extend(tree: Tree, targets: FloatArray, space: FreeSpace, scale: FloatArray
     return int(keep.sum())
 
 
-def _join(
-    here: Tree, there: Tree, begin: int, space: FreeSpace, scale: FloatArray
-) -> tuple[int, int] | None:
+def _join(here: Tree, there: Tree, begin: int, space: FreeSpace, scale: FloatArray) -> tuple[int, int] | None:
     """The first pair of a new node and a node of the other tree with a free edge between them."""
     new = here.nodes[begin:]
     partner = there.nearest(new, scale)

@@ -158,7 +158,9 @@ def _rest_violation(trajectory: JointTrajectory, scene: PlanningScene) -> Violat
                     f"the movement {where} with {what} {values[j]:.4g} {unit} of {names[j]} at waypoint {k}: it must "
                     f"be 0 {unit} within {AT_REST:g}"
                 )
-                return Violation(float(trajectory.times[k]), k, f"{what} at rest", abs(float(values[j])), sentence)
+                return Violation(
+                    float(trajectory.times[k]), k, f"{what} at rest", abs(float(values[j])), sentence
+                )
     return None
 
 
