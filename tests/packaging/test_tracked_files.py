@@ -9,13 +9,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-# written in pieces, so that this file passes its own test
-MACHINE_PATH = re.compile(
-    r"(?<![\w.$}])/(" + "|".join(("work", "root", "home", "farm", "Users")) + r")/\w|\.py"
-    r"env/(versions|shims)"
-)
+# the empty groups keep this file from finding itself
+MACHINE_PATH = re.compile(r"(?<![\w.$}])/(?:)(work|root|home|farm|Users)/\w|\.py(?:)env/(versions|shims)")
 INDEX_HOST = re.compile(
-    "py" r"pi\.org|pythonho" r"sted\.org|--extra-index-url|--index-url|--trusted-host|file:" "///"
+    r"py(?:)pi\.org|python(?:)hosted\.org|--(extra-)?(?:)index-url|--trusted-(?:)host|file:/(?:)//"
 )
 LONGEST_MODULE = 450
 

@@ -1,0 +1,163 @@
+"""Set-up: an interpreter that really runs, sentences that say what to install, work only for what changed."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FIND_PYTHON = ROOT / "tools" / "find_python.sh"
+SHIM = "#!/bin/sh\necho 'command not found in this version manager' >&2\nexit 127\n"
+
+
+@pytest.fixture(scope="module")
+def set_up() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("set_up", ROOT / "tools" / "set_up.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["set_up"] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+def executable(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(0o755)
+    return path
+
+
+def find_python(cwd: Path, path: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["/bin/sh", str(FIND_PYTHON)],
+        cwd=cwd,
+        env={"PATH": path, **variables},
+        capture_output=True,
+        text=True,
+    )
+
+
+def complete_python(folder: Path, name: str) -> Path:
+    """A stand-in for an interpreter with everything: it answers that nothing is missing."""
+    return executable(folder / name, "#!/bin/sh\nexit 0\n")
+
+
+def test_a_shim_that_fails_is_passed_over(tmp_path: Path) -> None:
+    executable(tmp_path / "shims" / "python3.11", SHIM)
+    good = complete_python(tmp_path / "bin", "python3.12")
+    found = find_python(tmp_path, f"{tmp_path}/shims:{tmp_path}/bin")
+    assert found.stdout.strip() == str(good), found.stderr
+
+
+def test_python_3_11_comes_first(tmp_path: Path) -> None:
+    for name in ("python3.13", "python3.12", "python3.11"):
+        complete_python(tmp_path / "bin", name)
+    assert find_python(tmp_path, f"{tmp_path}/bin").stdout.strip().endswith("/python3.11")
+
+
+def test_without_an_interpreter_a_sentence_says_what_to_install_and_what_was_seen(tmp_path: Path) -> None:
+    shim = executable(tmp_path / "shims" / "python3.11", SHIM)
+    for tool in ("head", "cat"):
+        (tmp_path / "shims" / tool).symlink_to(f"/usr/bin/{tool}")
+    found = find_python(tmp_path, f"{tmp_path}/shims")
+    assert found.returncode == 1
+    assert "apt install python3.11 python3.11-venv" in found.stderr
+    assert f"{shim}: command not found in this version manager" in found.stderr
+
+
+def test_an_interpreter_may_be_named(tmp_path: Path) -> None:
+    mine = complete_python(tmp_path / "mine", "python")
+    assert find_python(tmp_path, "/usr/bin:/bin", PYTHON=str(mine)).stdout.strip() == str(mine)
+
+
+def test_an_unfit_interpreter_says_why(tmp_path: Path) -> None:
+    old = executable(
+        tmp_path / "old", f'#!/bin/sh\nexec "{sys.executable}" -c "import sys; sys.exit(\'is Python 3.8\')"\n'
+    )
+    found = find_python(tmp_path, "/usr/bin:/bin", PYTHON=str(old))
+    assert found.returncode == 1
+    assert f"{old}: is Python 3.8" in found.stderr
+
+
+def test_the_environment_that_is_there_is_taken(tmp_path: Path) -> None:
+    executable(tmp_path / ".venv" / "bin" / "python", "#!/bin/sh\nexit 0\n")
+    assert find_python(tmp_path, "/usr/bin:/bin").stdout.strip() == ".venv/bin/python"
+
+
+def test_a_missing_compiler_is_named_with_its_package(
+    set_up: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(set_up.SetupError, match=r"No g\+\+ .*apt install g\+\+"):
+        set_up.check_machine()
+
+
+def test_another_machine_is_sent_to_the_container(
+    set_up: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(set_up.platform, "machine", lambda: "aarch64")
+    with pytest.raises(set_up.SetupError, match=r"x86-64 Linux; this is aarch64 .*docker/"):
+        set_up.check_machine()
+
+
+def test_only_names_and_contents_make_the_fingerprint(
+    set_up: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(set_up, "ROOT", tmp_path)
+    file = tmp_path / "Status.msg"
+    file.write_text("int32 code\n")
+    before = set_up.fingerprint([file])
+    os.utime(file, (0, 0))
+    assert set_up.fingerprint([file]) == before
+    file.write_text("int64 code\n")
+    assert set_up.fingerprint([file]) != before
+    assert set_up.fingerprint([file.rename(tmp_path / "Code.msg")]) != set_up.fingerprint([])
+
+
+def test_every_requirement_is_pinned_in_one_version() -> None:
+    def names(file: str) -> list[str]:
+        lines = (ROOT / "requirements" / file).read_text().splitlines()
+        bare = [re.split(r"[\[=<>~!; ]", line)[0] for line in lines if line and line[0] not in "#-"]
+        return [re.sub(r"[-_.]+", "-", name).lower() for name in bare]
+
+    pins = [
+        line
+        for line in (ROOT / "requirements" / "constraints.txt").read_text().splitlines()
+        if line[:1] not in ("", "#")
+    ]
+    assert [pin for pin in pins if not re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][0-9A-Za-z.]*", pin)] == []
+    pinned = names("constraints.txt")
+    assert len(pinned) == len(set(pinned))
+    assert {*names("build.txt"), *names("run.txt"), *names("dev.txt")} <= set(pinned)
+
+
+def test_the_interface_package_names_the_pinned_versions() -> None:
+    pins = set((ROOT / "requirements" / "constraints.txt").read_text().splitlines())
+    project = (ROOT / "ros_ws" / "src" / "ir_msgs" / "pyproject.toml").read_text()
+    named = {pin.replace("[fastrtps]", "") for pin in re.findall(r'"(ros-[^"]*==[^"]*)"', project)}
+    assert named
+    assert named <= pins
+
+
+def test_help_lists_every_target() -> None:
+    makefile = (ROOT / "Makefile").read_text()
+    phony = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)
+    assert phony is not None
+    shown = subprocess.run(
+        ["make", "--no-print-directory", "help"], cwd=ROOT, capture_output=True, text=True
+    ).stdout
+    assert {line.split()[0] for line in shown.splitlines()[1:]} == set(phony.group(1).split())
+
+
+def test_continuous_integration_runs_the_two_commands() -> None:
+    script = ROOT / ".ci" / "run"
+    assert os.access(script, os.X_OK)
+    assert re.findall(r"^ *make (\w+)", script.read_text(), re.MULTILINE) == ["check", "test"]
