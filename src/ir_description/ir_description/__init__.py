@@ -26,6 +26,7 @@ from ir_description.part import Part
 from ir_description.power import PowerData
 from ir_description.program import CellSignal, PartPlaces, ProgramStep, Signal
 from ir_description.robot import Counterbalance, RobotModel
+from ir_description.urdf import robot_urdf
 
 __all__ = [
     "AllowedContact",
@@ -59,4 +60,5 @@ __all__ = [
     "load_cell",
     "load_power_data",
     "load_robot",
+    "robot_urdf",
 ]
