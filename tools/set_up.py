@@ -152,7 +152,7 @@ def stages(python_version: str) -> list[Stage]:
         ),
         Stage(
             "kernels",
-            "compiled core, for this processor and for any (about 1 minute)",
+            "compiled core, for this processor and for any x86-64 (about 1 minute)",
             fingerprint(kernel_files, python_version),
             lambda: any((KERNELS / "ir_kernels").glob("_baseline*.so")),
             ((*local, "--editable", str(KERNELS)),),
@@ -192,6 +192,8 @@ def set_up() -> None:
             raise
         print(f"{time.monotonic() - start:.0f} s", flush=True)
         stamp.write_text(stage.fingerprint)
+        if not stage.is_there():
+            print(f"  {stage.name}: the build left nothing; see {LOG.relative_to(ROOT)}", file=sys.stderr, flush=True)
 
 
 def main() -> int:
