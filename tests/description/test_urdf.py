@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 POSITION_TOLERANCE = 1e-9  # m; the centre-of-mass frame is kept in double precision
 GRAVITY = 9.80665
 TOOL_155KG = Load(
-    "tool_155kg", "tool", 155.0, (0.24, 0.0, 0.0), solid_box_inertia(155.0, (0.465, 0.66, 0.22))
+    "tool_155kg", "tool", 155.0, np.array([0.24, 0.0, 0.0]), solid_box_inertia(155.0, (0.465, 0.66, 0.22))
 )
 
 

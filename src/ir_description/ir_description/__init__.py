@@ -3,6 +3,7 @@
 from ir_description.body import Body
 from ir_description.capsule import Capsule
 from ir_description.cell import Cell, Task
+from ir_description.cell_review import Finding, check_cell
 from ir_description.cell_writer import cell_to_yaml
 from ir_description.equipment import AllowedContact, Equipment, EquipmentState, Station, Zone
 from ir_description.errors import (
@@ -40,6 +41,7 @@ __all__ = [
     "DescriptionFileError",
     "Equipment",
     "EquipmentState",
+    "Finding",
     "InvalidValueError",
     "Load",
     "Part",
@@ -57,6 +59,7 @@ __all__ = [
     "bundled_robots",
     "cell_from_yaml",
     "cell_to_yaml",
+    "check_cell",
     "load_cell",
     "load_power_data",
     "load_robot",

@@ -1,0 +1,170 @@
+"""Looks over a cell that is valid but may not be meant: what a colleague would ask before running it.
+
+No kinematics here; whether stations are reachable without collision is the planner's to say.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ir_description.arrays import Array
+from ir_description.cell import Cell
+from ir_description.convex_distance import capsule_distance, point_distance
+from ir_description.equipment import Zone
+from ir_description.library import load_power_data
+from ir_description.power import PowerData
+from ir_description.program import AUTO
+
+PAIRS_MAX = 200_000
+"""Zones are compared pairwise up to this many pairs."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An error will keep the program from running; a warning may be meant."""
+
+    severity: Literal["error", "warning"]
+    subject: str
+    sentence: str
+
+
+def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...]:
+    """Return what looks wrong in a cell, errors first. power: the controller's modes, the bundled ones if None."""
+    findings = [
+        *_base(cell),
+        *_stations(cell),
+        *_zones(cell),
+        *_signals(cell),
+        *_pauses(cell, power or load_power_data()),
+        *_parts(cell),
+    ]
+    return tuple(sorted(findings, key=lambda finding: finding.severity))
+
+
+def _base(cell: Cell) -> Iterator[Finding]:
+    """Capsules of base_link never move: what they touch, they touch for good."""
+    ignored = set(cell.ignored_pairs)
+    bodies = cell.bodies()
+    for capsule in cell.robot.capsules:
+        if capsule.link != 0:
+            continue
+        placed = capsule.placed(cell.base_pose)
+        for body in bodies:
+            if (capsule.name, body.name) in ignored:
+                continue
+            distance = capsule_distance(body, placed)
+            if distance <= 0.0:
+                yield Finding(
+                    "error",
+                    body.name,
+                    f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or name the pair in "
+                    "base_contacts if the robot is mounted on it",
+                )
+
+
+def _stations(cell: Cell) -> Iterator[Finding]:
+    shoulder = cell.base_pose @ cell.robot.joint_origin[0]
+    reach = _reach(cell)
+    bodies = [body for machine in cell.equipment for body in machine.world_bodies()]
+    for station in cell.stations:
+        point = station.pose[:3, 3]
+        for body in bodies:
+            depth = point_distance(body, point)
+            if depth < 0.0:
+                yield Finding("error", station.name, f"its tcp is {-depth:.3f} m inside {body.name}")
+        distance = float(np.linalg.norm(point - shoulder[:3, 3]))
+        if distance > reach:
+            yield Finding(
+                "error", station.name, f"its tcp is {distance:.3f} m from A1, the arm reaches {reach:.3f} m"
+            )
+        machine = cell.machine(station.equipment)
+        if not machine.enabled:
+            yield Finding("warning", station.name, f"its machine {machine.name} is switched off")
+        if station.allowed_contacts and not _inside(machine.zone, point):
+            yield Finding(
+                "warning",
+                station.name,
+                f"its tcp is outside the zone of {machine.name}; only inside do its allowed contacts hold",
+            )
+
+
+def _reach(cell: Cell) -> float:
+    """Upper bound of the distance of the tcp from the first joint's frame."""
+    offsets = np.linalg.norm(cell.robot.joint_origin[1:, :3, 3], axis=1)
+    return float(offsets.sum() + np.linalg.norm(cell.tcp[:3, 3]))
+
+
+def _inside(zone: Zone, point: Array) -> bool:
+    local = zone.pose[:3, :3].T @ (point - zone.pose[:3, 3])
+    return bool((np.abs(local) <= zone.size / 2.0).all())
+
+
+def _zones(cell: Cell) -> Iterator[Finding]:
+    """Zones that overlap make one machine stand in the way out of the other; without stations nobody goes in."""
+    machines = [machine for machine in cell.equipment if machine.enabled]
+    visited = {station.equipment for station in cell.stations}
+    zones = [machine.zone for machine in machines]
+    pairs = itertools.islice(itertools.combinations(range(len(zones)), 2), PAIRS_MAX)
+    for i, j in pairs:
+        if visited.isdisjoint((machines[i].name, machines[j].name)):
+            continue
+        if _boxes_overlap(zones[i], zones[j]):
+            yield Finding("warning", machines[i].name, f"its zone overlaps that of {machines[j].name}")
+
+
+def _boxes_overlap(first: Zone, second: Zone) -> bool:
+    """Separating axes of two boxes: their faces' normals and the cross products of their edges."""
+    A, B = first.pose[:3, :3], second.pose[:3, :3]
+    between = second.pose[:3, 3] - first.pose[:3, 3]
+    half = (first.size + second.size) / 2.0
+    if float(np.linalg.norm(between)) > float(np.linalg.norm(half)):
+        return False
+    crosses = np.cross(A.T[:, None], B.T[None]).reshape(-1, 3)
+    for axis in (*A.T, *B.T, *(c for c in crosses if np.linalg.norm(c) > 1e-9)):
+        reach = (np.abs(A.T @ axis) @ first.size + np.abs(B.T @ axis) @ second.size) / 2.0
+        if abs(float(axis @ between)) >= float(reach) - 1e-9:
+            return False
+    return True
+
+
+def _signals(cell: Cell) -> Iterator[Finding]:
+    answered = {signal.name: signal for signal in cell.signals}
+    set_somewhere = {(signal.name, signal.value) for step in cell.program for signal in step.set_signals}
+    for k, step in enumerate(cell.program, start=1):
+        for signal in step.wait_for:
+            source = answered[signal.name]
+            if source.initial == signal.value or (signal.name, signal.value) in set_somewhere:
+                continue
+            if (source.follows, signal.value) in set_somewhere:
+                continue
+            yield Finding(
+                "warning",
+                signal.name,
+                f"step {k} waits for {signal.text}, which nothing in the cell brings about",
+            )
+
+
+def _pauses(cell: Cell, power: PowerData) -> Iterator[Finding]:
+    for k, step in enumerate(cell.program, start=1):
+        if step.kind != "PAUSE" or step.power_mode == AUTO:
+            continue
+        mode = power.mode(step.power_mode)
+        if step.dwell < mode.time_min_pause:
+            yield Finding(
+                "warning",
+                f"step {k}",
+                f"the pause is {step.dwell:g} s, {mode.name} needs at least {mode.time_min_pause:g} s",
+            )
+
+
+def _parts(cell: Cell) -> Iterator[Finding]:
+    state = cell.parts_at_start()
+    for step in cell.program:
+        state = state.after(step)
+    if state.held:
+        yield Finding("warning", state.held, "is still held when the program ends")
