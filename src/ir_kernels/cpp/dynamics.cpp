@@ -1,3 +1,197 @@
-#include "bindings.hpp"
+// Binds the dynamics: the model is built once from arrays, its methods read and write NumPy buffers without the GIL.
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 
-void bind_dynamics(pybind11::module_&) {}
+#include <stdexcept>
+
+#include "bindings.hpp"
+#include "dynamics_bounds.hpp"
+#include "dynamics_kernels.hpp"
+
+namespace py = pybind11;
+
+namespace {
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+std::vector<double> flat(const py::object& data, const char* name) {
+  const Array array = data.attr(name).cast<Array>();
+  return {array.data(), array.data() + array.size()};
+}
+
+ir::ChainInput input_of(const py::object& data) {
+  ir::ChainInput in;
+  in.n = data.attr("n").cast<int>();
+  if (in.n < 1 || in.n > ir::kMaxJoints)
+    throw std::invalid_argument("robot has " + std::to_string(in.n) + " joints: the compiled core takes 1 to " +
+                                std::to_string(ir::kMaxJoints));
+  in.origin = flat(data, "origin");
+  in.axis = flat(data, "axis");
+  in.mass = flat(data, "mass");
+  in.com = flat(data, "com");
+  in.inertia = flat(data, "inertia");
+  const std::vector<double> gravity = flat(data, "gravity");
+  in.gravity = {gravity[0], gravity[1], gravity[2]};
+  in.rotor = flat(data, "rotor_inertia");
+  in.viscous = flat(data, "viscous");
+  in.coulomb = flat(data, "coulomb");
+  in.ratio = flat(data, "gear_ratio");
+  in.copper = flat(data, "copper_loss");
+  in.envelope_speed = flat(data, "envelope_speed");
+  in.envelope_torque = flat(data, "envelope_torque");
+  in.knots = static_cast<int>(in.envelope_speed.size()) / in.n;
+  const py::object cylinder = data.attr("counterbalance");
+  if (!cylinder.is_none()) {
+    in.balanced_joint = cylinder.attr("joint").cast<int>();
+    in.pivot = cylinder.attr("pivot").cast<std::array<double, 2>>();
+    in.eye = cylinder.attr("rod_eye").cast<std::array<double, 2>>();
+    in.piston_area = cylinder.attr("piston_area").cast<double>();
+    in.gas_volume = cylinder.attr("gas_volume").cast<double>();
+    in.charge_pressure = cylinder.attr("charge_pressure").cast<double>();
+    in.rod_length = cylinder.attr("rod_length_at_charge").cast<double>();
+    in.exponent = cylinder.attr("exponent").cast<double>();
+  }
+  return in;
+}
+
+class Dynamics {
+ public:
+  explicit Dynamics(const py::object& data) : Dynamics(input_of(data)) {}
+
+  py::tuple inverse_dynamics(const Array& q, const Array& qd, const Array& qdd) const {
+    return run(q, {&qd, &qdd}, [&](double* tau) {
+      return ir::inverse_dynamics(model_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
+    });
+  }
+  py::tuple inverse_dynamics_single(const Array& q, const Array& qd, const Array& qdd) const {
+    return run(q, {&qd, &qdd}, [&](double* tau) {
+      return ir::inverse_dynamics(single_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
+    });
+  }
+  py::tuple bias(const Array& q, const Array& qd) const {
+    return run(q, {&qd}, [&](double* tau) { return ir::bias(model_, q.data(), qd.data(), q.shape(0), tau); });
+  }
+  py::tuple gravity(const Array& q) const {
+    return run(q, {}, [&](double* tau) { return ir::bias(model_, q.data(), nullptr, q.shape(0), tau); });
+  }
+  py::tuple counterbalance(const Array& q) const {
+    return run(q, {}, [&](double* tau) { return ir::counterbalance(model_, q.data(), q.shape(0), tau); });
+  }
+  py::tuple forward_dynamics(const Array& q, const Array& qd, const Array& tau) const {
+    return run(q, {&qd, &tau}, [&](double* qdd) {
+      return ir::forward_dynamics(model_, q.data(), qd.data(), tau.data(), q.shape(0), qdd);
+    });
+  }
+  py::tuple torque_limit(const Array& qd) const {
+    return run(qd, {}, [&](double* limit) { return envelope_.limits(qd.data(), qd.shape(0), limit); });
+  }
+  py::tuple axis_power(const Array& qd, const Array& tau) const {
+    return run(qd, {&tau}, [&](double* power) {
+      return ir::axis_power(model_, qd.data(), tau.data(), qd.shape(0), power);
+    });
+  }
+  py::tuple mass_matrix(const Array& q) const {
+    check(q, {});
+    Array H = cube(q.shape(0));
+    bool finite;
+    {
+      py::gil_scoped_release released;
+      finite = ir::mass_matrix(model_, q.data(), q.shape(0), H.mutable_data());
+    }
+    return py::make_tuple(H, finite);
+  }
+  py::tuple torque_gradients(const Array& q, const Array& qd, const Array& qdd) const {
+    check(q, {&qd, &qdd});
+    Array of_q = cube(q.shape(0)), of_qd = cube(q.shape(0)), of_qdd = cube(q.shape(0));
+    bool finite;
+    {
+      py::gil_scoped_release released;
+      finite = ir::torque_gradients(model_, q.data(), qd.data(), qdd.data(), q.shape(0), of_q.mutable_data(),
+                                    of_qd.mutable_data(), of_qdd.mutable_data());
+    }
+    return py::make_tuple(py::make_tuple(of_q, of_qd, of_qdd), finite);
+  }
+
+  // upper, sampled, time (n,) and the number of intervals
+  py::tuple torque_bounds(const Array& coefficients, const Array& durations, double tolerance, long most) const {
+    if (coefficients.ndim() != 3 || coefficients.shape(1) != model_.n || durations.ndim() != 1 ||
+        durations.shape(0) != coefficients.shape(0) || coefficients.shape(2) > ir::kMaxTerms)
+      throw std::invalid_argument("coefficients have to be (S, n, d + 1) and durations (S,)");
+    ir::TorqueBounds bounds;
+    {
+      py::gil_scoped_release released;
+      bounds = ir::torque_bounds(model_, envelope_, coefficients.data(), durations.data(), coefficients.shape(0),
+                                 static_cast<int>(coefficients.shape(2)), tolerance, most);
+    }
+    const auto n = static_cast<py::ssize_t>(model_.n);
+    return py::make_tuple(Array(n, bounds.upper.data()), Array(n, bounds.sampled.data()), Array(n, bounds.time.data()),
+                          bounds.intervals);
+  }
+
+ private:
+  explicit Dynamics(const ir::ChainInput& in)
+      : model_(ir::build_model(in)),
+        single_(ir::to_single(model_)),
+        envelope_(in.n, in.knots, in.envelope_speed, in.envelope_torque) {}
+
+  void check(const Array& first, std::initializer_list<const Array*> others) const {
+    bool fits = first.ndim() == 2 && first.shape(1) == model_.n;
+    for (const Array* other : others)
+      fits = fits && other->ndim() == 2 && other->shape(0) == first.shape(0) && other->shape(1) == model_.n;
+    if (!fits) throw std::invalid_argument("arrays have to be (N, n) of one length");
+  }
+  Array cube(py::ssize_t N) const { return Array({N, py::ssize_t(model_.n), py::ssize_t(model_.n)}); }
+
+  template <class Function>
+  py::tuple run(const Array& first, std::initializer_list<const Array*> others, Function function) const {
+    check(first, others);
+    Array result({first.shape(0), first.shape(1)});
+    double* out = result.mutable_data();
+    bool finite;
+    {
+      py::gil_scoped_release released;
+      finite = function(out);
+    }
+    return py::make_tuple(result, finite);
+  }
+
+  ir::Model<double> model_;
+  ir::Model<float> single_;
+  ir::Envelope envelope_;
+};
+
+py::tuple dc_bus(const Array& power, const Array& dt, double capacity, const std::string& regeneration,
+                 double stored) {
+  if (power.ndim() != 2 || dt.ndim() != 1 || dt.shape(0) != power.shape(0))
+    throw std::invalid_argument("axis_power has to be (N, n) and dt (N,)");
+  const ir::Regeneration kind = regeneration == "shared" ? ir::Regeneration::kShared
+                                : regeneration == "none" ? ir::Regeneration::kNone
+                                                         : ir::Regeneration::kFedBack;
+  const py::ssize_t N = power.shape(0);
+  Array mains(N), burnt(N), level(N);
+  double *m = mains.mutable_data(), *b = burnt.mutable_data(), *l = level.mutable_data();
+  {
+    py::gil_scoped_release released;
+    ir::dc_bus(power.data(), dt.data(), N, static_cast<int>(power.shape(1)), capacity, kind, stored, m, b, l);
+  }
+  return py::make_tuple(mains, burnt, level);
+}
+
+}  // namespace
+
+void bind_dynamics(py::module_& m) {
+  py::class_<Dynamics>(m, "Dynamics", py::module_local())
+      .def(py::init<const py::object&>())
+      .def("inverse_dynamics", &Dynamics::inverse_dynamics)
+      .def("inverse_dynamics_single", &Dynamics::inverse_dynamics_single)
+      .def("bias", &Dynamics::bias)
+      .def("gravity", &Dynamics::gravity)
+      .def("counterbalance", &Dynamics::counterbalance)
+      .def("forward_dynamics", &Dynamics::forward_dynamics)
+      .def("torque_limit", &Dynamics::torque_limit)
+      .def("axis_power", &Dynamics::axis_power)
+      .def("mass_matrix", &Dynamics::mass_matrix)
+      .def("torque_gradients", &Dynamics::torque_gradients)
+      .def("torque_bounds", &Dynamics::torque_bounds);
+  m.def("dc_bus", &dc_bus);
+}

@@ -1,0 +1,69 @@
+// A serial chain in the form that costs least per sample: modified Denavit-Hartenberg frames and base inertial
+// parameters (Khalil, Kleinfinger 1986, 1987). Built once per robot and load, read by every recursion.
+#pragma once
+
+#include <array>
+#include <vector>
+
+namespace ir {
+
+constexpr int kMaxJoints = 16;
+
+using Vec3 = std::array<double, 3>;
+using Mat3 = std::array<Vec3, 3>;
+
+// What the model is built from: see ir_kernels/dynamics_data.py.
+struct ChainInput {
+  int n = 0;
+  std::vector<double> origin, axis, mass, com, inertia;
+  Vec3 gravity{};
+  std::vector<double> rotor, viscous, coulomb, ratio, copper, envelope_speed, envelope_torque;
+  int knots = 0;
+  int balanced_joint = -1;
+  std::array<double, 2> pivot{}, eye{};
+  double piston_area = 0, gas_volume = 0, charge_pressure = 0, rod_length = 0, exponent = 0;
+};
+
+// Frame i from frame i-1: Rx(alpha) Tx(a) Rz(q + theta0) Tz(d). In the link: no mass, first moment (hx, hy, 0), inertia
+// about the origin without yy: what turns with the joint but looks the same at every angle has moved to the link before.
+template <class T>
+struct Joint {
+  enum Turn { kParallel, kPerpendicular, kAny };
+  Turn turn;
+  T cos_alpha, sin_alpha;
+  T r[3];  // origin of frame i in frame i-1
+  bool has[3], has_r;
+  T theta0;
+  T hx, hy;
+  T xx, xy, xz, yz, zz;
+  bool has_hx, has_hy, products;  // what a robot doesn't have isn't computed
+};
+
+template <class T>
+struct Drive {
+  T rotor, viscous, coulomb, ratio, copper_at_joint;  // copper losses in W per Nm^2 of joint torque
+};
+
+// Torque of the counterbalance: g(|P - B|^2) times the lever, g as a polynomial fitted to rounding (gas law, length).
+template <class T>
+struct Balance {
+  static constexpr int kTerms = 20;
+  int joint = -1;
+  T lever_cos, lever_sin;    // of cos and sin (q + theta0)
+  T square_cos, square_sin;  // |P - B|^2, centred and scaled to [-1, 1]
+  T coefficient[kTerms];
+};
+
+template <class T>
+struct Model {
+  int n = 0;
+  Joint<T> joint[kMaxJoints];
+  Drive<T> drive[kMaxJoints];
+  Balance<T> balance;
+  T lift[3];  // minus the acceleration of free fall, in frame 0
+};
+
+Model<double> build_model(const ChainInput& input);
+Model<float> to_single(const Model<double>& model);
+
+}  // namespace ir
