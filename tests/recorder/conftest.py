@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from ir_description import cell_from_yaml, load_power_data
-from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
 from ir_msgs.msg import ControllerState, PlannedMovement, PlcOutputs, PowerState, ProgramState
 from ir_msgs_py.power import Mode
 from ir_recorder.qos import QosOffer
@@ -22,6 +20,9 @@ from ir_recorder.writer import RecordingWriter
 from mcap_ros2._dynamic import serialize_dynamic
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
+
+from ir_description import cell_from_yaml, load_power_data
+from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
 
 CELL_YAML = """
 format: ir_cell/1
@@ -78,6 +79,7 @@ program:
 START_NS = 1_700_000_000_000_000_000
 JOINT_DT_NS = 2_000_000
 POWER_DT_NS = 10_000_000
+EXACT = ("sensor_msgs/msg/JointState", "ir_msgs/msg/PowerState", "diagnostic_msgs/msg/DiagnosticArray")
 JOINT_NAMES = [f"joint_a{i}" for i in range(1, 7)]
 TABLE_2_MODES = {
     Mode.STAND_ON_MOTORS: "stand_on_motors",
@@ -93,8 +95,14 @@ def stamp(ns: int) -> Time:
 
 
 def _encoder(kind: str) -> Callable[[Any], bytes]:
-    """rclpy's serialize_message is quick but leaves stray bytes behind short sequences; the middleware doesn't."""
-    if kind in ("sensor_msgs/msg/JointState", "ir_msgs/msg/PowerState", "diagnostic_msgs/msg/DiagnosticArray"):
+    """rclpy's serialize_message is quick but leaves stray bytes behind short sequences; the middleware
+    doesn't.
+    """
+    if kind in (
+        "sensor_msgs/msg/JointState",
+        "ir_msgs/msg/PowerState",
+        "diagnostic_msgs/msg/DiagnosticArray",
+    ):
         return serialize_message
     return serialize_dynamic(kind, SchemaLibrary().schema(kind).text)[kind]
 
@@ -237,7 +245,9 @@ class _Recorder:
         if phase.step is not None:
             self._event(phase, index, len(steps), "ended")
 
-    def _power(self, phase: Phase, ns: int, mains: Any, axis: Any, bus: Any, tau: Any, base: float, k: int) -> None:
+    def _power(
+        self, phase: Phase, ns: int, mains: Any, axis: Any, bus: Any, tau: Any, base: float, k: int
+    ) -> None:
         part = slice(k - 4, k + 1)
         power = float(mains[part].mean())
         self.energy += power * POWER_DT_NS * 1e-9
@@ -269,7 +279,9 @@ PRESS = np.radians([34.0, -55.0, 90.0, 0.0, 50.0, -30.0])
 
 
 def demo_run(rest: float = 0.4, move: float = 1.5) -> Run:
-    """Table II at machine home without and with the tool, then a program of three movements and two pauses."""
+    """Table II at machine home without and with the tool, then a program of three movements and two
+    pauses.
+    """
     run = Run()
     for load in ("none", "gripper"):
         run.rest(rest, Mode.STAND_ON_MOTORS, HOME, load)
@@ -278,19 +290,23 @@ def demo_run(rest: float = 0.4, move: float = 1.5) -> Run:
         run.rest(rest, Mode.BUS_POWER_OFF, HOME, load)
         run.rest(rest, Mode.HIBERNATION, HOME, load)
         run.rest(rest / 2, Mode.FROM_HIBERNATION, HOME, load, Mode.STAND_ON_MOTORS)
-    tool, both = "gripper", "gripper+part"
-    run.move(move, HOME, TABLE, tool, PlannedMovement(kind="regional", from_station="home", to_station="table", attach="part"))
-    run.move(move, TABLE, PRESS, both, PlannedMovement(kind="service_entry", from_station="table", to_station="press", detach="part"))
-    run.pause(rest, Mode.STAND_ON_MOTORS, PRESS, tool, "press", "STAND_ON_MOTORS")
-    run.pause(2 * rest, Mode.BUS_POWER_OFF, PRESS, tool, "press", "BUS_POWER_OFF")
-    run.move(move, PRESS, HOME, tool, PlannedMovement(kind="service_exit", from_station="press", to_station="home"))
+    fetch = PlannedMovement(kind="regional", from_station="home", to_station="table", attach="part")
+    bring = PlannedMovement(kind="service_entry", from_station="table", to_station="press", detach="part")
+    leave = PlannedMovement(kind="service_exit", from_station="press", to_station="home")
+    run.move(move, HOME, TABLE, "gripper", fetch)
+    run.move(move, TABLE, PRESS, "gripper+part", bring)
+    run.pause(rest, Mode.STAND_ON_MOTORS, PRESS, "gripper", "press", "STAND_ON_MOTORS")
+    run.pause(2 * rest, Mode.BUS_POWER_OFF, PRESS, "gripper", "press", "BUS_POWER_OFF")
+    run.move(move, PRESS, HOME, "gripper", leave)
     return run
 
 
 @pytest.fixture(scope="session")
 def demo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A whole run, a few seconds long."""
-    return demo_run().record(tmp_path_factory.mktemp("recording") / "demo.mcap", facts={"hibernation": "shortened"})
+    return demo_run().record(
+        tmp_path_factory.mktemp("recording") / "demo.mcap", facts={"hibernation": "shortened"}
+    )
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
+from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.status import StatusCode
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException
@@ -28,7 +29,7 @@ from rclpy.utilities import remove_ros_args
 from ir_msgs_py import names
 from ir_recorder.cell_files import cell_files
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
-from ir_recorder.parameters import declare_settings
+from ir_recorder.parameters import declared_settings
 from ir_recorder.qos import QosOffer, request_for
 from ir_recorder.session import CellFiles, RecordingSession
 from ir_recorder.settings import RecorderSettings
@@ -51,7 +52,7 @@ class RecorderNode(Node):
         self, settings: RecorderSettings | None = None, writer: OpenWriter = open_writer, **options: Any
     ) -> None:
         super().__init__(names.RECORDER, **options)
-        self._settings = settings or declare_settings(self)
+        self._settings = settings or declared_settings(self)
         self._open_writer = writer
         self._session: RecordingSession | None = None
         self._selection = TopicSelection()
@@ -68,7 +69,22 @@ class RecorderNode(Node):
         self.create_timer(self._settings.discovery_period, self._discover)
         self.create_timer(1.0, self._each_second)
         if self._settings.path:
-            self.start(self._settings.path, self._settings.overwrite, self._settings.topics)
+            self.start(self._settings.path, self._settings.overwrite)
+
+    @property
+    def messages(self) -> int:
+        """How many messages the running recording holds."""
+        return self._session.messages if self._session is not None else 0
+
+    @property
+    def cell_attached(self) -> bool:
+        """Whether the running recording holds the cell."""
+        return self._session is not None and self._session.cell_attached
+
+    @property
+    def failure(self) -> str:
+        """Why the last recording ended on its own, "" when it didn't."""
+        return self._failure
 
     def start(self, path: str, overwrite: bool = False, topics: Sequence[str] = (), cell: str = "") -> str:
         """Opens a recording and returns its absolute path; PathError or WriteError when it can't."""
@@ -78,7 +94,9 @@ class RecorderNode(Node):
         files = cell_files(name) if name else None
         writer = self._open_writer(path, overwrite)
         self._session = RecordingSession(writer, self._settings.named_facts, self._now())
-        self._selection = TopicSelection(tuple(topics) or self._settings.topics, self.get_namespace())
+        self._selection = TopicSelection(
+            tuple(t for t in topics if t) or self._settings.wanted_topics, self.get_namespace()
+        )
         self._passed_over.clear()
         self._lost, self._failure = 0, ""
         if files is not None:
@@ -271,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         return _close(node)
-    except RecorderError as error:
+    except (RecorderError, MsgsError) as error:
         _say(error)
     _close(node)
     return 1
@@ -293,5 +311,9 @@ def _close(node: RecorderNode | None) -> int:
     return 0
 
 
-def _say(error: RecorderError) -> None:
+def _say(error: Exception) -> None:
     sys.stderr.write(f"ir-record: {error}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

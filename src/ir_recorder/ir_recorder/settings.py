@@ -1,43 +1,49 @@
-"""Settings of the recorder node: one field each with its default, unit and sentence."""
+"""Settings of the recorder node; its ROS parameters derive from them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from ir_msgs_py.settings import check_settings, setting
 
 from ir_recorder.errors import RecorderError
 
 
 @dataclass(frozen=True)
 class RecorderSettings:
-    """What the recorder node may be told.
-
-    path: file to record into from the start, "" = wait for ~/start. overwrite: replace an existing file.
-    topics: names or patterns, empty = all topics of the cell. cell: name or file of the cell to attach, ""
-    = ask the planner. facts: "key=value" texts kept in the file and shown by the report. depth: messages
-    kept per subscription while the disk is busy. discovery_period [s]: how often new topics are looked for.
+    """What the recorder node may be told. An empty text in a list counts as nothing: ROS has no empty
+    lists.
     """
 
-    path: str = ""
-    overwrite: bool = False
-    topics: tuple[str, ...] = ()
-    cell: str = ""
-    facts: tuple[str, ...] = ()
-    depth: int = 2000
-    discovery_period: float = 0.1
+    path: str = setting("", "File to record into from the start; empty: wait for ~/start.", read_only=True)
+    overwrite: bool = setting(False, "Replace an existing file.", read_only=True)
+    topics: tuple[str, ...] = setting(
+        ("",), "Names or patterns of topics; empty: all topics of the cell.", read_only=True
+    )
+    cell: str = setting("", "Name or file of the cell to attach; empty: ask the planner.", read_only=True)
+    facts: tuple[str, ...] = setting(
+        ("",), "Texts key=value, kept in the file and shown by the report.", read_only=True
+    )
+    depth: int = setting(
+        2000, "Messages kept per topic while the disk is busy.", minimum=1, maximum=100_000, read_only=True
+    )
+    discovery_period: float = setting(
+        0.1, "Time between two looks for new topics.", unit="s", minimum=0.01, maximum=60.0, read_only=True
+    )
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "topics", tuple(self.topics))
-        object.__setattr__(self, "facts", tuple(self.facts))
-        if not 1 <= self.depth <= 100_000:
-            raise RecorderError(f"depth is {self.depth}, must be 1 to 100000 messages")
-        if not 0.01 <= self.discovery_period <= 60.0:
-            raise RecorderError(f"discovery_period is {self.discovery_period:g} s, must be 0.01 to 60 s")
+        check_settings(self)
         for fact in self.facts:
-            if "=" not in fact or "\0" in fact:
+            if fact and ("=" not in fact or "\0" in fact):
                 raise RecorderError(f"fact {fact[:80]!r} is not of the form key=value")
+
+    @property
+    def wanted_topics(self) -> tuple[str, ...]:
+        """The names and patterns, empty for all topics of the cell."""
+        return tuple(topic for topic in self.topics if topic)
 
     @property
     def named_facts(self) -> dict[str, str]:
         """The facts by key."""
-        pairs = (fact.partition("=") for fact in self.facts)
+        pairs = (fact.partition("=") for fact in self.facts if fact)
         return {key.strip(): value.strip() for key, _, value in pairs}

@@ -1,0 +1,201 @@
+"""The recorder node on real topics, in one process."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ir_msgs.srv import GetCell, StartRecording, StopRecording
+from ir_msgs_py.status import StatusCode
+from ir_recorder.errors import PathError, WriteError
+from ir_recorder.node import RecorderNode
+from ir_recorder.raw import read_raw
+from ir_recorder.settings import RecorderSettings
+from ir_recorder.writer import RecordingWriter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+
+LATCHED = QoSProfile(
+    depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+FAST = {"discovery_period": 0.01}
+
+
+@pytest.fixture
+def recorder(ros_context: Any, ros_executor: Any) -> RecorderNode:
+    return ros_executor.add_node(RecorderNode(RecorderSettings(**FAST), context=ros_context))
+
+
+@pytest.fixture
+def call(ros_node: Any, ros_executor: Any, wait_for: Any) -> Any:
+    def send(kind: Any, name: str, request: Any) -> Any:
+        client = ros_node.create_client(kind, name)
+        wait_for(client.service_is_ready)
+        future = client.call_async(request)
+        assert ros_executor.wait(future, 5.0)
+        return future.result()
+
+    return send
+
+
+def start(call: Any, path: Path, **fields: Any) -> Any:
+    request = StartRecording.Request(path=str(path), **fields)
+    return call(StartRecording, "/ir_recorder/start", request)
+
+
+def stop(call: Any) -> Any:
+    return call(StopRecording, "/ir_recorder/stop", StopRecording.Request())
+
+
+def test_latched_and_volatile_messages_arrive_byte_by_byte(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    description = ros_node.create_publisher(String, "/robot_description", LATCHED)
+    description.publish(String(data="<robot/>"))
+    joints = ros_node.create_publisher(JointState, "/joint_states", 100)
+    started = start(call, tmp_path / "a.mcap")
+    assert started.status.code == StatusCode.SUCCESS
+    wait_for(lambda: joints.get_subscription_count() and description.get_subscription_count())
+    for k in range(500):
+        message = JointState(name=["joint_a1"], position=[float(k)])
+        joints.publish(message)
+    wait_for(lambda: recorder.messages >= 501)
+    stopped = stop(call)
+    assert stopped.status.code == StatusCode.SUCCESS
+    assert stopped.path == str(tmp_path / "a.mcap")
+    raw = read_raw(tmp_path / "a.mcap")
+    assert raw.problems == ()
+    messages = [deserialize_message(m, JointState) for m in raw.channel("/joint_states").messages]
+    positions = [message.position[0] for message in messages]
+    assert positions == list(range(500))
+    assert b"<robot/>" in raw.channel("/robot_description").messages[0]
+    assert "transient_local" in raw.channel("/robot_description").qos
+
+
+def test_topics_of_the_nodes_are_recorded_and_others_are_not(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    ours = ros_node.create_publisher(Float64, "/ir_sim_driver/speed_scaling", 10)
+    other = ros_node.create_publisher(Float64, "/elsewhere", 10)
+    late_joiner = None
+    start(call, tmp_path / "b.mcap")
+    wait_for(ours.get_subscription_count)
+    late_joiner = ros_node.create_publisher(Float64, "/ir_planner/late", 10)
+    wait_for(late_joiner.get_subscription_count)
+    assert other.get_subscription_count() == 0
+    stop(call)
+
+
+def test_patterns_choose_other_topics(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    other = ros_node.create_publisher(Float64, "/elsewhere/value", 10)
+    joints = ros_node.create_publisher(JointState, "/joint_states", 10)
+    start(call, tmp_path / "c.mcap", topics=["/elsewhere/*"])
+    wait_for(other.get_subscription_count)
+    assert joints.get_subscription_count() == 0
+    stop(call)
+
+
+def test_a_taken_path_is_refused_and_the_node_lives_on(
+    recorder: RecorderNode, call: Any, tmp_path: Path
+) -> None:
+    taken = tmp_path / "taken.mcap"
+    taken.write_text("mine")
+    refused = start(call, taken)
+    assert refused.status.code == StatusCode.FAILURE
+    assert "taken.mcap is there already" in refused.status.message
+    assert taken.read_text() == "mine"
+    assert start(call, taken, overwrite=True).status.code == StatusCode.SUCCESS
+
+
+def test_a_second_start_names_the_running_recording(
+    recorder: RecorderNode, call: Any, tmp_path: Path
+) -> None:
+    start(call, tmp_path / "first.mcap")
+    second = start(call, tmp_path / "second.mcap")
+    assert second.status.code == StatusCode.FAILURE
+    assert "first.mcap" in second.status.message
+    assert not (tmp_path / "second.mcap").exists()
+
+
+def test_stop_without_a_recording_says_so(recorder: RecorderNode, call: Any) -> None:
+    answer = stop(call)
+    assert answer.status.code == StatusCode.FAILURE
+    assert answer.status.message == "nothing is being recorded"
+
+
+def test_a_full_disk_ends_the_recording_and_nothing_else(
+    ros_context: Any, ros_executor: Any, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    class FullWriter(RecordingWriter):
+        def write(self, *arguments: Any, **others: Any) -> None:
+            raise WriteError("No space left on device")
+
+    node = RecorderNode(
+        RecorderSettings(**FAST),
+        lambda path, overwrite: FullWriter(path, overwrite=overwrite),
+        context=ros_context,
+    )
+    ros_executor.add_node(node)
+    joints = ros_node.create_publisher(JointState, "/joint_states", 10)
+    start(call, tmp_path / "full.mcap")
+    wait_for(joints.get_subscription_count)
+    joints.publish(JointState())
+    wait_for(lambda: node.failure)
+    answer = stop(call)
+    assert answer.status.code == StatusCode.FAILURE
+    assert "No space left" in answer.status.message
+    assert start(call, tmp_path / "next.mcap").status.code == StatusCode.SUCCESS
+
+
+def test_the_planners_cell_is_attached(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    def answer(request: GetCell.Request, response: GetCell.Response) -> GetCell.Response:
+        response.status.code = int(StatusCode.SUCCESS)
+        response.cell_yaml, response.robot_description = "name: here", "<robot/>"
+        return response
+
+    ros_node.create_service(GetCell, "/ir_planner/get_cell", answer)
+    start(call, tmp_path / "cell.mcap")
+    wait_for(lambda: recorder.cell_attached)
+    stop(call)
+    raw = read_raw(tmp_path / "cell.mcap")
+    assert raw.attachment("cell.yaml") == b"name: here"
+    assert raw.attachment("robot.urdf") == b"<robot/>"
+
+
+def test_an_unknown_cell_is_refused_before_a_file_is_made(
+    recorder: RecorderNode, ros_executor: Any, tmp_path: Path
+) -> None:
+    with pytest.raises(PathError, match="nowhere"):
+        ros_executor.run(lambda: recorder.start(str(tmp_path / "d.mcap"), cell="nowhere"))
+    assert not (tmp_path / "d.mcap").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wait_for: Any) -> None:
+    path = tmp_path / "signals.mcap"
+    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+    command = [sys.executable, "-m", "ir_recorder.node", str(path), "--topics", "/rosout"]
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE)
+    try:
+        wait_for(
+            lambda: (path.exists() and path.stat().st_size) or process.poll() is not None, timeout=20.0
+        )
+        process.send_signal(number)
+        process.send_signal(number)  # a nervous second one
+        _, said = process.communicate(timeout=10.0)
+    finally:
+        process.kill()
+    assert process.returncode == 0, said
+    assert read_raw(path).problems == ()
+    assert read_raw(path).fact("version")
