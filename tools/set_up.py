@@ -193,7 +193,11 @@ def set_up() -> None:
         print(f"{time.monotonic() - start:.0f} s", flush=True)
         stamp.write_text(stage.fingerprint)
         if not stage.is_there():
-            print(f"  {stage.name}: the build left nothing; see {LOG.relative_to(ROOT)}", file=sys.stderr, flush=True)
+            print(
+                f"  {stage.name}: the build left nothing; see {LOG.relative_to(ROOT)}",
+                file=sys.stderr,
+                flush=True,
+            )
 
 
 def main() -> int:

@@ -1,0 +1,54 @@
+"""The launch package names what exists: executables, topics, parameters."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from pathlib import Path
+
+import yaml
+from ir_msgs_py import names
+
+ROOT = Path(__file__).resolve().parents[2]
+BRINGUP = ROOT / "ros_ws" / "src" / "ir_bringup"
+NODES = ("ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder")
+TOPICS = {value for key, value in vars(names).items() if key.isupper() and isinstance(value, str)}
+
+
+def test_the_launch_file_starts_executables_that_the_packages_declare() -> None:
+    tree = ast.parse((BRINGUP / "launch" / "cell.launch.py").read_text(encoding="utf-8"))
+    [launched] = [ast.literal_eval(n.value) for n in tree.body if isinstance(n, ast.Assign)]
+    assert launched == NODES
+    for node in launched:
+        setup = (ROOT / "src" / node / "setup.py").read_text(encoding="utf-8")
+        assert re.search(rf'"{node} = {node}(\.\w+)+:main"', setup), (
+            f"{node}/setup.py declares no script {node}"
+        )
+
+
+def test_the_parameter_file_speaks_to_the_nodes_only() -> None:
+    parameters = yaml.safe_load((BRINGUP / "config" / "cell.yaml").read_text(encoding="utf-8"))
+    assert set(parameters) <= {"/**", *(f"/**/{node}" for node in NODES)}
+    assert all(set(block) == {"ros__parameters"} for block in parameters.values())
+
+
+def test_views_show_topics_of_the_cell() -> None:
+    rviz = yaml.safe_load((BRINGUP / "rviz" / "cell.rviz").read_text(encoding="utf-8"))
+    displays = rviz["Visualization Manager"]["Displays"]
+    shown = {display["Topic"]["Value"] for display in displays if "Topic" in display}
+    layout = json.loads((BRINGUP / "foxglove" / "cell.json").read_text(encoding="utf-8"))
+    for panel in layout["configById"].values():
+        shown |= {path["value"].partition(".")[0].removeprefix("/") for path in panel.get("paths", ())}
+        shown |= {topic.removeprefix("/") for topic in panel.get("topics", ())}
+    assert shown
+    assert shown <= TOPICS
+
+
+def test_docker_installs_the_pinned_versions() -> None:
+    pins = set((ROOT / "requirements" / "constraints.txt").read_text().splitlines())
+    wanted = [
+        line for line in (ROOT / "docker" / "requirements.txt").read_text().splitlines() if "==" in line
+    ]
+    assert wanted
+    assert set(wanted) <= pins
