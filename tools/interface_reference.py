@@ -11,8 +11,8 @@ PAGE = ROOT / "docs" / "interface_reference.md"
 KINDS = {"srv": "Services", "action": "Actions", "msg": "Messages"}
 HEAD = """# Interface reference
 
-Written by `make docs` from the files of `ros_ws/src/ir_msgs`; edit those. Units are SI, angles radians. Names and topics of
-the nodes: [interfaces.md](interfaces.md).
+Written by `make docs` from the files of `ros_ws/src/ir_msgs`; edit those. Units are SI, angles radians.
+Which node has which service, topic and action: [interfaces.md](interfaces.md).
 """
 
 

@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 import yaml
+
 from ir_msgs_py import names
 
 ROOT = Path(__file__).resolve().parents[2]
