@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ir_description import bundled_cells, load_cell
 from ir_description.errors import DescriptionError
+
+from ir_description import bundled_cells, load_cell
 
 from .errors import CommandError
 from .terminal import table
@@ -16,7 +17,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add cell check and cell list."""
     cell = commands.add_parser("cell", help="check cell files, list the bundled cells")
     verbs = cell.add_subparsers(dest="verb", required=True)
-    check = verbs.add_parser("check", help="read a cell file and say what is wrong with it, with line numbers")
+    check = verbs.add_parser("check", help="read a cell file; say what is wrong with it, and where")
     check.add_argument("file", help="a path, or the name of a bundled cell")
     check.set_defaults(run=run_check)
     listing = verbs.add_parser("list", help="names of the bundled cells")
@@ -33,7 +34,9 @@ def run_check(arguments: argparse.Namespace) -> int:
         [machine.name, str(machine.zone.kind).lower(), str(len(machine.bodies)), machine.state or "-"]
         for machine in cell.equipment
     ]
-    sys.stdout.write(f"cell {cell.name}: robot {cell.robot.name}, tool {cell.tool.name if cell.tool else 'none'}\n")
+    sys.stdout.write(
+        f"cell {cell.name}: robot {cell.robot.name}, tool {cell.tool.name if cell.tool else 'none'}\n"
+    )
     sys.stdout.write(table(["equipment", "zone", "bodies", "state"], rows) + "\n")
     sys.stdout.write(
         f"stations: {', '.join(station.name for station in cell.stations) or 'none'}; "

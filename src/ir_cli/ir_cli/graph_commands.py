@@ -21,14 +21,14 @@ SHOWN_ELEMENTS = 128
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add call, echo and list."""
-    call = commands.add_parser("call", help="call a service: ir call /ir_planner/set_cell '{cell_file: demo}'")
+    call = commands.add_parser("call", help="call a service: call /ir_planner/get_cell '{}'")
     call.add_argument("service")
-    call.add_argument("values", nargs="*", help="[type] and the request as YAML, as `ros2 service call` takes it")
+    call.add_argument("values", nargs="*", help="[type] and request as YAML, as for `ros2 service call`")
     call.add_argument("--timeout", type=float, default=60.0, help="s to wait for the answer (60)")
     call.add_argument("--full", action="store_true", help="print long arrays whole")
     call.set_defaults(run=run_call)
 
-    echo = commands.add_parser("echo", help="print the messages of a topic: ir echo /ir_sim_driver/power_state")
+    echo = commands.add_parser("echo", help="print a topic's messages: echo /ir_sim_driver/power_state")
     echo.add_argument("topic")
     echo.add_argument("--once", action="store_true", help="one message, then end")
     echo.add_argument("--timeout", type=float, default=10.0, help="s to wait for the topic (10)")

@@ -42,10 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser(chosen: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="ir", description="Energy-aware planning for a robot among machines.")
+    parser = argparse.ArgumentParser(prog="ir", description="Energy-aware planning for industrial robots.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    modules = [COMMAND_MODULES[chosen]] if chosen in COMMAND_MODULES else dict.fromkeys(COMMAND_MODULES.values())
-    for module in modules:
+    wanted = [chosen] if chosen in COMMAND_MODULES else list(COMMAND_MODULES)
+    for module in dict.fromkeys(COMMAND_MODULES[command] for command in wanted):
         import_module(module).add_commands(commands)
     return parser
 

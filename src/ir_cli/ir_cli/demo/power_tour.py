@@ -1,7 +1,8 @@
-"""A tour through the power modes at machine home: what the paper's Table II measured, by PLC bits and one packet.
+"""A tour through the power modes at machine home, by PLC bits and Wake-on-LAN: the paper's Table II.
 
-For each load the robot rests on motors, on brakes, with the drive bus off and in hibernation, long enough for the
-mains meter to show a plateau. Hibernation takes the controller off the network: only Wake-on-LAN brings it back.
+For each load the robot rests on motors, on brakes, with the drive bus off and in hibernation, long enough
+for the mains meter to show a plateau. Hibernation takes the controller off the network: only Wake-on-LAN
+brings it back.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ from collections.abc import Callable, Sequence
 
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import SetLoad, SetPlcInput
-from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
 
 from ir_cli.errors import DemonstrationError
+from ir_msgs_py import names
 
 MODE_SECONDS = 30.0
 """Longest wait for a mode [s]; transitions of the demonstration take a few seconds."""

@@ -1,24 +1,26 @@
 """The demonstration: four nodes, one cell, from the cell file to the report.
 
-Transition times of hibernation and Bus Power Off are shortened by parameters, so that a person need not wait
-minutes for a controller to boot; the recording carries the facts and the report says so. The clock is never scaled.
+Pauses of the program and the transitions of hibernation and Bus Power Off are shortened, so that a person
+need not wait half an hour; the recording carries the facts and the report says so. The clock is never scaled.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from ir_description import Cell, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
-from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.answers import ProgramPlan
 from ir_msgs_py.ros.client import Client
-from ir_program_runner.wake_on_lan import WakeOnLan
+from ir_program_runner.settings import LinkSettings
+from ir_program_runner.wake_on_lan import magic_packet, send_packet
 
 from ir_cli.nodes import cell_nodes
 from ir_cli.processes import NodeProcesses
 from ir_cli.terminal import Progress
+from ir_description import Cell, cell_to_yaml, load_cell
+from ir_msgs_py import names
 
 from .outcome import Outcome, examine
 from .power_tour import PowerWatch, tour
@@ -32,7 +34,10 @@ TRANSITIONS = {
     "hibernation_minimum_stay": 2.0,
 }
 """Seconds; a real KR C4 takes 3/20 s for Bus Power Off and about 60/120 s for hibernation."""
+LONGEST_PAUSE = 12.0
+"""Seconds; longer pauses of the program are cut to this."""
 TOUR_STAY = 1.2
+"""Seconds in each power mode at machine home."""
 START_SECONDS = 30.0
 
 
@@ -40,23 +45,26 @@ class Demonstration:
     """One run: `run` returns what came out of it, or raises an error with a sentence."""
 
     def __init__(self, cell: str, out: Path, seed: int, progress: Progress) -> None:
-        self._cell_name, self._out, self._seed, self._progress = cell, out, seed, progress
-        self._cell: Cell = load_cell(cell)
+        self._out, self._seed, self._progress = out, seed, progress
+        self._cell = with_short_pauses(load_cell(cell), LONGEST_PAUSE)
 
     def run(self) -> Outcome:
         """Start the nodes, run the story, stop the nodes, examine the recording."""
         self._out.mkdir(parents=True, exist_ok=True)
-        recording = self._out / "demo.mcap"
+        recording, cell_file = self._out / "demo.mcap", self._out / "demo_cell.yaml"
+        cell_file.write_text(cell_to_yaml(self._cell))
         progress = self._progress
         progress.say(f"Demonstration of cell {self._cell.name}: real nodes over DDS, real time")
         nodes = NodeProcesses(self._out / "log", {})
-        facts = [f"shortened {name}={seconds:g} s" for name, seconds in TRANSITIONS.items()]
+        facts = [f"{name}={seconds:g} s" for name, seconds in TRANSITIONS.items()]
+        facts.append(f"longest pause={LONGEST_PAUSE:g} s")
         with nodes, Client(timeout=START_SECONDS, node_name="ir_demo") as client:
             progress.begin("start planner, driver, runner, recorder")
             nodes.start(
                 cell_nodes(
-                    self._cell_name,
-                    driver={**{f"transitions.{k}": v for k, v in TRANSITIONS.items()}, "load": "none"},
+                    str(cell_file.resolve()),
+                    planner={f"pauses.{name}": seconds for name, seconds in TRANSITIONS.items()},
+                    driver={f"transitions.{name}": seconds for name, seconds in TRANSITIONS.items()},
                     recorder={"facts": facts},
                 )
             )
@@ -96,7 +104,7 @@ class Demonstration:
         tool = self._cell.tool.name if self._cell.tool else "none"
         loads = ("none", tool) if tool != "none" else ("none",)
         watch = PowerWatch(client)
-        tour(client, watch, loads, TOUR_STAY, WakeOnLan().wake, self._progress.update)
+        tour(client, watch, loads, TOUR_STAY, wake, self._progress.update)
         self._progress.end("motors, brakes, Bus Power Off, hibernation, with and without the tool")
 
     def _drive(self, client: Client, plan: ProgramPlan) -> None:
@@ -108,3 +116,18 @@ class Demonstration:
             ),
         )
         self._progress.end(f"{run.executed} steps, {run.duration:.1f} s, {run.energy / 1000.0:.1f} kJ")
+
+
+def wake() -> None:
+    """Send the Wake-on-LAN packet that the program runner would send."""
+    link = LinkSettings()
+    send_packet(magic_packet(link.mac), link.wake_address, link.wake_port)
+
+
+def with_short_pauses(cell: Cell, longest: float) -> Cell:
+    """Cell whose program pauses no longer than `longest` [s]."""
+    steps = tuple(
+        replace(step, dwell=min(step.dwell, longest)) if step.kind == "PAUSE" else step
+        for step in cell.program
+    )
+    return replace(cell, program=steps)
