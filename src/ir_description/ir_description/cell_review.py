@@ -34,7 +34,7 @@ class Finding:
 
 
 def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...]:
-    """Return what looks wrong in a cell, errors first. power: the controller's modes, the bundled ones if None."""
+    """Return what looks wrong in a cell, errors first. power: the controller's modes; None: the bundled."""
     findings = [
         *_base(cell),
         *_stations(cell),
@@ -105,7 +105,7 @@ def _inside(zone: Zone, point: Array) -> bool:
 
 
 def _zones(cell: Cell) -> Iterator[Finding]:
-    """Zones that overlap make one machine stand in the way out of the other; without stations nobody goes in."""
+    """Overlapping zones put one machine in the way out of the other; without stations nobody goes in."""
     machines = [machine for machine in cell.equipment if machine.enabled]
     visited = {station.equipment for station in cell.stations}
     zones = [machine.zone for machine in machines]
