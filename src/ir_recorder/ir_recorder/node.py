@@ -21,7 +21,7 @@ from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.status import StatusCode
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
@@ -114,9 +114,10 @@ class RecorderNode(Node):
         if session is None:
             return None
         summary = session.finish()
-        self.get_logger().info(
-            f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, {self._lost} lost"
-        )
+        if self.context.ok():  # after a signal nobody hears the log any more
+            self.get_logger().info(
+                f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, {self._lost} lost"
+            )
         return summary
 
     def _on_start(self, request: Any, response: Any) -> Any:
@@ -283,14 +284,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rclpy.init(args=everything)
     node = None
     try:
+        executor = SingleThreadedExecutor()
         node = RecorderNode()
         if options.path:
             node.start(options.path, options.overwrite, options.topics, options.cell)
-        rclpy.spin(node)
+        executor.add_node(node)
+        executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         return _close(node)
     except (RecorderError, MsgsError) as error:
         _say(error)
+    except Exception:  # a signal ended the context in the middle of a call: rclpy raises nearly anything
+        if rclpy.ok():
+            raise
+        return _close(node)
     _close(node)
     return 1
 

@@ -56,6 +56,7 @@ class RecordingWriter:
         self._finished = False
         with self._storage():
             self._writer.start(profile="ros2", library="ir_recorder")
+            self._file.flush()  # a full disk shows at once
 
     @property
     def messages(self) -> int:
