@@ -1,7 +1,7 @@
 """The port between the controller and a robot, and what a robot did with its motors.
 
-Three kinds of steps of length dt: the motors follow a command (`track`), the mechanical brakes act (`brake`), or
-the brakes are closed and nothing moves (`rest`).
+Three kinds of steps of length dt: the motors follow a command (`track`), the mechanical brakes act
+(`brake`), or the brakes are closed and nothing moves (`rest`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from ir_sim_driver.arrays import Array
 
 
 class Work(NamedTuple):
-    """What the motors did in K steps: speed (K, n) [rad/s] in the middle of the step, torque (K, n) [Nm] at the joint."""
+    """What the motors did in K steps: speed (K, n) [rad/s] in the middle of the step, torque (K, n) [Nm] at
+    the joint.
+    """
 
     speed: Array
     torque: Array
@@ -28,8 +30,11 @@ class Backend(Protocol):
 
     q: Array
     qd: Array
-    torque: Array
     disturbance: Array | None
+
+    @property
+    def torque(self) -> Array:
+        """Motor torque (n,) [Nm] of the last step."""
 
     def reset(self, q: Array) -> None:
         """Stand still at q (n,), commanded to stay there."""

@@ -1,8 +1,8 @@
 """Computed torque with PD: the acceleration that brings the robot back onto the command.
 
-Command and robot are compared on the same grid of steps: speed is the difference of two commands, acceleration
-the difference of two speeds. The command's velocity and acceleration feed forward exactly, whatever its path time
-does, and there is nothing to differentiate by hand.
+Command and robot are compared on the same grid of steps: speed is the difference of two commands,
+acceleration the difference of two speeds. The command's velocity and acceleration feed forward exactly,
+whatever its path time does, and there is nothing to differentiate by hand.
 """
 
 from __future__ import annotations
@@ -10,28 +10,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.settings import check_settings, setting
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.errors import SettingsError
 
 
 @dataclass(frozen=True)
 class ControlSettings:
-    """Gains of the position loop.
+    """Gains of the position loop; the frequency is bounded by what a 1 kHz loop can do."""
 
-    natural_frequency [rad/s] and damping of the error; the frequency is bounded by what a 1 kHz loop can do.
-    """
-
-    natural_frequency: float = 100.0
-    damping: float = 1.0
+    natural_frequency: float = setting(
+        100.0,
+        "Natural frequency of the position error.",
+        unit="rad/s",
+        minimum=1.0,
+        maximum=300.0,
+        read_only=True,
+    )
+    damping: float = setting(1.0, "Damping of the position error.", minimum=0.3, maximum=2.0, read_only=True)
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.natural_frequency <= 300.0:
-            raise SettingsError(
-                f"natural_frequency is {self.natural_frequency:g} rad/s: it must be in [1, 300] rad/s"
-            )
-        if not 0.3 <= self.damping <= 2.0:
-            raise SettingsError(f"damping is {self.damping:g}: it must be in [0.3, 2]")
+        check_settings(self)
 
 
 class CommandFollower:
@@ -52,7 +51,9 @@ class CommandFollower:
         """Acceleration (n,) for the step that ends with the command q_next; the robot is at q, qd now."""
         speed = (q_next - self.command) * self._per_dt
         wanted: Array = (
-            (speed - self._speed) * self._per_dt + self._kd * (self._speed - qd) + self._kp * (self.command - q)
+            (speed - self._speed) * self._per_dt
+            + self._kd * (self._speed - qd)
+            + self._kp * (self.command - q)
         )
         self.command, self._speed = q_next, speed
         return wanted

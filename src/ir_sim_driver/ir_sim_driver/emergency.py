@@ -13,7 +13,9 @@ _SAMPLES = 400
 
 
 class Excursion:
-    """Collects configurations while the robot stops; `distance` is the farthest the tool was from the path ahead."""
+    """Collects configurations while the robot stops; `distance` is the farthest the tool was from the path
+    ahead.
+    """
 
     def __init__(self, tool: ToolPoint, path: Path | None, s: float, q: Array) -> None:
         self._tool = tool

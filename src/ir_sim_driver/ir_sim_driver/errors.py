@@ -2,9 +2,10 @@
 
 DriverError
 ├── SettingsError (ValueError)        a setting out of its range
-├── TrajectoryRefusedError            a trajectory that is not executed; code of control_msgs/FollowJointTrajectory
-├── RequestRefusedError               a service request that cannot be met; code of moveit_msgs/MoveItErrorCodes
-└── BackendError                      the physics gave up: not installed, disconnected or diverged
+├── TrajectoryRefusedError            a trajectory that is not executed; code of
+control_msgs/FollowJointTrajectory ├── RequestRefusedError               a service request that cannot be
+met; code of moveit_msgs/MoveItErrorCodes └── BackendError                      the physics gave up: not
+installed, disconnected or diverged
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""Trajectory execution, stepped: path time with speed scaling, hold, stop along the path, tolerances and the tube.
+"""Trajectory execution, stepped: path time with speed scaling, hold, stop along the path, tolerances and the
+tube.
 
-The semantics are those of ros2_controllers' joint_trajectory_controller; what it leaves open is in docs/driver.md.
+The semantics are those of ros2_controllers' joint_trajectory_controller; what it leaves open is in
+docs/driver.md.
 """
 
 from __future__ import annotations
@@ -35,6 +37,19 @@ class _Run:
     settling: int = 0
     stopping: bool = False
     deviation: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """Command and robot side by side: positions (n,), velocities (n,), the command's accelerations (n,)."""
+
+    command: Motion
+    q: Array
+    qd: Array
+    label: str
+    path_time: float
+    path_speed: float
+    deviation: float
 
 
 class Executor:
@@ -100,9 +115,10 @@ class Executor:
         """Use the dynamics of another load."""
         self._speed.dynamics = dynamics
 
-    def set_tool(self, tool: ToolPoint) -> None:
-        """Watch another tool point."""
-        self._tool = tool
+    def set_settings(self, settings: ExecutionSettings) -> None:
+        """Use other bounds from the next goal on."""
+        self._settings = settings
+        self._speed.set_stop_time(settings.stop_time)
 
     def motion(self) -> Motion:
         """The commanded motion now."""
@@ -116,6 +132,10 @@ class Executor:
         """The motion at the present place of the path at full path speed."""
         run = self._run
         return Motion(self.command, self._still, self._still) if run is None else run.route.path.motion(run.s)
+
+    def following(self, q: Array, qd: Array) -> Following:
+        """How the robot at q, qd (n,) follows."""
+        return Following(self.motion(), q, qd, self.label, self.path_time, self.path_speed, self.deviation)
 
     def start(self, goal_id: int, goal: TrajectoryGoal, route: Route, delay: float = 0.0) -> None:
         """Follow the route, which starts at the commanded motion; a running goal ends as preempted."""
@@ -139,7 +159,9 @@ class Executor:
         self._fresh = not moving
 
     def stop(self, code: ErrorCode, sentence: str, canceled: bool = False) -> None:
-        """Stop along the path; the goal ends so when the robot stands. A stop that is already on its way stays."""
+        """Stop along the path; the goal ends so when the robot stands. A stop that is already on its way
+        stays.
+        """
         if self._run is not None and not self._run.stopping:
             self._will_end(code, sentence, canceled)
             self._run.stopping = True
@@ -205,7 +227,8 @@ class Executor:
     def _broken(self, run: _Run, error: Array, qd: Array) -> str:
         if self.deviation > self._settings.tube:
             return (
-                f"the tool is {self.deviation * 1e3:.2f} mm from the commanded path at {self.path_time:.3f} s: at most "
+                f"the tool is {self.deviation * 1e3:.2f} mm from the commanded path at "
+                f"{self.path_time:.3f} s: at most "
                 f"{self._settings.tube * 1e3:g} mm; worst is {self._names[int(np.abs(error).argmax())]} with "
                 f"{error[int(np.abs(error).argmax())]:+.6f} rad; stopped on the path"
             )
@@ -223,7 +246,9 @@ class Executor:
             return
         run.settling += 1
         if run.settling * self._dt > run.goal_time:
-            self._will_end(ErrorCode.GOAL_TOLERANCE_VIOLATED, f"{sentence} {run.goal_time:g} s after the end", False)
+            self._will_end(
+                ErrorCode.GOAL_TOLERANCE_VIOLATED, f"{sentence} {run.goal_time:g} s after the end", False
+            )
             self._finish()
 
     def _will_end(self, code: ErrorCode, sentence: str, canceled: bool) -> None:

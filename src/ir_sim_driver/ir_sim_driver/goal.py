@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-
 from ir_msgs_py.trajectory import JointTrajectory
 
 
@@ -34,8 +33,9 @@ class JointTolerance:
 class TrajectoryGoal:
     """A trajectory with what the sender allows.
 
-    stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for the goal tolerance
-    after the end, 0 = the default. has_effort: points carry effort. multi_dof: number of multi-dof points.
+    stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for the goal
+    tolerance after the end, 0 = the default. has_effort: points carry effort. multi_dof: number of multi-dof
+    points.
     """
 
     trajectory: JointTrajectory
@@ -52,8 +52,8 @@ class TrajectoryGoal:
 class Outcome:
     """How goal `goal_id` ended.
 
-    canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp; energy [J] at the
-    mains while it ran.
+    canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp; energy
+    [J] at the mains while it ran.
     """
 
     goal_id: int

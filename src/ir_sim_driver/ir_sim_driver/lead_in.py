@@ -1,8 +1,8 @@
 """From where the command is onto a trajectory, without a jump.
 
 First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference (within the start
-tolerance) is closed before path time starts. First time 0 in motion: a polynomial bridges to the next point far
-enough away.
+tolerance) is closed before path time starts. First time 0 in motion: a polynomial bridges to the next point
+far enough away.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ _SAME = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A path and the path time [s] at which its trajectory starts; the first `lead` segments are not the trajectory's."""
+    """A path and the path time [s] at which its trajectory starts; the first `lead` segments are not the
+    trajectory's.
+    """
 
     path: Path
     offset: float
@@ -47,7 +49,8 @@ def route_onto(
     if now.qd.any():
         if len(durations) == 0:
             raise TrajectoryRefusedError(
-                ErrorCode.INVALID_GOAL, "the only point has time 0 s and the robot moves: give it a time above 0 s"
+                ErrorCode.INVALID_GOAL,
+                "the only point has time 0 s and the robot moves: give it a time above 0 s",
             )
         k = min(int(np.searchsorted(trajectory.times, settings.bridge_time)), len(durations))
         bridge = quintic(now, _motion_at_point(trajectory, k), float(trajectory.times[k]))
@@ -73,7 +76,10 @@ def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
     v = samples.qd[0] if trajectory.velocities is None else trajectory.velocities[k]
     a = samples.qdd[0] if trajectory.accelerations is None else trajectory.accelerations[k]
     if last:  # the robot rests there
-        v, a = (still if trajectory.velocities is None else v), (still if trajectory.accelerations is None else a)
+        v, a = (
+            (still if trajectory.velocities is None else v),
+            (still if trajectory.accelerations is None else a),
+        )
     return Motion(trajectory.positions[k], v, a)
 
 
@@ -85,8 +91,10 @@ def _check_start(
     if abs(delta[j]) > settings.start_tolerance:
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
-            f"{trajectory.joint_names[j]} starts at {trajectory.positions[0, j]:.6f} rad, {delta[j]:+.6f} rad from the "
-            f"commanded {now.q[j]:.6f} rad: at most {settings.start_tolerance:g} rad (or a first time above 0 s)",
+            f"{trajectory.joint_names[j]} starts at {trajectory.positions[0, j]:.6f} rad, "
+            f"{delta[j]:+.6f} rad from the "
+            f"commanded {now.q[j]:.6f} rad: at most {settings.start_tolerance:g} rad (or a first time "
+            "above 0 s)",
         )
     jump = _motion_at_point(trajectory, 0).qd - now.qd
     over = np.abs(jump) - settings.blend_time * acceleration_max

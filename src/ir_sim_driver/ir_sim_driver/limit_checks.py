@@ -1,4 +1,6 @@
-"""Does a path keep the limits of position, velocity, acceleration and torque? Sampled as it will be executed."""
+"""Does a path keep the limits of position, velocity, acceleration and torque? Sampled as it will be
+executed.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +30,8 @@ def check_limits(
     """Raise TrajectoryRefusedError naming joint, time, value, limit and excess of the first violation.
 
     Segments (S, n, 6) with durations (S,) [s], the first at time `start` [s] of the trajectory. dynamics: an
-    ir_kernels DynamicsModel with the present load. Samples every dt [s], coarser for paths of more than 400 000
-    steps, and every point.
+    ir_kernels DynamicsModel with the present load. Samples every dt [s], coarser for paths of more than 400
+    000 steps, and every point.
     """
     slack = 1.0 + settings.limit_slack
     for t, q, qd, qdd in _samples(coefficients, durations, start, dt):
@@ -42,7 +44,14 @@ def check_limits(
         ):
             excess = np.abs(value) - limit
             _refuse_first(
-                robot, t, value, np.broadcast_to(limit, value.shape), excess - limit * (margin - 1.0), excess, "needs", unit
+                robot,
+                t,
+                value,
+                np.broadcast_to(limit, value.shape),
+                excess - limit * (margin - 1.0),
+                excess,
+                "needs",
+                unit,
             )
         torque = dynamics.inverse_dynamics(q, qd, qdd)
         limits = dynamics.torque_limit(qd)
@@ -78,7 +87,8 @@ def _refuse_first(
     j = int(over[k].argmax())
     raise TrajectoryRefusedError(
         ErrorCode.INVALID_GOAL,
-        f"{robot.joint_names[j]} {verb} {value[k, j]:.6g} {unit} at {t[k]:.4f} s: the limit is {bound[k, j]:.6g} {unit}, "
+        f"{robot.joint_names[j]} {verb} {value[k, j]:.6g} {unit} at {t[k]:.4f} s: the limit is "
+        f"{bound[k, j]:.6g} {unit}, "
         f"exceeded by {excess[k, j]:.3g} {unit}",
     )
 
@@ -90,7 +100,9 @@ def check_jumps(
     c, T = coefficients, durations[:, None]
     if len(c) == 0:
         return
-    final = c[:, :, 1] + T * (2.0 * c[:, :, 2] + T * (3.0 * c[:, :, 3] + T * (4.0 * c[:, :, 4] + T * 5.0 * c[:, :, 5])))
+    final = c[:, :, 1] + T * (
+        2.0 * c[:, :, 2] + T * (3.0 * c[:, :, 3] + T * (4.0 * c[:, :, 4] + T * 5.0 * c[:, :, 5]))
+    )
     following = np.vstack((c[1:, :, 1], np.zeros(c.shape[1])))
     jump = following - final
     allowed = settings.blend_time * robot.acceleration_max
@@ -101,6 +113,7 @@ def check_jumps(
         time = start + float(durations[: k + 1].sum())
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
-            f"the velocity of {robot.joint_names[j]} jumps by {jump[k, j]:+.4f} rad/s at {time:.4f} s: at most "
+            f"the velocity of {robot.joint_names[j]} jumps by {jump[k, j]:+.4f} rad/s at {time:.4f} "
+            "s: at most "
             f"{allowed[j]:.4f} rad/s; give the points velocities",
         )

@@ -56,17 +56,25 @@ def carried(cell: Any, text: str) -> Carried:
                 f"load {name[:80]!r} is unknown: known are {', '.join((*sorted(known), NO_LOAD, CUSTOM))}",
             )
         if names.count(name) > 1:
-            raise RequestRefusedError(StatusCode.INVALID_OBJECT_NAME, f"load {name!r} is named more than once")
+            raise RequestRefusedError(
+                StatusCode.INVALID_OBJECT_NAME, f"load {name!r} is named more than once"
+            )
     return _within_payload(Carried(text, tuple(known[name] for name in names)), cell.robot)
 
 
-def custom_load(cell: Any, mass: float, com: Array, inertia: Array, always: float, drive_bus: float) -> Carried:
-    """A load from numbers [kg, m, kg m^2 (ixx ixy ixz iyy iyz izz or none), W]. Raises RequestRefusedError."""
+def custom_load(
+    cell: Any, mass: float, com: Array, inertia: Array, always: float, drive_bus: float
+) -> Carried:
+    """A load from numbers [kg, m, kg m^2 (ixx ixy ixz iyy iyz izz or none), W]. Raises
+    RequestRefusedError.
+    """
     limit = cell.robot.rated_payload
     if not (math.isfinite(mass) and 0.0 <= mass <= limit):
         raise RequestRefusedError(_PAYLOAD_CODE, f"mass is {mass:g} kg: it must be in [0, {limit:g}] kg")
     if inertia.size not in (0, 6):
-        raise RequestRefusedError(_PAYLOAD_CODE, f"inertia has {inertia.size} values: it must have 6, or none")
+        raise RequestRefusedError(
+            _PAYLOAD_CODE, f"inertia has {inertia.size} values: it must have 6, or none"
+        )
     if mass == 0.0:
         return Carried(CUSTOM, ())
     matrix = np.zeros((3, 3))
@@ -87,7 +95,7 @@ def combined(loads: tuple[Load, ...]) -> Load | None:
     if len(loads) < 2:
         return loads[0] if loads else None
     mass = sum(load.mass for load in loads)
-    com = sum(load.mass * np.array(load.com) for load in loads) / mass
+    com = np.sum([load.mass * np.array(load.com) for load in loads], axis=0) / mass
     inertia = np.zeros((3, 3))
     for load in loads:
         arm = np.array(load.com) - com
@@ -98,6 +106,7 @@ def combined(loads: tuple[Load, ...]) -> Load | None:
 def _within_payload(what: Carried, robot: Any) -> Carried:
     if what.mass > robot.rated_payload:
         raise RequestRefusedError(
-            _PAYLOAD_CODE, f"{what.text} weighs {what.mass:g} kg: the robot carries at most {robot.rated_payload:g} kg"
+            _PAYLOAD_CODE,
+            f"{what.text} weighs {what.mass:g} kg: the robot carries at most {robot.rated_payload:g} kg",
         )
     return what

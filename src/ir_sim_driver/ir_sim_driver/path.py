@@ -51,14 +51,16 @@ class Path:
         return self._at(segment, min(s - self._starts[segment], self._lengths[segment]))
 
     def motion(self, s: float) -> Motion:
-        """Position and derivatives at path time s; derivatives are zero before the start and after the end."""
+        """Position and derivatives at path time s; derivatives are zero before the start and after the
+        end.
+        """
         if s < 0.0 or s > self.duration or not self._starts:
             rest = np.zeros(len(self.start))
             return Motion(self.position(s), rest, rest)
         segment = bisect_right(self._starts, s) - 1
         t = min(s - self._starts[segment], self._lengths[segment])
         c = self._c[segment]
-        powers = t ** _DERIVATIVE
+        powers = t**_DERIVATIVE
         once = np.zeros(6)
         twice = np.zeros(6)
         once[1:] = _DERIVATIVE[1:] * powers[:5]

@@ -19,7 +19,8 @@ _TINY = 1e-12
 class PathSpeed:
     """Speed sd of the path time, from 0 to 1 and towards `target`.
 
-    dynamics: an ir_kernels DynamicsModel (torques along the path); stop_time [s]: the shortest stop from full speed.
+    dynamics: an ir_kernels DynamicsModel (torques along the path); stop_time [s]: the shortest stop from
+    full speed.
     """
 
     def __init__(self, dynamics: Any, acceleration_max: Array, stop_time: float, dt: float) -> None:
@@ -28,6 +29,10 @@ class PathSpeed:
         self._rate = 1.0 / stop_time
         self._dt = dt
         self.value = 0.0
+
+    def set_stop_time(self, stop_time: float) -> None:
+        """Take another shortest stop [s]."""
+        self._rate = 1.0 / stop_time
 
     def advance(self, target: float, motion: Motion | None) -> float:
         """Step towards the target; returns the path time [s] covered. motion: at the present path time."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 from ir_msgs_py.power import Mode, PowerMode
 
@@ -23,24 +24,21 @@ def mode_table(
     power: watts at the mains in a mode with the present load and posture.
     """
     motors = power(Mode.STAND_ON_MOTORS)
-    table = [
-        PowerMode(mode=Mode.STAND_ON_MOTORS, pe_mode_id=pe_ids[Mode.STAND_ON_MOTORS], power=motors, break_even=0.0)
-    ]
-    for rest in rests.values():
-        table.append(
-            PowerMode(
-                mode=rest.mode,
-                pe_mode_id=pe_ids[rest.mode],
-                power=power(rest.mode),
-                time_min_pause=rest.enter + rest.leave + rest.minimum_stay,
-                time_to_pause=rest.enter,
-                regular_time_to_operate=rest.leave,
-                time_min_length_of_stay=rest.minimum_stay,
-                energy_to_pause=0.0 if source is rest.mode else rest.enter * power(source),
-                energy_to_operate=rest.leave * motors,
-                break_even=0.0,
-            )
+    table = [PowerMode(mode=Mode.STAND_ON_MOTORS, pe_mode_id=pe_ids[Mode.STAND_ON_MOTORS], power=motors)]
+    table += [
+        PowerMode(
+            mode=rest.mode,
+            pe_mode_id=pe_ids[rest.mode],
+            power=power(rest.mode),
+            time_min_pause=rest.enter + rest.leave + rest.minimum_stay,
+            time_to_pause=rest.enter,
+            regular_time_to_operate=rest.leave,
+            time_min_length_of_stay=rest.minimum_stay,
+            energy_to_pause=0.0 if source is rest.mode else rest.enter * power(source),
+            energy_to_operate=rest.leave * motors,
         )
+        for rest in rests.values()
+    ]
     return tuple(_with_break_even(table))
 
 
@@ -60,7 +58,7 @@ def best_mode(table: tuple[PowerMode, ...], pause: float) -> PowerMode:
 def _with_break_even(table: list[PowerMode]) -> list[PowerMode]:
     """Pause from which each mode saves against the next shallower one; never shorter than its least pause."""
     result = table[:1]
-    for shallower, mode in zip(table, table[1:], strict=False):
+    for shallower, mode in pairwise(table):
         slope = shallower.power - mode.power
         start = energy_of(mode, 0.0) - energy_of(shallower, 0.0)
         pays = start / slope if slope > 0.0 else math.inf

@@ -1,40 +1,48 @@
 """The PLC's side of the controller: debounced levels, interlocks of AB, HIB and KS, and the mode switch.
 
-Rules of the KR C4 power management: the three bits count only in operating mode EXT, only one at a time, and never
-together with a PROFIenergy pause; a contradiction is ignored with a warning. A bit that is already 1 when the
-controller starts or wakes is ignored until it has been 0 once.
+Rules of the KR C4 power management: the three bits count only in operating mode EXT, only one at a time, and
+never together with a PROFIenergy pause; a contradiction is ignored with a warning. A bit that is already 1
+when the controller starts or wakes is ignored until it has been 0 once.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
+from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
 from ir_msgs_py.power import Mode
+from ir_msgs_py.settings import check_settings, setting
 
-from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.plc_bits import BITS, POWER_BITS, OperatingMode, PlcInputs
 
+POWER_BITS = ("ab", "hib", "ks")
+BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
 _BIT_OF_REST = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib"}
 
 
 @dataclass(frozen=True)
 class PlcSettings:
-    """How levels become facts.
+    """How levels become facts."""
 
-    debounce [s]: a level has to stay that long to count (emergency stop counts at once).
-    startup_window [s]: levels of the first full set count as "already 1 at the start" when it comes within this time.
-    """
-
-    debounce: float = 0.02
-    startup_window: float = 0.5
+    debounce: float = setting(
+        0.02,
+        "A level has to stay that long to count; a pressed emergency stop counts at once.",
+        unit="s",
+        minimum=0.0,
+        maximum=10.0,
+        read_only=True,
+    )
+    startup_window: float = setting(
+        0.5,
+        "Levels of the first full set count as already there at the start when it comes within this time.",
+        unit="s",
+        minimum=0.0,
+        maximum=60.0,
+        read_only=True,
+    )
 
     def __post_init__(self) -> None:
-        for name in ("debounce", "startup_window"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and 0.0 <= value <= 60.0):
-                raise SettingsError(f"{name} is {value:g} s: it must be in [0, 60] s")
+        check_settings(self)
 
 
 class Plc:
@@ -44,7 +52,9 @@ class Plc:
     drives_on, confirm, restart: rising edges seen in this step.
     """
 
-    def __init__(self, settings: PlcSettings, notices: Notices, mode: OperatingMode = OperatingMode.EXT) -> None:
+    def __init__(
+        self, settings: PlcSettings, notices: Notices, mode: OperatingMode = OperatingMode.EXT
+    ) -> None:
         self._settings, self._notices = settings, notices
         self.raw = PlcInputs(operating_mode=mode)
         self.levels = PlcInputs(operating_mode=mode)
@@ -65,7 +75,7 @@ class Plc:
         self._greeted = True
         for bit in BITS:
             self._set(bit, getattr(inputs, bit))
-        if inputs.operating_mode is not None:
+        if inputs.operating_mode is not OperatingMode.UNCHANGED:
             self.set_operating_mode(inputs.operating_mode)
 
     def set_bit(self, bit: str, level: bool) -> None:
@@ -83,7 +93,7 @@ class Plc:
         """The controller starts again: power bits that are 1 now are ignored until they have been 0."""
         self._stick(frozenset(bit for bit in POWER_BITS if getattr(self.raw, bit)))
         self._ages.clear()
-        self.levels = replace(self.raw, **dict.fromkeys(POWER_BITS, False))
+        self.levels = replace(self.raw, ab=False, hib=False, ks=False)
         self.rest = None
 
     def step(self, dt: float, pause_active: bool = False) -> None:
@@ -100,7 +110,7 @@ class Plc:
     def _set(self, bit: str, level: bool) -> None:
         if level == getattr(self.raw, bit):
             return
-        self.raw = replace(self.raw, **{bit: level})
+        self.raw = self.raw.with_bit(bit, level)
         if not level and bit in self._stuck:
             self._stuck -= {bit}
             return
@@ -110,7 +120,9 @@ class Plc:
         self._stuck |= bits
         if bits:
             names = ", ".join(sorted(bit.upper() for bit in bits))
-            self._notices.add(Level.WARN, f"PLC bit {names} is already 1 at the start: ignored until it has been 0")
+            self._notices.add(
+                Level.WARN, f"PLC bit {names} is already 1 at the start: ignored until it has been 0"
+            )
 
     def _debounce(self, dt: float) -> None:
         for bit in list(self._ages):
@@ -122,7 +134,7 @@ class Plc:
             urgent = bit == "emergency_stop" and level
             if urgent or self._ages[bit] >= self._settings.debounce - 1e-9:
                 del self._ages[bit]
-                self.levels = replace(self.levels, **{bit: level})
+                self.levels = self.levels.with_bit(bit, level)
                 if level:
                     self.drives_on |= bit == "drives_on"
                     self.confirm |= bit == "conf_mess"
@@ -145,5 +157,9 @@ class Plc:
         self.restart = False
         if on:
             self._notices.add(Level.WARN, f"PLC bit {names} ignored: {refusal}")
-        if self.operating_mode is OperatingMode.EXT and self.rest is not None and _BIT_OF_REST[self.rest] not in on:
+        if (
+            self.operating_mode is OperatingMode.EXT
+            and self.rest is not None
+            and _BIT_OF_REST[self.rest] not in on
+        ):
             self.rest = None

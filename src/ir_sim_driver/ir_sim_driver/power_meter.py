@@ -1,7 +1,8 @@
-"""The mains meter: base load by mode, axes through the common DC bus, energy that is the integral of the power.
+"""The mains meter: base load by mode, axes through the common DC bus, energy that is the integral of the
+power.
 
-P = P_controller(mode) + P_tool(mode) + P_drives + max(0, bus); axis power at the bus is torque times speed plus the
-copper loss (design of the drives: ir_kernels.power).
+P = P_controller(mode) + P_tool(mode) + P_drives + max(0, bus); axis power at the bus is torque times speed
+plus the copper loss (design of the drives: ir_kernels.power).
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ class BasePower:
     """Watts of controller, drives and tool in a mode; `data` is ir_description's PowerData."""
 
     def __init__(self, data: Any) -> None:
-        self._controller = {Mode[mode.name]: mode.controller_watts for mode in data.modes}
+        self._controller: dict[Mode, float] = {Mode[mode.name]: mode.controller_watts for mode in data.modes}
         self._drives = float(data.drives_and_brake_release)
         self.set_tool(0.0, 0.0)
 
     def set_tool(self, always: float, drive_bus: float) -> None:
         """Take the tool's watts: always, and more while the drive bus is up."""
-        self._always, self._drive_bus = always, drive_bus
+        self._always: float = always
+        self._drive_bus: float = drive_bus
 
     def of(self, level: Mode) -> float:
         """Watts in STAND_ON_MOTORS or a rest, without holding torque."""

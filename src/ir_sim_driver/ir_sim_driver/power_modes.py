@@ -5,39 +5,66 @@ Times come from the controller's data and are parameters; names and numbers are 
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from ir_msgs_py.power import Mode
+from ir_msgs_py.settings import check_settings, setting
 
 from ir_sim_driver.errors import SettingsError
 
 
 @dataclass(frozen=True)
 class TransitionSettings:
-    """Times [s] of the ways into and out of each rest, shortest stay in it, and the controller's own timers.
-
-    motors_to_brakes_in_program / _in_command: standing still on motors before the brakes close, in automatic and in
-    manual operation.
+    """Times of the ways into and out of each rest, the shortest stay in it, and the controller's own
+    timers.
     """
 
-    stand_on_brakes_enter: float = 0.3
-    stand_on_brakes_leave: float = 0.7
-    stand_on_brakes_minimum_stay: float = 1.0
-    bus_power_off_enter: float = 3.0
-    bus_power_off_leave: float = 20.0
-    bus_power_off_minimum_stay: float = 2.0
-    hibernation_enter: float = 60.0
-    hibernation_leave: float = 120.0
-    hibernation_minimum_stay: float = 120.0
-    motors_to_brakes_in_program: float = 20.0
-    motors_to_brakes_in_command: float = 10.0
+    stand_on_brakes_enter: float = setting(
+        0.3, "Motors to brakes.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    stand_on_brakes_leave: float = setting(
+        0.7, "Brakes to motors.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    stand_on_brakes_minimum_stay: float = setting(
+        1.0, "Shortest stay on brakes.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    bus_power_off_enter: float = setting(
+        3.0, "Into Bus Power Off.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    bus_power_off_leave: float = setting(
+        20.0, "Bus Power Off to motors.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    bus_power_off_minimum_stay: float = setting(
+        2.0, "Shortest Bus Power Off.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    hibernation_enter: float = setting(
+        60.0, "Into hibernation.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    hibernation_leave: float = setting(
+        120.0, "Hibernation to motors.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    hibernation_minimum_stay: float = setting(
+        120.0, "Shortest hibernation.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+    )
+    motors_to_brakes_in_program: float = setting(
+        20.0,
+        "Standing on motors before the brakes close, in AUT and EXT.",
+        unit="s",
+        minimum=0.0,
+        maximum=1e5,
+        read_only=True,
+    )
+    motors_to_brakes_in_command: float = setting(
+        10.0,
+        "Standing on motors before the brakes close, in T1 and T2.",
+        unit="s",
+        minimum=0.0,
+        maximum=1e5,
+        read_only=True,
+    )
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and 0.0 <= value <= 1e5):
-                raise SettingsError(f"{field.name} is {value:g} s: it must be in [0, 100000] s")
+        check_settings(self)
 
 
 @dataclass(frozen=True)
@@ -73,9 +100,22 @@ class Wish:
 
 NO_WISH = Wish()
 _INSTANT = 1e-6  # s; sums of steps are not exact
-_DEPTH = {Mode.STAND_ON_MOTORS: 0, Mode.MOVING: 0, Mode.STAND_ON_BRAKES: 1, Mode.BUS_POWER_OFF: 2, Mode.HIBERNATION: 3}
+_DEPTH = {
+    Mode.STAND_ON_MOTORS: 0,
+    Mode.MOVING: 0,
+    Mode.STAND_ON_BRAKES: 1,
+    Mode.BUS_POWER_OFF: 2,
+    Mode.HIBERNATION: 3,
+}
 _DRIVES_ARE_ON = frozenset(
-    {Mode.STAND_ON_MOTORS, Mode.MOVING, Mode.TO_BRAKES, Mode.FROM_BRAKES, Mode.STAND_ON_BRAKES, Mode.EMERGENCY_STOP}
+    {
+        Mode.STAND_ON_MOTORS,
+        Mode.MOVING,
+        Mode.TO_BRAKES,
+        Mode.FROM_BRAKES,
+        Mode.STAND_ON_BRAKES,
+        Mode.EMERGENCY_STOP,
+    }
 )
 OFF_THE_NETWORK = frozenset({Mode.HIBERNATION, Mode.FROM_HIBERNATION})
 """Modes in which the controller does not answer."""
@@ -115,19 +155,22 @@ def rests_of(settings: TransitionSettings) -> tuple[Rest, ...]:
 class PowerModes:
     """The state machine; `step` advances it by dt [s].
 
-    mode: present mode. source: the rest (or STAND_ON_MOTORS) that a transition left: its power counts while entering.
+    mode: present mode. source: the rest (or STAND_ON_MOTORS) that a transition left: its power counts while
+    entering.
     """
 
     def __init__(self, settings: TransitionSettings, start: Mode = Mode.STAND_ON_MOTORS) -> None:
         if start not in _DEPTH or start is Mode.MOVING:
-            raise SettingsError(f"the controller cannot start in {start.name}: known are motors, brakes and deeper rests")
+            raise SettingsError(
+                f"the controller cannot start in {start.name}: known are motors, brakes and deeper rests"
+            )
         self.settings = settings
         self.rests = {rest.mode: rest for rest in rests_of(settings)}
         self._by_transition = {rest.entering: rest for rest in self.rests.values()} | {
             rest.leaving: rest for rest in self.rests.values()
         }
-        self.mode = start
-        self.source = start
+        self.mode: Mode = start
+        self.source: Mode = start
         self.elapsed = 0.0
         self._wake = False
 

@@ -1,8 +1,8 @@
 """The robot in PyBullet, driven by motor torques within the envelope. The only file that knows PyBullet.
 
-Rotor inertia is up to 4000 times a link's own and can neither be fed back as a torque (it diverges in six steps)
-nor be added to the links. So every step solves qdd = (H + J_r)^-1 (tau - h - friction + counterbalance) and applies
-H qdd + h to the links: exact, and without saturation H is not even needed.
+Rotor inertia is up to 4000 times a link's own and can neither be fed back as a torque (it diverges in six
+steps) nor be added to the links. So every step solves qdd = (H + J_r)^-1 (tau - h - friction +
+counterbalance) and applies H qdd + h to the links: exact, and without saturation H is not even needed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _CHUNK = 4096
 class PyBulletBackend:
     """Implements Backend for `robot` standing at `base_pose` (4, 4).
 
-    urdf: makes the URDF text of the robot with one load (None: nothing attached); combine: makes one load of many.
+    urdf: makes the URDF text of the robot with a tuple of loads.
     Raises BackendError when PyBullet is missing or has diverged.
     """
 
@@ -53,7 +53,7 @@ class PyBulletBackend:
         self._zeros = [0.0] * self._n
         self._still: Array = np.zeros(self._n)
         self.disturbance: Array | None = None
-        self.torque: Array = self._still
+        self.torque = self._still
         self.q: Array = np.array(robot.machine_home, dtype=np.float64)
         self.qd: Array = self._still
         self._speed: Array = self._still
@@ -96,7 +96,12 @@ class PyBulletBackend:
         self._place_base()
         for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
             bullet.changeDynamics(
-                self._body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=client
+                self._body,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=client,
             )
             bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=client)
         for joint in self._joints:  # the built-in motors off
@@ -168,7 +173,9 @@ class PyBulletBackend:
         state = self._bullet.getLinkState(
             self._body, self._joints[link - 1], computeForwardKinematics=True, physicsClientId=self._client
         )
-        return np.array(state[0]), np.array(state[1])
+        position: Array = np.array(state[0])
+        quaternion: Array = np.array(state[1], dtype=np.float64)
+        return position, quaternion
 
     def _driven(self, torque: Array, resistance: Array) -> tuple[Array, Array]:
         """Torque on the links and acceleration under motor torque and disturbance."""
@@ -176,7 +183,7 @@ class PyBulletBackend:
         outer = torque - h - resistance
         if self.disturbance is not None:
             outer = outer + self.disturbance
-        qdd = np.linalg.solve(H + np.diag(self._drives.rotor_inertia), outer)
+        qdd: Array = np.linalg.solve(H + np.diag(self._drives.rotor_inertia), outer)
         return H @ qdd + h, qdd
 
     def _inverse_dynamics(self, qdd: Array) -> Array:
@@ -233,7 +240,7 @@ class PyBulletBackend:
 
 def _connect(dt: float) -> tuple[Any, int]:
     try:
-        import pybullet  # noqa: PLC0415  a missing PyBullet is reported when it is wanted
+        import pybullet  # a missing PyBullet is reported when it is wanted
     except ImportError as error:
         raise BackendError(f"PyBullet is not installed ({error}): use backend ideal") from error
     client = pybullet.connect(pybullet.DIRECT)
@@ -245,6 +252,6 @@ def _connect(dt: float) -> tuple[Any, int]:
 
 
 def _quaternion(R: Array) -> list[float]:
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415  slow import, needed once
+    from scipy.spatial.transform import Rotation  # slow import, needed once
 
     return [float(x) for x in Rotation.from_matrix(R).as_quat()]

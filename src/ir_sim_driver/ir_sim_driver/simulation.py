@@ -1,33 +1,35 @@
-"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains meter. No ROS.
+"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains meter. No
+ROS.
 
-One `step` is dt of plant time. Whoever steps it decides how fast time passes; nothing here sleeps or asks a clock.
+One `step` is dt of plant time. Whoever steps it decides how fast time passes; nothing here sleeps or asks a
+clock.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from ir_kernels.dynamics import DynamicsModel
-from ir_kernels.power import Regeneration
+from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.status import StatusCode
 
 from ir_sim_driver.arrays import Array
 from ir_sim_driver.backend import Backend
 from ir_sim_driver.emergency import Excursion
-from ir_sim_driver.errors import BackendError, RequestRefusedError, SettingsError, TrajectoryRefusedError
+from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.executor import Executor
 from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.loads import Carried
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.pause import best_mode, mode_table
-from ir_sim_driver.plc import Plc, PlcSettings
-from ir_sim_driver.plc_bits import ALL_OFF, OperatingMode, PlcOutputs
+from ir_sim_driver.plc import Plc
 from ir_sim_driver.power_meter import BasePower, PowerMeter
-from ir_sim_driver.power_modes import OFF_THE_NETWORK, PowerModes, TransitionSettings, Wish
+from ir_sim_driver.power_modes import OFF_THE_NETWORK, PowerModes, Wish
+from ir_sim_driver.simulation_settings import SimulationSettings
 from ir_sim_driver.tool_point import ToolPoint
 from ir_sim_driver.trajectory_checks import check_goal, check_trajectory, checked_route
 
@@ -36,27 +38,6 @@ _STANDING = 1e-3  # rad/s
 _HOME = 0.01  # rad
 _T1_SPEED = 0.25 * 0.98  # m/s at the tool; a margin because the path speed follows with bounded deceleration
 _MANUAL = (OperatingMode.T1, OperatingMode.T2)
-
-
-@dataclass(frozen=True)
-class SimulationSettings:
-    """dt [s]: step of plant and controller. start_mode: STAND_ON_MOTORS, STAND_ON_BRAKES, BUS_POWER_OFF or HIBERNATION.
-
-    enabling_switch: somebody holds it, so that programs may run in T1 and T2.
-    """
-
-    dt: float = 0.001
-    start_mode: Mode = Mode.STAND_ON_MOTORS
-    operating_mode: OperatingMode = OperatingMode.EXT
-    enabling_switch: bool = False
-    regeneration: Regeneration = "shared"
-    execution: ExecutionSettings = field(default_factory=ExecutionSettings)
-    transitions: TransitionSettings = field(default_factory=TransitionSettings)
-    plc: PlcSettings = field(default_factory=PlcSettings)
-
-    def __post_init__(self) -> None:
-        if not 1e-4 <= self.dt <= 0.01:
-            raise SettingsError(f"dt is {self.dt:g} s: it must be in [0.0001, 0.01] s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +55,20 @@ class Simulation:
     """
 
     def __init__(
-        self, cell: Any, data: Any, backend: Backend, load: Carried, settings: SimulationSettings | None = None
+        self,
+        cell: Any,
+        data: Any,
+        backend: Backend,
+        load: Carried,
+        settings: SimulationSettings | None = None,
     ) -> None:
         self.settings = settings = settings or SimulationSettings()
         self.cell, self.robot, self.backend = cell, cell.robot, backend
         self.notices = Notices()
-        self.plc = Plc(settings.plc, self.notices, settings.operating_mode)
-        self.modes = PowerModes(settings.transitions, settings.start_mode)
+        self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
+        self.modes = PowerModes(settings.transitions, settings.controller.rest_at_start)
         self.base = BasePower(data)
-        self.meter = PowerMeter(cell.robot, data, settings.dt, settings.regeneration)
+        self.meter = PowerMeter(cell.robot, data, settings.dt, settings.controller.regeneration_mode)
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
         self._pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
         backend.reset(np.array(cell.machine_home))
@@ -116,10 +102,11 @@ class Simulation:
         """Whether the controller answers; the mains meter always does."""
         return self.modes.mode not in OFF_THE_NETWORK
 
-    # -- what may be asked -------------------------------------------------------------------------------------------
+    # -- what may be asked ----------------------------------------------------------------------------------
 
     def vet(self, goal: TrajectoryGoal, now_ns: int) -> VettedGoal:
-        """Check all of a goal that does not depend on the robot's state. Takes its time, may run beside `step`.
+        """Check all of a goal that does not depend on the robot's state. Takes its time, may run beside
+        `step`.
 
         Raises TrajectoryRefusedError.
         """
@@ -129,12 +116,16 @@ class Simulation:
         return VettedGoal(checked, dynamics)
 
     def execute(self, vetted: VettedGoal, now_ns: int) -> int:
-        """Start a vetted goal and return its id; the goal that runs is preempted. Raises TrajectoryRefusedError."""
+        """Start a vetted goal and return its id; the goal that runs is preempted. Raises
+        TrajectoryRefusedError.
+        """
         refusal = self._refusal()
         if refusal:
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         if vetted.dynamics is not self.dynamics:
-            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "the load changed while the trajectory was checked")
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL, "the load changed while the trajectory was checked"
+            )
         goal, s = vetted.goal, self.settings
         route = checked_route(
             goal.trajectory, self.executor.motion(), self.robot, self.dynamics, s.execution, s.dt
@@ -172,7 +163,9 @@ class Simulation:
         return self.speed_scaling
 
     def start_pause(self, pause: float) -> PowerMode:
-        """PROFIenergy Start_Pause of `pause` [s]: go to the mode that takes least energy. Raises RequestRefusedError."""
+        """PROFIenergy Start_Pause of `pause` [s]: go to the mode that takes least energy. Raises
+        RequestRefusedError.
+        """
         if not (np.isfinite(pause) and pause > 0.0):
             raise RequestRefusedError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS, f"pause is {pause:g} s: it must be finite and above 0 s"
@@ -193,7 +186,9 @@ class Simulation:
         return chosen
 
     def end_pause(self) -> float:
-        """PROFIenergy End_Pause: back to motors; returns the seconds it takes, rest of the minimum stay included."""
+        """PROFIenergy End_Pause: back to motors; returns the seconds it takes, rest of the minimum stay
+        included.
+        """
         self.pause = None
         self._wanted_on = True
         return self.modes.time_to_ready()
@@ -223,13 +218,19 @@ class Simulation:
         self.settle_meter()
         self._carry(load)
 
+    def set_execution(self, settings: ExecutionSettings) -> None:
+        """Use other bounds of trajectories from the next goal on."""
+        self.settings = replace(self.settings, execution=settings)
+        self.executor.set_settings(settings)
+
     def wake(self) -> None:
         """A Wake-on-LAN packet for this controller came in. Does nothing unless it hibernates."""
         if self.modes.mode is Mode.HIBERNATION:
             self._wake = True
 
     def recover(self) -> str:
-        """Leave the emergency stop: release the brakes where the robot stands. Never moves or resumes anything.
+        """Leave the emergency stop: release the brakes where the robot stands. Never moves or resumes
+        anything.
 
         Returns a remark. Raises RequestRefusedError.
         """
@@ -249,12 +250,12 @@ class Simulation:
         """Let an outside torque (n,) [Nm] act on the joints until the next call; None ends it."""
         self.backend.disturbance = torque
 
-    # -- what may be read --------------------------------------------------------------------------------------------
+    # -- what may be read -----------------------------------------------------------------------------------
 
     def outputs(self) -> PlcOutputs:
         """Levels to the PLC; all off while the controller is off the network."""
         if not self.on_the_network:
-            return replace(ALL_OFF, operating_mode=self.plc.operating_mode)
+            return PlcOutputs(operating_mode=self.plc.operating_mode)
         mode = self.modes.mode
         return PlcOutputs(
             ab=mode in (Mode.BUS_POWER_OFF, Mode.TO_HIBERNATION),
@@ -270,7 +271,7 @@ class Simulation:
         """Bring the meter's reading up to the last step."""
         self.meter.settle(self.backend.work())
 
-    # -- time --------------------------------------------------------------------------------------------------------
+    # -- time -----------------------------------------------------------------------------------------------
 
     def step(self) -> None:
         """Let dt pass."""
@@ -324,7 +325,9 @@ class Simulation:
             self.last_excursion = self._excursion.distance()
             self._excursion = None
             self.notices.add(
-                Level.WARN, f"emergency stop: the tool left its path by {self.last_excursion * 1e3:.1f} mm; recover to go on"
+                Level.WARN,
+                f"emergency stop: the tool left its path by {self.last_excursion * 1e3:.1f} mm; "
+                "recover to go on",
             )
 
     def _scaling(self) -> float:
@@ -421,8 +424,11 @@ class Simulation:
             return f"drives not powered: {_name(rest)} is requested"
         if self._drives_off:
             return "drives not powered: drives_off was given, drives_on is needed"
-        if plc.operating_mode in _MANUAL and not self.settings.enabling_switch:
-            return f"operating mode is {plc.operating_mode.name}: programs need EXT or AUT, or the enabling switch"
+        if plc.operating_mode in _MANUAL and not self.settings.controller.enabling_switch:
+            return (
+                f"operating mode is {plc.operating_mode.name}: programs need EXT or AUT, or the "
+                "enabling switch"
+            )
         return ""
 
     def _carry(self, load: Carried) -> None:

@@ -42,8 +42,8 @@ class Tolerances:
 
 
 def _worst(names: Sequence[str], error: Array, bound: Array, what: str, unit: str) -> str:
-    over = np.abs(error) - bound
-    j = int(over.argmax())
-    if not over[j] > 0.0:
+    size = np.abs(error)
+    if (size <= bound).all():
         return ""
+    j = int((size - bound).argmax())
     return f"{names[j]} {what} error is {error[j]:+.6f} {unit}: the tolerance is {bound[j]:g} {unit}"

@@ -1,4 +1,6 @@
-"""How far the tool is from where it was commanded: a cheap bound first, the exact distance when it matters."""
+"""How far the tool is from where it was commanded: a cheap bound first, the exact distance when it
+matters.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ class ToolPoint:
         return positions
 
     def deviation(self, commanded: Array, q: Array) -> float:
-        """Distance [m] of the tcp at q from that at `commanded`; an upper bound where it is below EXACT_FROM."""
+        """Distance [m] of the tcp at q from that at `commanded`; an upper bound where it is below
+        EXACT_FROM.
+        """
         bound = float(self._reach @ np.abs(commanded - q))
         if bound <= EXACT_FROM:
             return bound

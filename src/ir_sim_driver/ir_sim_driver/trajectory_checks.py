@@ -20,8 +20,12 @@ _REST = 1e-6  # rad/s that still counts as standing
 _NS = 1e-9
 
 
-def check_goal(goal: TrajectoryGoal, joint_names: tuple[str, ...], settings: ExecutionSettings, now_ns: int) -> TrajectoryGoal:
-    """Return the goal in the robot's joint order. Raises TrajectoryRefusedError; knows nothing of the robot's state."""
+def check_goal(
+    goal: TrajectoryGoal, joint_names: tuple[str, ...], settings: ExecutionSettings, now_ns: int
+) -> TrajectoryGoal:
+    """Return the goal in the robot's joint order. Raises TrajectoryRefusedError; knows nothing of the
+    robot's state.
+    """
     if goal.multi_dof:
         raise _invalid(f"{goal.multi_dof} multi-dof points: the robot has joints only")
     if goal.has_effort:
@@ -64,7 +68,12 @@ def check_trajectory(
 
 
 def checked_route(
-    trajectory: JointTrajectory, now: Motion, robot: Any, dynamics: Any, settings: ExecutionSettings, dt: float
+    trajectory: JointTrajectory,
+    now: Motion,
+    robot: Any,
+    dynamics: Any,
+    settings: ExecutionSettings,
+    dt: float,
 ) -> Route:
     """Path from the commanded motion `now` along a trajectory that passed check_trajectory.
 
@@ -91,17 +100,22 @@ def _check_points(trajectory: JointTrajectory, robot: Any, settings: ExecutionSe
         )
 
 
-def _check_stamp(goal: TrajectoryGoal, trajectory: JointTrajectory, settings: ExecutionSettings, now_ns: int) -> None:
+def _check_stamp(
+    goal: TrajectoryGoal, trajectory: JointTrajectory, settings: ExecutionSettings, now_ns: int
+) -> None:
     if goal.stamp_ns == 0:
         return
     delay = (goal.stamp_ns - now_ns) * _NS
     if delay + trajectory.duration < 0.0:
         raise TrajectoryRefusedError(
             ErrorCode.OLD_HEADER_TIMESTAMP,
-            f"the trajectory ended {-delay - trajectory.duration:.3f} s ago by its header stamp: it must end in the future",
+            f"the trajectory ended {-delay - trajectory.duration:.3f} s ago by its header stamp: it "
+            "must end in the future",
         )
     if delay > settings.max_delay:
-        raise _invalid(f"the trajectory starts in {delay:.3f} s by its header stamp: at most {settings.max_delay:g} s")
+        raise _invalid(
+            f"the trajectory starts in {delay:.3f} s by its header stamp: at most {settings.max_delay:g} s"
+        )
 
 
 def _check_end(trajectory: JointTrajectory) -> None:
@@ -111,7 +125,8 @@ def _check_end(trajectory: JointTrajectory) -> None:
     j = int(np.abs(last).argmax())
     if abs(last[j]) > _REST:
         raise _invalid(
-            f"point {len(trajectory.times_ns) - 1} joint {j} ({trajectory.joint_names[j]}) ends with {last[j]:g} rad/s: "
+            f"point {len(trajectory.times_ns) - 1} joint {j} ({trajectory.joint_names[j]}) ends with "
+            f"{last[j]:g} rad/s: "
             "the last velocity must be 0 rad/s"
         )
 
@@ -125,7 +140,8 @@ def _check_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) ->
         value = getattr(tolerance, what)
         if not (math.isfinite(value) and (value >= 0.0 or value == -1.0)):
             raise _invalid(
-                f"{what} tolerance of {tolerance.name} is {value:g}: it must be at least 0 (0: default), or -1 (unbounded)"
+                f"{what} tolerance of {tolerance.name} is {value:g}: it must be at least 0 (0: "
+                "default), or -1 (unbounded)"
             )
 
 

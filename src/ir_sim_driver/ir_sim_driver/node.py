@@ -1,0 +1,412 @@
+"""The node: topics, the action and services of the driver; parse, call, map, reply."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import ControllerState, PowerState
+from ir_msgs.msg import PlcInputs as PlcInputsMsg
+from ir_msgs.msg import PlcOutputs as PlcOutputsMsg
+from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.plc import OperatingMode
+from ir_msgs_py.ros.conversions import (
+    plc_inputs_from_msg,
+    plc_inputs_to_msg,
+    plc_outputs_to_msg,
+    power_mode_to_msg,
+    power_state_to_msg,
+    status_to_msg,
+    time_to_msg,
+)
+from ir_msgs_py.status import Status, StatusCode
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+from ir_description import DescriptionError, robot_urdf
+from ir_msgs_py import names
+from ir_sim_driver.assembly import make_simulation
+from ir_sim_driver.diagnostics import report
+from ir_sim_driver.driver import Driver, Frame
+from ir_sim_driver.errors import DriverError, RequestRefusedError
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.goal import ErrorCode, Outcome
+from ir_sim_driver.loads import CUSTOM, carried, custom_load
+from ir_sim_driver.messages import (
+    controller_state,
+    fill_joint_state,
+    goal_from_action,
+    goal_from_trajectory,
+    points_of,
+    robot_markers,
+    status,
+)
+from ir_sim_driver.notices import Level
+from ir_sim_driver.parameters import DriverParameters
+from ir_sim_driver.real_time import GridThread, ScaledClock
+from ir_sim_driver.simulation import Simulation
+from ir_sim_driver.wake_on_lan import WakeListener
+
+_NS = 1_000_000_000
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_STREAM = QoSProfile(depth=100)
+_SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
+
+
+class SimDriver(Node):
+    """Node around a Driver. simulation: another core than the one the parameters describe.
+
+    Raises DriverError, DescriptionError or MsgsError when a parameter makes no sense.
+    """
+
+    def __init__(self, simulation: Simulation | None = None, **node_options: Any) -> None:
+        super().__init__(names.SIM_DRIVER, **node_options)
+        self._parameters = DriverParameters(self, self._change_refusal, self._execution_changed)
+        options = self._parameters.node
+        self._simulation = simulation or make_simulation(
+            options.cell, options.load, options.backend, self._parameters.simulation
+        )
+        self._joint_names = list(self._simulation.robot.joint_names)
+        steps = round(1.0 / (options.joint_state_rate * self._simulation.settings.dt))
+        self._driver = Driver(self._simulation, steps)
+        self._goals: dict[bytes, int] = {}
+        self._rates = (0, 0)
+        self._frame: Frame | None = None
+        self._open_topics()
+        self._open_requests()
+        self._listener = self._listen(options.wake_host, options.wake_port, options.mac)
+        own_time = options.real_time_factor != 1.0
+        clock = self.get_clock()
+        start = clock.now().nanoseconds
+        self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if own_time else None
+        self._plant = GridThread(
+            _NS // options.joint_state_rate,
+            ScaledClock(options.real_time_factor, start or _NS)
+            if own_time
+            else lambda: clock.now().nanoseconds,
+            self._tick,
+            self._clock_jumped,
+            self._plant_failed,
+            max_lag=float("inf") if own_time else 5.0,
+        )
+        self._plant.start()
+
+    @property
+    def wake_port(self) -> int:
+        """UDP port that Wake-on-LAN packets are heard on; 0 when the listener could not open it."""
+        return 0 if self._listener is None else self._listener.port
+
+    def destroy_node(self) -> None:
+        """Stop the plant, then the rest."""
+        self._plant.close()
+        if self._listener is not None:
+            self._listener.close()
+        self._driver.close()
+        self._action.destroy()
+        super().destroy_node()
+
+    def _open_topics(self) -> None:
+        self._joint_states = self.create_publisher(JointState, names.JOINT_STATES, _STREAM)
+        self._power_states = self.create_publisher(PowerState, names.POWER_STATE, _STREAM)
+        self._controller_states = self.create_publisher(ControllerState, names.CONTROLLER_STATE, _STREAM)
+        self._outputs = self.create_publisher(PlcOutputsMsg, names.PLC_OUTPUTS, _LATCHED)
+        self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
+        self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+        self._description = self.create_publisher(String, names.ROBOT_DESCRIPTION, _LATCHED)
+        self._joint_state = JointState(name=self._joint_names)
+        self._joint_state.header.frame_id = names.BASE_FRAME
+        self.create_subscription(JointTrajectory, names.COMMANDED_TRAJECTORY, self._on_trajectory, 10)
+        self.create_subscription(PlcInputsMsg, names.PLC_INPUTS, self._on_plc_inputs, _LATCHED)
+        self.create_subscription(Float64, names.SPEED_SCALING, self._on_speed_scaling, 10)
+        self.create_timer(0.05, self._publish_markers)
+        self.create_timer(1.0, self._publish_diagnostics)
+        self._publish_description()
+
+    def _open_requests(self) -> None:
+        self._action = ActionServer(
+            self,
+            ExecuteTrajectory,
+            names.EXECUTE_TRAJECTORY,
+            self._execute,
+            cancel_callback=self._cancel,
+        )
+        self.create_service(SetPlcInput, names.SET_PLC_INPUT, self._set_plc_input)
+        self.create_service(StartPause, names.START_PAUSE, self._start_pause)
+        self.create_service(EndPause, names.END_PAUSE, self._end_pause)
+        self.create_service(QueryModes, names.QUERY_MODES, self._query_modes)
+        self.create_service(Recover, names.RECOVER, self._recover)
+        self.create_service(SetLoad, names.SET_LOAD, self._set_load)
+
+    def _listen(self, host: str, port: int, mac: str) -> WakeListener | None:
+        try:
+            return WakeListener(host, port, mac, self._wake)
+        except OSError as error:
+            self.get_logger().warning(f"no Wake-on-LAN: UDP {host}:{port} can't be opened ({error})")
+            return None
+
+    # the plant's thread
+
+    def _tick(self, stamp_ns: int) -> None:
+        frame = self._frame = self._driver.tick(stamp_ns)
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(Clock(clock=time_to_msg(stamp_ns)))
+        if frame.q is not None and frame.qd is not None and frame.torque is not None:
+            fill_joint_state(self._joint_state, stamp_ns, frame.q, frame.qd, frame.torque)
+            self._joint_states.publish(self._joint_state)
+        if frame.power is not None:
+            self._power_states.publish(power_state_to_msg(frame.power))
+        if frame.following is not None:
+            self._controller_states.publish(controller_state(self._joint_names, stamp_ns, frame.following))
+        if frame.outputs is not None:
+            msg = plc_outputs_to_msg(frame.outputs)
+            msg.header.stamp = time_to_msg(stamp_ns)
+            self._outputs.publish(msg)
+
+    def _clock_jumped(self, sentence: str) -> None:
+        with self._driver.locked() as simulation:
+            simulation.notices.add(Level.WARN, sentence)
+            simulation.abort(f"{sentence}; stopped on the path")
+
+    def _plant_failed(self, error: Exception) -> None:
+        if self.context.ok():
+            self.get_logger().fatal(f"the plant has stopped: {error!r}")
+
+    # topics in
+
+    def _on_trajectory(self, msg: JointTrajectory) -> None:
+        limit = self._simulation.settings.execution.max_points
+        self._driver.submit(lambda: goal_from_trajectory(msg, limit), lambda goal_id: None, self._topic_ended)
+
+    def _topic_ended(self, outcome: Outcome) -> None:
+        if outcome.code is not ErrorCode.SUCCESSFUL:
+            sentence = f"trajectory of the topic: {outcome.sentence} ({outcome.code.name})"
+            with self._driver.locked() as simulation:
+                simulation.notices.add(Level.WARN, sentence)
+
+    def _on_plc_inputs(self, msg: PlcInputsMsg) -> None:
+        with self._driver.locked() as simulation:
+            try:
+                simulation.plc.set_all(plc_inputs_from_msg(msg))
+            except MsgsError as error:
+                simulation.notices.add(Level.WARN, f"plc_inputs ignored: {error}")
+
+    def _on_speed_scaling(self, msg: Float64) -> None:
+        with self._driver.locked() as simulation:
+            simulation.set_speed_scaling(float(msg.data))
+
+    def _wake(self) -> None:
+        with self._driver.locked() as simulation:
+            simulation.wake()
+
+    # the action
+
+    async def _execute(self, handle: Any) -> Any:
+        result = ExecuteTrajectory.Result()
+        done = Future(executor=self.executor)
+        key = bytes(handle.goal_id.uuid)
+        limit = self._simulation.settings.execution.max_points
+        request = handle.request
+
+        def started(goal_id: int) -> None:
+            self._goals[key] = goal_id
+            if handle.is_cancel_requested:
+                self._simulation.cancel(goal_id)
+
+        def ended(outcome: Outcome) -> None:
+            done.set_result(outcome)
+            if self.executor is not None:
+                self.executor.wake()
+
+        self._driver.submit(lambda: goal_from_action(request, limit), started, ended)
+        feedback = self.create_timer(0.05, lambda: self._publish_feedback(handle, key))
+        outcome: Outcome = await done
+        self.destroy_timer(feedback)
+        self._goals.pop(key, None)
+        result.error_code, result.error_string = int(outcome.code), outcome.sentence
+        result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
+        if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):
+            handle.canceled()
+        elif outcome.code is ErrorCode.SUCCESSFUL:
+            handle.succeed()
+        else:
+            handle.abort()
+        return result
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        goal_id = self._goals.get(bytes(handle.goal_id.uuid))
+        if goal_id is not None:
+            with self._driver.locked() as simulation:
+                simulation.cancel(goal_id)
+        return CancelResponse.ACCEPT
+
+    def _publish_feedback(self, handle: Any, key: bytes) -> None:
+        with self._driver.locked() as simulation:
+            if simulation.executor.goal_id is None or simulation.executor.goal_id != self._goals.get(key):
+                return
+            backend = simulation.backend
+            following = simulation.executor.following(backend.q, backend.qd)
+        feedback = ExecuteTrajectory.Feedback(joint_names=self._joint_names)
+        feedback.header.stamp = self.get_clock().now().to_msg()
+        feedback.desired, feedback.actual, feedback.error = points_of(following)
+        handle.publish_feedback(feedback)
+
+    # services
+
+    def _answer(self, response: Any, work: Any) -> Any:
+        """Run work(simulation) under the lock unless the controller sleeps; errors become the status."""
+        try:
+            with self._driver.locked() as simulation:
+                if not simulation.on_the_network:
+                    raise RequestRefusedError(
+                        StatusCode.INVALID_ROBOT_STATE,
+                        f"the controller is off the network ({simulation.modes.mode.name}): only a "
+                        "Wake-on-LAN packet "
+                        f"for {self._parameters.node.mac} wakes it",
+                    )
+                remark = work(simulation)
+            answer = Status.success(remark or "", self.get_name())
+        except RequestRefusedError as error:
+            answer = Status(error.code, str(error), self.get_name())
+        except (MsgsError, DriverError) as error:
+            answer = Status(StatusCode.FAILURE, str(error), self.get_name())
+        response.status = status_to_msg(answer)
+        return response
+
+    def _set_plc_input(self, request: Any, response: Any) -> Any:
+        def work(simulation: Simulation) -> None:
+            try:
+                simulation.plc.raw.with_bit(request.name, request.value)
+            except MsgsError as error:
+                raise RequestRefusedError(StatusCode.INVALID_OBJECT_NAME, str(error)) from error
+            if request.name in OperatingMode.__members__:
+                simulation.plc.set_operating_mode(OperatingMode[request.name])
+            else:
+                simulation.plc.set_bit(request.name, bool(request.value))
+            response.inputs = plc_inputs_to_msg(simulation.plc.raw)
+
+        return self._answer(response, work)
+
+    def _start_pause(self, request: Any, response: Any) -> Any:
+        def work(simulation: Simulation) -> str:
+            mode = simulation.start_pause(float(request.pause))
+            response.mode = power_mode_to_msg(mode)
+            response.time_to_pause = mode.time_to_pause
+            response.regular_time_to_operate = mode.regular_time_to_operate
+            return f"{mode.name} for {request.pause:g} s"
+
+        return self._answer(response, work)
+
+    def _end_pause(self, request: Any, response: Any) -> Any:
+        def work(simulation: Simulation) -> None:
+            response.time_to_operate = simulation.end_pause()
+
+        return self._answer(response, work)
+
+    def _query_modes(self, request: Any, response: Any) -> Any:
+        def work(simulation: Simulation) -> None:
+            response.modes = [power_mode_to_msg(mode) for mode in simulation.query_modes()]
+            response.current = int(simulation.modes.mode)
+
+        return self._answer(response, work)
+
+    def _recover(self, request: Any, response: Any) -> Any:
+        return self._answer(response, lambda simulation: simulation.recover())
+
+    def _set_load(self, request: Any, response: Any) -> Any:
+        def work(simulation: Simulation) -> str:
+            cell = simulation.cell
+            if request.load == CUSTOM:
+                com = request.center_of_mass
+                load = custom_load(
+                    cell,
+                    float(request.mass),
+                    np.array((com.x, com.y, com.z)),
+                    np.array(request.inertia),
+                    float(request.watts_always),
+                    float(request.watts_drive_bus),
+                )
+            else:
+                load = carried(cell, request.load)
+            simulation.set_load(load)
+            response.total_mass = load.mass
+            return f"carrying {load.text}"
+
+        answer = self._answer(response, work)
+        if answer.status.code == StatusCode.SUCCESS:
+            self._publish_description()
+        return answer
+
+    # slow topics out
+
+    def _publish_description(self) -> None:
+        cell, load = self._simulation.cell, self._simulation.load
+        self._description.publish(String(data=robot_urdf(cell.robot, load.loads, cell.tcp)))
+
+    def _publish_markers(self) -> None:
+        frame = self._frame
+        if frame is None or frame.q is None or not self._markers.get_subscription_count():
+            return
+        robot, load = self._simulation.robot, self._simulation.load
+        poses = self._simulation.tool.chain.link_poses(frame.q[None])[0]
+        of_load = [capsule for item in load.loads for capsule in item.capsules]
+        capsules = [*robot.capsules, *of_load]
+        is_load = [False] * len(robot.capsules) + [True] * len(of_load)
+        self._markers.publish(robot_markers(capsules, is_load, poses, frame.stamp_ns))
+
+    def _publish_diagnostics(self) -> None:
+        with self._driver.locked() as simulation:
+            notices = simulation.notices.take()
+            entries = report(simulation, self._plant.worst_lag)
+        for level, sentence in notices:
+            log = self.get_logger()
+            (log.info if level is Level.OK else log.warning if level is Level.WARN else log.error)(sentence)
+        msg = DiagnosticArray(status=[status(*entry) for entry in entries])
+        msg.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(msg)
+
+    # parameters
+
+    def _change_refusal(self) -> str:
+        with self._driver.locked() as simulation:
+            return "the robot moves: change it when it stands" if simulation.executor.active else ""
+
+    def _execution_changed(self, settings: ExecutionSettings) -> None:
+        with self._driver.locked() as simulation:
+            simulation.set_execution(settings)
+
+
+def main() -> None:
+    """Spin the driver until it is told to stop."""
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    rclpy.init()
+    node = None
+    try:
+        node = SimDriver()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (DriverError, DescriptionError, MsgsError) as error:
+        sys.exit(f"ir_sim_driver: {error}")
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()

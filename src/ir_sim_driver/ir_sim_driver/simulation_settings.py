@@ -1,0 +1,69 @@
+"""Settings of the simulated controller, stage by stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import cast
+
+from ir_kernels.power import REGENERATIONS, Regeneration
+from ir_msgs_py.plc import OperatingMode
+from ir_msgs_py.power import REST_MODES, Mode
+from ir_msgs_py.settings import check_settings, setting
+
+from ir_sim_driver.control import ControlSettings
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.plc import PlcSettings
+from ir_sim_driver.power_modes import TransitionSettings
+
+DT = 0.001
+"""Step of plant and controller [s]."""
+
+
+@dataclass(frozen=True)
+class ControllerSettings:
+    """How the controller starts and what it is told about its surroundings."""
+
+    start_mode: str = setting(
+        "STAND_ON_MOTORS", "Power mode at the start.", choices=REST_MODES, read_only=True
+    )
+    operating_mode: str = setting(
+        "EXT", "Position of the mode switch at the start.", choices=("T1", "T2", "AUT", "EXT"), read_only=True
+    )
+    enabling_switch: bool = setting(
+        False,
+        "Somebody holds the enabling switch: programs may run in T1 (at 250 mm/s) and T2.",
+        read_only=True,
+    )
+    regeneration: str = setting(
+        "shared", "What becomes of braking energy at the DC bus.", choices=REGENERATIONS, read_only=True
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+    @property
+    def rest_at_start(self) -> Mode:
+        """Power mode at the start."""
+        return Mode[self.start_mode]
+
+    @property
+    def mode_switch(self) -> OperatingMode:
+        """Position of the mode switch at the start."""
+        return OperatingMode[self.operating_mode]
+
+    @property
+    def regeneration_mode(self) -> Regeneration:
+        """What becomes of braking energy."""
+        return cast(Regeneration, self.regeneration)
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """All stages of the simulation; dt [s]: step of plant and controller."""
+
+    dt: float = DT
+    controller: ControllerSettings = field(default_factory=ControllerSettings)
+    control: ControlSettings = field(default_factory=ControlSettings)
+    execution: ExecutionSettings = field(default_factory=ExecutionSettings)
+    transitions: TransitionSettings = field(default_factory=TransitionSettings)
+    plc: PlcSettings = field(default_factory=PlcSettings)
