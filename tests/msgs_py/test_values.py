@@ -106,7 +106,7 @@ def test_a_status_says_its_code_as_a_word():
 def test_a_program_sets_and_clears_signals_by_text():
     assert plc.Signal.parse("clamp") == plc.Signal("clamp", True)
     assert plc.Signal.parse("clamp=1") == plc.Signal("clamp", True)
-    assert plc.Signal.parse("clamp=0") == plc.Signal("clamp", False)
+    assert plc.Signal.parse("clamp=0") == plc.Signal.parse("not clamp") == plc.Signal("clamp", False)
 
 
 def test_one_bit_changes_and_the_others_stay():

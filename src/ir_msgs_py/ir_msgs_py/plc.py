@@ -102,7 +102,9 @@ class Signal:
 
     @classmethod
     def parse(cls, text: str) -> Signal:
-        """Read what a program sets: "name" and "name=1" set, "name=0" clears."""
+        """Read what a program waits for or sets: "name" or "name=1", "name=0" or "not name"."""
+        if text.startswith("not "):
+            return cls(text[4:].strip(), False)
         name, separator, level = text.partition("=")
         if separator and level.strip() not in ("0", "1"):
             raise InvalidValueError(f'signal "{text[:80]}" has level "{level[:20]}": known are 0, 1')

@@ -9,10 +9,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
+
+from ir_msgs_py.status import Status, StatusCode
 
 
 @dataclass(eq=False)
@@ -43,6 +46,16 @@ class Waiting:
         """Wait for a service's or action's future; False when it is not done within `timeout` [s]."""
         future.add_done_callback(lambda done: self.look())
         return await self.until(future.done, timeout)
+
+    async def ask(self, client: Any, request: Any, timeout: float) -> Any:
+        """Call a service: its response, or a TIMED_OUT Status that says why there is none in `timeout` [s]."""
+        if not await self.until(client.service_is_ready, timeout):
+            return Status(StatusCode.TIMED_OUT, f"nobody offers {client.srv_name} within {timeout:g} s")
+        future: Future = client.call_async(request)
+        if not await self.answer(future, timeout):
+            client.remove_pending_request(future)
+            return Status(StatusCode.TIMED_OUT, f"{client.srv_name} did not answer within {timeout:g} s")
+        return future.result()
 
     def look(self) -> None:
         """Look at all conditions again; call it where something arrives that a condition depends on."""

@@ -1,0 +1,164 @@
+"""The driver as a program sees it: its services, its action and its meter, for coroutines of one node.
+
+Every answer is a Status; nothing blocks, and nothing is waited for without end: while the meter is heard the
+driver is alive, and when it falls silent every wait ends.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import PowerState as PowerStateMsg
+from ir_msgs.srv import QueryModes
+from ir_msgs.srv import SetLoad as SetLoadSrv
+from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
+
+from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.ros.conversions import power_mode_from_msg, status_from_msg, trajectory_to_msg
+from ir_msgs_py.ros.waiting import Waiting
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+
+_OFF_THE_NETWORK = (Mode.HIBERNATION, Mode.FROM_HIBERNATION)
+
+
+class Driver:
+    """Clients of one driver; times in s.
+
+    response_timeout: for services, and to take a goal. silence_timeout: without a reading of the meter the
+    driver counts as gone. cancel_timeout: to stop along the path. on_meter: called after each reading.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        waiting: Waiting,
+        name: str,
+        *,
+        response_timeout: float = 2.0,
+        silence_timeout: float = 2.0,
+        cancel_timeout: float = 5.0,
+        on_meter: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.name = name
+        self.mode: Mode | None = None
+        self.energy = 0.0
+        self._waiting = waiting
+        self._response_timeout = response_timeout
+        self._silence_timeout = silence_timeout
+        self._cancel_timeout = cancel_timeout
+        self._on_meter = on_meter
+        self._heard = -float("inf")
+        self._plc = node.create_client(SetPlcInputSrv, f"{name}/set_plc_input")
+        self._load = node.create_client(SetLoadSrv, f"{name}/set_load")
+        self._modes = node.create_client(QueryModes, f"{name}/query_modes")
+        self._execute = ActionClient(node, ExecuteTrajectory, f"{name}/execute_trajectory")
+        heard_from_all = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+        node.create_subscription(PowerStateMsg, f"{name}/power_state", self._read_meter, heard_from_all)
+
+    @property
+    def silent(self) -> bool:
+        """Whether the meter has not been heard for too long."""
+        return time.monotonic() - self._heard > self._silence_timeout
+
+    @property
+    def off_the_network(self) -> bool:
+        """Whether the controller hibernates, so that it answers nothing."""
+        return self.mode in _OFF_THE_NETWORK
+
+    def state(self) -> Status:
+        """Say whether the driver can be talked to."""
+        if self.silent:
+            sentence = f"nothing was heard from {self.name} for {self._silence_timeout:g} s"
+            return Status(StatusCode.ROBOT_STATE_STALE, sentence)
+        return Status.success()
+
+    async def set_plc_input(self, name: str, value: bool) -> Status:
+        """Set one level, the others stay."""
+        return _status_of(await self.ask(self._plc, SetPlcInputSrv.Request(name=name, value=value)))
+
+    async def set_load(self, load: str) -> Status:
+        """Let the robot carry exactly this load text."""
+        return _status_of(await self.ask(self._load, SetLoadSrv.Request(load=load)))
+
+    async def query_modes(self) -> tuple[Status, tuple[PowerMode, ...]]:
+        """Ask for the modes with their times."""
+        response = await self.ask(self._modes, QueryModes.Request())
+        if isinstance(response, Status):
+            return response, ()
+        return status_from_msg(response.status), tuple(power_mode_from_msg(mode) for mode in response.modes)
+
+    async def drive(self, trajectory: JointTrajectory, stop: Callable[[], bool]) -> Status:
+        """Execute a trajectory; `stop` is looked at all the time, and when it is true the goal is canceled.
+
+        SUCCESS, PREEMPTED when it was stopped along the path, else the driver's code and sentence. The
+        duration is not limited: speed scaling may prolong or hold a movement.
+        """
+        if not await self._waiting.until(self._execute.server_is_ready, self._response_timeout):
+            return _timed_out(f"nobody offers {self.name}/execute_trajectory", self._response_timeout)
+        goal = ExecuteTrajectory.Goal(
+            trajectory=trajectory_to_msg(trajectory), trajectory_id=trajectory.trajectory_id
+        )
+        sent: Future = self._execute.send_goal_async(goal)
+        if not await self._waiting.answer(sent, self._response_timeout):
+            sent.add_done_callback(_cancel_late)
+            return _timed_out(f"{self.name} did not take the trajectory", self._response_timeout)
+        handle = sent.result()
+        if not handle.accepted:
+            return Status(StatusCode.FAILURE, f"{self.name} rejected the trajectory")
+        result: Future = handle.get_result_async()
+        result.add_done_callback(lambda done: self._waiting.look())
+        await self._waiting.until(lambda: result.done() or stop() or self.silent or self.off_the_network)
+        if result.done():
+            return _status_of_result(result.result().result)
+        return await self._give_up(handle, result, stop())
+
+    async def ask(self, client: Any, request: Any) -> Any:
+        """Call a service: its response, or a Status that says why there is none."""
+        if self.off_the_network:
+            return Status(StatusCode.TIMED_OUT, f"{self.name} hibernates: {client.srv_name} is not available")
+        return await self._waiting.ask(client, request, self._response_timeout)
+
+    async def _give_up(self, handle: Any, result: Future, stopped: bool) -> Status:
+        alive = self.state()
+        handle.cancel_goal_async()
+        if not stopped:
+            asleep = f"{self.name} went into hibernation during the movement"
+            return alive if not alive.ok else Status(StatusCode.INVALID_ROBOT_STATE, asleep)
+        if not await self._waiting.answer(result, self._cancel_timeout):
+            return _timed_out(f"{self.name} did not confirm the stop", self._cancel_timeout)
+        return Status(StatusCode.PREEMPTED, result.result().result.error_string or "stopped along the path")
+
+    def _read_meter(self, reading: PowerStateMsg) -> None:
+        self._heard = time.monotonic()
+        self.energy = float(reading.energy)
+        if reading.mode != self.mode:
+            self.mode = Mode(reading.mode)
+        self._on_meter()
+
+
+def _cancel_late(sent: Future) -> None:
+    handle = sent.result()
+    if handle is not None and handle.accepted:
+        handle.cancel_goal_async()
+
+
+def _status_of(response: Any) -> Status:
+    return response if isinstance(response, Status) else status_from_msg(response.status)
+
+
+def _status_of_result(result: Any) -> Status:
+    if result.error_code == ExecuteTrajectory.Result.SUCCESSFUL:
+        return Status.success(result.error_string)
+    return Status(StatusCode.FAILURE, f"the driver aborted with {result.error_code}: {result.error_string}")
+
+
+def _timed_out(what: str, limit: float) -> Status:
+    return Status(StatusCode.TIMED_OUT, f"{what} within {limit:g} s")

@@ -1,0 +1,306 @@
+"""The node `ir_program_runner`: fetches a program, fulfils its requests one by one, and tells where it is."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from ir_msgs.action import RunProgram
+from ir_msgs.msg import ProgramState as ProgramStateMsg
+from ir_msgs.msg import Signal as SignalMsg
+from ir_msgs_py.errors import InvalidValueError, ParameterError
+from ir_msgs_py.plc import Signal
+from ir_msgs_py.power import PowerMode
+from ir_msgs_py.program import Event, ProgramState
+from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.ros.conversions import (
+    planned_movement_from_msg,
+    program_state_to_msg,
+    signal_from_msg,
+    signal_to_msg,
+    status_to_msg,
+)
+from ir_msgs_py.ros.driver import Driver
+from ir_msgs_py.ros.planner import Planner
+from ir_msgs_py.ros.waiting import Waiting
+from ir_msgs_py.status import Status, StatusCode
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+
+from ir_description import DescriptionError, load_cell
+from ir_msgs_py import names
+from ir_program_runner import requests as ask
+from ir_program_runner.checks import check_program
+from ir_program_runner.errors import CanceledError, ProgramError
+from ir_program_runner.machines import Machines
+from ir_program_runner.parameters import declare_parameters
+from ir_program_runner.program import Program, ProgramResult
+from ir_program_runner.progress import Progress
+from ir_program_runner.wake_on_lan import magic_packet, send_packet
+
+_KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_SIGNALS = QoSProfile(depth=100)
+_FEEDBACK_PERIOD = 0.2  # s
+_MACHINES_PERIOD = 0.02  # s, of the soft PLC
+
+
+class ProgramRunnerNode(Node):
+    """Runs one program at a time.
+
+    send: sends a packet to an address and UDP port. machines: the soft PLC; None = the one of the parameter
+    `cell`.
+    """
+
+    def __init__(
+        self,
+        send: Callable[[bytes, str, int], None] = send_packet,
+        machines: Machines | None = None,
+        **node_arguments: Any,
+    ) -> None:
+        super().__init__(names.PROGRAM_RUNNER, **node_arguments)
+        self._progress: Progress | None = None
+        self._parameters = declare_parameters(self, lambda: self._progress is not None)
+        links = self._parameters.links.value
+        self._send = send
+        self._machines = (
+            Machines(load_cell(links.cell).signals if links.cell else ()) if machines is None else machines
+        )
+        self._waiting = Waiting(self)
+        self._planner = Planner(self, self._waiting, links.planner, links.response_timeout)
+        self._driver = Driver(
+            self,
+            self._waiting,
+            links.driver,
+            response_timeout=links.response_timeout,
+            silence_timeout=links.silence_timeout,
+            cancel_timeout=links.cancel_timeout,
+            on_meter=self._waiting.look,
+        )
+        self._signals = self.create_publisher(SignalMsg, "~/signals", _SIGNALS)
+        self._machine_signals = self.create_publisher(SignalMsg, "~/machine_signals", _SIGNALS)
+        self._program_state = self.create_publisher(ProgramStateMsg, "~/program_state", _KEPT)
+        self.create_subscription(SignalMsg, "~/signals", self._hear_signal, _SIGNALS)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
+        self._server = ActionServer(
+            self,
+            RunProgram,
+            "~/run_program",
+            self._run,
+            cancel_callback=lambda goal: CancelResponse.ACCEPT,
+        )
+
+    def destroy_node(self) -> None:
+        """Let go of the action server before the node."""
+        self._server.destroy()
+        super().destroy_node()
+
+    async def _run(self, goal: Any) -> RunProgram.Result:
+        if self._progress is not None:
+            sentence = f"program {self._progress.program_id} is running: one program at a time"
+            return self._end(
+                goal, ProgramResult(Status(StatusCode.INVALID_ROBOT_STATE, sentence), 0), 0.0, 0.0
+            )
+        self._progress = progress = Progress(goal.request.program_id, (), time.monotonic())
+        try:
+            status, movements = await self._fetch(goal.request)
+            # a driver that has just been started gets the time to be heard
+            await self._waiting.until(
+                lambda: not self._driver.silent, self._parameters.links.value.response_timeout
+            )
+            energy = self._driver.energy
+            result = ProgramResult(status, 0)
+            if status.ok:
+                progress.movements = movements
+                result = await self._fulfil_all(goal, Program(movements, self._parameters.program.value))
+        finally:
+            self._progress = None
+        return self._end(goal, result, time.monotonic() - progress.started, self._driver.energy - energy)
+
+    async def _fetch(self, request: Any) -> tuple[Status, tuple[PlannedMovement, ...]]:
+        """Get the steps with all points, and check them as a whole."""
+        if bool(request.program_id) == bool(request.movements):
+            sentence = "give either program_id or movements"
+            return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence), ()
+        try:
+            given = [planned_movement_from_msg(movement) for movement in request.movements]
+            fetch = (
+                self._planner.program(request.program_id)
+                if request.program_id
+                else self._planner.with_points(given)
+            )
+            status, movements = await fetch
+            if status.ok:
+                check_program(movements)
+        except InvalidValueError as error:
+            return Status(StatusCode.INVALID_MOTION_PLAN, str(error)), ()
+        except ProgramError as error:
+            return Status(error.code, str(error)), ()
+        return status, movements
+
+    async def _fulfil_all(self, goal: Any, program: Program) -> ProgramResult:
+        """Drive the generator; a cancel is thrown into it once, at the request that it interrupts."""
+        steps = program.run()
+        feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._tell_feedback(goal))
+        canceled = False
+
+        def stop() -> bool:
+            return bool(goal.is_cancel_requested) and not canceled
+
+        try:
+            request = next(steps)
+            while True:
+                interrupted = stop() and isinstance(request, ask.INTERRUPTIBLE)
+                outcome = ask.Outcome(time.monotonic(), self._driver.mode)
+                if not interrupted:
+                    outcome = await self._fulfil(request, stop)
+                    interrupted = stop() and isinstance(request, ask.INTERRUPTIBLE) and not outcome.status.ok
+                self._tell_feedback(goal)
+                if interrupted:
+                    canceled = True
+                    request = steps.throw(CanceledError(outcome.status.message))
+                else:
+                    request = steps.send(outcome)
+        except StopIteration as ended:
+            result: ProgramResult = ended.value
+            return result
+        finally:
+            self.destroy_timer(feedback)
+
+    async def _fulfil(self, request: ask.Request, stop: Callable[[], bool]) -> ask.Outcome:
+        status = Status.success()
+        modes: tuple[PowerMode, ...] = ()
+        match request:
+            case ask.Tell():
+                self._tell(request)
+            case ask.Phase(text):
+                assert self._progress is not None
+                self._progress.phase = text
+            case ask.WaitForSignals(signals, timeout):
+                status = await self._wait(lambda: self._machines.holds(signals), timeout, stop)
+            case ask.WaitForMode(wanted, timeout):
+                status = await self._wait(lambda: self._driver.mode in wanted, timeout, stop)
+            case ask.WaitUntil(moment):
+                status = await self._wait(lambda: time.monotonic() >= moment, float("inf"), stop)
+            case ask.SetSignal(signal):
+                self._set_signal(signal)
+            case ask.SetLoad(load):
+                status = await self._driver.set_load(load)
+            case ask.SetPlcInput(name, value):
+                status = await self._driver.set_plc_input(name, value)
+            case ask.AskModes():
+                status, modes = await self._driver.query_modes()
+            case ask.Drive(trajectory):
+                status = await self._driver.drive(trajectory, stop)
+            case ask.SendWakePacket():
+                status = self._send_wake_packet()
+        return ask.Outcome(time.monotonic(), self._driver.mode, status, modes)
+
+    async def _wait(self, condition: Callable[[], bool], timeout: float, stop: Callable[[], bool]) -> Status:
+        """Wait for the condition, but no longer than the driver is heard and nobody cancels."""
+        driver = self._driver
+        await self._waiting.until(lambda: condition() or stop() or driver.silent, timeout)
+        if condition():
+            return Status.success()
+        if stop():
+            return Status(StatusCode.PREEMPTED, "the wait was interrupted")
+        return driver.state() if driver.silent else Status(StatusCode.TIMED_OUT, f"not within {timeout:g} s")
+
+    def _send_wake_packet(self) -> Status:
+        links = self._parameters.links.value
+        try:
+            self._send(magic_packet(links.mac), links.wake_address, links.wake_port)
+        except OSError as error:
+            where = f"{links.wake_address} port {links.wake_port}"
+            return Status(StatusCode.FAILURE, f"no Wake-on-LAN packet could be sent to {where}: {error}")
+        return Status.success()
+
+    def _set_signal(self, signal: Signal) -> None:
+        self._machines.set(signal, time.monotonic())
+        self._machine_signals.publish(signal_to_msg(self._stamped(signal)))
+
+    def _hear_signal(self, msg: SignalMsg) -> None:
+        try:
+            self._machines.set(signal_from_msg(msg), time.monotonic())
+        except InvalidValueError as error:
+            self.get_logger().warning(f"a signal is ignored: {error}")
+        self._waiting.look()
+
+    def _let_machines_answer(self) -> None:
+        for signal in self._machines.take_answers(time.monotonic()):
+            self._signals.publish(signal_to_msg(self._stamped(signal)))
+
+    def _stamped(self, signal: Signal) -> Signal:
+        return Signal(signal.name, signal.value, self.get_clock().now().nanoseconds)
+
+    def _tell(self, tell: ask.Tell) -> None:
+        progress = self._progress
+        assert progress is not None
+        if tell.event is Event.STARTED:
+            progress.begin(tell.index, time.monotonic())
+        state = ProgramState(
+            stamp_ns=self.get_clock().now().nanoseconds,
+            program_id=progress.program_id,
+            index=tell.index,
+            total=progress.total,
+            event=tell.event,
+            movement=progress.movements[tell.index],
+            note=tell.note,
+        )
+        self._program_state.publish(program_state_to_msg(state))
+
+    def _tell_feedback(self, goal: Any) -> None:
+        progress = self._progress
+        if progress is not None and goal.is_active:
+            goal.publish_feedback(
+                RunProgram.Feedback(
+                    movement=progress.index,
+                    total=progress.total,
+                    phase=progress.phase,
+                    remaining=progress.remaining(time.monotonic()),
+                )
+            )
+
+    def _end(self, goal: Any, result: ProgramResult, duration: float, energy: float) -> RunProgram.Result:
+        if result.status.ok:
+            goal.succeed()
+        elif result.status.code == StatusCode.PREEMPTED and goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.abort()
+            self.get_logger().error(str(result.status))
+        status = Status(result.status.code, result.status.message, self.get_name())
+        return RunProgram.Result(
+            status=status_to_msg(status), executed=result.executed, duration=duration, energy=energy
+        )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node until it is told to end."""
+    rclpy.init(args=arguments)
+    node = None
+    try:
+        node = ProgramRunnerNode()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (ParameterError, DescriptionError, ValueError) as error:
+        sys.stderr.write(f"{names.PROGRAM_RUNNER}: {error}\n")
+        return 1
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,35 @@
+"""Where a running program is, and how long it still takes by plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ir_msgs_py.report import PlannedMovement
+
+
+@dataclass
+class Progress:
+    """State of one run; times of a steady clock [s]."""
+
+    program_id: str
+    movements: Sequence[PlannedMovement]
+    started: float
+    index: int = 0
+    phase: str = ""
+    step_started: float = 0.0
+
+    @property
+    def total(self) -> int:
+        """Number of steps."""
+        return len(self.movements)
+
+    def begin(self, index: int, now: float) -> None:
+        """Step `index` starts now."""
+        self.index = index
+        self.step_started = now
+
+    def remaining(self, now: float) -> float:
+        """Planned seconds until the program ends; a step that takes longer counts as nothing more."""
+        step = max(0.0, self.movements[self.index].duration - (now - self.step_started))
+        return step + sum(movement.duration for movement in self.movements[self.index + 1 :])

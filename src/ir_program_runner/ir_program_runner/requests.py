@@ -1,0 +1,133 @@
+"""What a program asks of the world, one request at a time, and what the world says to it.
+
+The program never waits, sends or looks at a clock itself: it yields a request and is sent an Outcome.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ir_msgs_py.plc import Signal
+from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.program import Event
+from ir_msgs_py.status import Status
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_program_runner.errors import StepFailedError
+
+
+@dataclass(frozen=True)
+class Tell:
+    """Tell everybody that step `index` started, ended, failed or was canceled."""
+
+    index: int
+    event: Event
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Tell whoever follows the program what it does now."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class WaitForSignals:
+    """Wait until all signals have these levels; TIMED_OUT after `timeout` [s]."""
+
+    signals: tuple[Signal, ...]
+    timeout: float
+
+
+@dataclass(frozen=True)
+class SetSignal:
+    """Set a signal for the machines."""
+
+    signal: Signal
+
+
+@dataclass(frozen=True)
+class SetLoad:
+    """Let the driver carry exactly this load text."""
+
+    load: str
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Let the driver execute a trajectory to its end."""
+
+    trajectory: JointTrajectory
+
+
+@dataclass(frozen=True)
+class SetPlcInput:
+    """Set one level from the PLC to the robot's controller."""
+
+    name: str
+    value: bool
+
+
+@dataclass(frozen=True)
+class AskModes:
+    """Ask the driver for its power modes."""
+
+
+@dataclass(frozen=True)
+class WaitForMode:
+    """Wait until the power mode is one of these; TIMED_OUT after `timeout` [s]."""
+
+    modes: tuple[Mode, ...]
+    timeout: float
+
+
+@dataclass(frozen=True)
+class WaitUntil:
+    """Wait until this moment of the clock of the outcomes [s]."""
+
+    moment: float
+
+
+@dataclass(frozen=True)
+class SendWakePacket:
+    """Send a Wake-on-LAN packet."""
+
+
+Request = (
+    Tell
+    | Phase
+    | WaitForSignals
+    | SetSignal
+    | SetLoad
+    | Drive
+    | SetPlcInput
+    | AskModes
+    | WaitForMode
+    | WaitUntil
+    | SendWakePacket
+)
+
+# what takes time, so that a cancel interrupts it; all other requests are fulfilled in any case
+INTERRUPTIBLE = (WaitForSignals, WaitForMode, WaitUntil, Drive)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a request.
+
+    now: a steady clock [s]. mode: the power mode, None before it is known. modes: the answer to AskModes.
+    A status ROBOT_STATE_STALE means that the driver is silent, whatever was asked.
+    """
+
+    now: float
+    mode: Mode | None
+    status: Status = field(default_factory=Status.success)
+    modes: tuple[PowerMode, ...] = ()
+
+
+def need(outcome: Outcome) -> Outcome:
+    """Return the outcome, or end the step with its status."""
+    if not outcome.status.ok:
+        raise StepFailedError(outcome.status)
+    return outcome

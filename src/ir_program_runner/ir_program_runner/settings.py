@@ -1,0 +1,114 @@
+"""Settings of the program runner: times of a program, and where driver, planner and network are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.settings import check_settings, setting
+
+_HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class ProgramSettings:
+    """Patience and margins of a program, and times of the power modes where the driver doesn't tell them."""
+
+    signal_timeout: float = setting(
+        600.0, "Longest wait for the signals of a step.", unit="s", minimum=0.0, maximum=24 * _HOUR
+    )
+    ready_timeout: float = setting(
+        10.0, "How much later than told the robot may be ready.", unit="s", minimum=0.0, maximum=_HOUR
+    )
+    enter_timeout: float = setting(
+        5.0, "How much later than told a power mode may be reached.", unit="s", minimum=0.0, maximum=_HOUR
+    )
+    load_timeout: float = setting(
+        2.0, "How long a load is offered to a robot that still settles.", unit="s", minimum=0.0, maximum=60.0
+    )
+    wake_margin: float = setting(
+        0.2, "How much earlier than needed the robot is woken.", unit="s", minimum=0.0, maximum=_HOUR
+    )
+    wake_repeat: float = setting(
+        1.0,
+        "Time between two Wake-on-LAN packets: a packet can get lost.",
+        unit="s",
+        minimum=0.1,
+        maximum=60.0,
+    )
+    brakes_enter: float = setting(0.3, "Time to close the brakes.", unit="s", minimum=0.0, maximum=_HOUR)
+    brakes_leave: float = setting(0.7, "Time to open the brakes.", unit="s", minimum=0.0, maximum=_HOUR)
+    brakes_stay: float = setting(1.0, "Shortest stay on brakes.", unit="s", minimum=0.0, maximum=_HOUR)
+    bus_power_off_enter: float = setting(
+        3.0, "Time to switch the drive bus off.", unit="s", minimum=0.0, maximum=_HOUR
+    )
+    bus_power_off_leave: float = setting(
+        20.0, "Time to switch the drive bus on.", unit="s", minimum=0.0, maximum=_HOUR
+    )
+    bus_power_off_stay: float = setting(
+        2.0, "Shortest stay with the bus off.", unit="s", minimum=0.0, maximum=_HOUR
+    )
+    hibernation_enter: float = setting(60.0, "Time to hibernate.", unit="s", minimum=0.0, maximum=_HOUR)
+    hibernation_leave: float = setting(120.0, "Time to wake up.", unit="s", minimum=0.0, maximum=_HOUR)
+    hibernation_stay: float = setting(
+        120.0, "Shortest stay in hibernation.", unit="s", minimum=0.0, maximum=_HOUR
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+    def times(self, mode: Mode) -> PowerMode:
+        """Times of a rest mode, as far as these settings know them."""
+        enter, leave, stay = {
+            Mode.STAND_ON_BRAKES: (self.brakes_enter, self.brakes_leave, self.brakes_stay),
+            Mode.BUS_POWER_OFF: (self.bus_power_off_enter, self.bus_power_off_leave, self.bus_power_off_stay),
+            Mode.HIBERNATION: (self.hibernation_enter, self.hibernation_leave, self.hibernation_stay),
+        }[mode]
+        return PowerMode(
+            mode=mode, time_to_pause=enter, regular_time_to_operate=leave, time_min_length_of_stay=stay
+        )
+
+
+@dataclass(frozen=True)
+class LinkSettings:
+    """Where the others are; fixed when the node starts."""
+
+    driver: str = setting("ir_sim_driver", "Name of the driver's node.", read_only=True)
+    planner: str = setting("ir_planner", "Name of the planner's node.", read_only=True)
+    cell: str = setting(
+        "",
+        "Cell file or bundled cell whose machines are simulated; empty: signals come from outside.",
+        read_only=True,
+    )
+    mac: str = setting("02:00:00:c4:02:10", "MAC address of the robot's controller.", read_only=True)
+    wake_address: str = setting(
+        "127.0.0.1", "Where Wake-on-LAN packets go; may be a broadcast.", read_only=True
+    )
+    wake_port: int = setting(
+        9009, "UDP port of Wake-on-LAN; the real one is 9.", minimum=1, maximum=65535, read_only=True
+    )
+    response_timeout: float = setting(
+        2.0,
+        "Longest wait for an answer of driver or planner.",
+        unit="s",
+        minimum=0.01,
+        maximum=60.0,
+        read_only=True,
+    )
+    silence_timeout: float = setting(
+        2.0,
+        "Without a reading of the meter the driver counts as gone.",
+        unit="s",
+        minimum=0.05,
+        maximum=60.0,
+        read_only=True,
+    )
+    cancel_timeout: float = setting(
+        5.0, "Longest wait for a stop along the path.", unit="s", minimum=0.1, maximum=60.0, read_only=True
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+        if not re.fullmatch(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}", self.mac):
+            raise ValueError(f"mac is {self.mac[:80]!r}: it must be six hex bytes like 02:00:00:c4:02:10")
