@@ -20,7 +20,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     up = commands.add_parser("up", help="start planner, driver, runner and recorder until Ctrl-C")
     up.add_argument("--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)")
     up.add_argument(
-        "--logs", type=Path, default=Path("out/log"), help="where the nodes' output goes (out/log)"
+        "--logs", type=Path, default=Path("out/log"), help="folder of the nodes' output (out/log)"
     )
     up.set_defaults(run=run_up)
 
@@ -30,9 +30,7 @@ def run_up(arguments: argparse.Namespace) -> int:
     load_cell(arguments.cell)
     with NodeProcesses(arguments.logs, {}) as nodes:
         nodes.start(cell_nodes(arguments.cell))
-        sys.stdout.write(
-            "ir_planner, ir_sim_driver, ir_program_runner and ir_recorder run; Ctrl-C ends them\n"
-        )
+        sys.stdout.write("planner, driver, runner and recorder run; Ctrl-C ends them\n")
         sys.stdout.flush()
         while True:
             nodes.check()
