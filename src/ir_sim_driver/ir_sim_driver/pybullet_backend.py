@@ -183,7 +183,7 @@ class PyBulletBackend:
         outer = torque - h - resistance
         if self.disturbance is not None:
             outer = outer + self.disturbance
-        qdd: Array = np.linalg.solve(H + np.diag(self._drives.rotor_inertia), outer)
+        qdd = np.asarray(np.linalg.solve(H + np.diag(self._drives.rotor_inertia), outer), dtype=np.float64)
         return H @ qdd + h, qdd
 
     def _inverse_dynamics(self, qdd: Array) -> Array:

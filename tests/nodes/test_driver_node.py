@@ -1,0 +1,204 @@
+"""The driver as a node, in this process: topics, the action and services as a client sees them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ir_description import load_cell
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
+from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
+from ir_msgs_py import names
+from ir_msgs_py.errors import RequestRefusedError
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.node import SimDriver
+from ir_sim_driver.wake_on_lan import magic_packet
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+
+MAC = "02:00:00:c4:02:10"
+QUICK = {
+    "cell": "open",
+    "backend": "ideal",
+    "wake_port": 0,
+    "plc.debounce": 0.005,
+    "plc.startup_window": 0.0,
+    "transitions.bus_power_off_enter": 0.1,
+    "transitions.bus_power_off_leave": 0.1,
+    "transitions.bus_power_off_minimum_stay": 0.1,
+    "transitions.hibernation_enter": 0.1,
+    "transitions.hibernation_leave": 0.2,
+    "transitions.hibernation_minimum_stay": 0.1,
+    "transitions.stand_on_brakes_minimum_stay": 0.1,
+}
+
+
+@pytest.fixture
+def make_driver(ros_context, ros_executor):
+    def make(**parameters):
+        overrides = [Parameter(name, value=value) for name, value in {**QUICK, **parameters}.items()]
+        return ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+
+    return make
+
+
+@pytest.fixture
+def cell_client(ros_context):
+    with Client(context=ros_context) as client:
+        yield client
+
+
+@pytest.fixture
+def listen(ros_node):
+    def listen_to(topic, message_type, latched=False):
+        received = []
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        ros_node.create_subscription(
+            message_type, topic, received.append, QoSProfile(depth=2000, durability=durability)
+        )
+        return received
+
+    return listen_to
+
+
+def movement(step=0.05, duration=0.5):
+    cell = load_cell("open")
+    q = np.array(cell.machine_home)
+    return JointTrajectory.from_seconds(
+        cell.robot.joint_names, [0.0, duration], [q, q + step], np.zeros((2, 6)), np.zeros((2, 6))
+    )
+
+
+def stamp_ns(msg):
+    return msg.header.stamp.sec * 1_000_000_000 + msg.header.stamp.nanosec
+
+
+def test_joint_states_stand_on_a_gap_free_grid(make_driver, listen, wait_for):
+    make_driver()
+    received = listen(names.JOINT_STATES, JointState)
+    wait_for(lambda: len(received) >= 500, timeout=20.0)
+    stamps = np.array([stamp_ns(msg) for msg in received])
+    assert (np.diff(stamps) == 2_000_000).all()
+    assert (stamps % 2_000_000 == 0).all()
+    assert list(received[0].name) == list(load_cell("open").robot.joint_names)
+
+
+def test_power_state_is_the_derivative_of_its_energy(make_driver, listen, wait_for):
+    make_driver()
+    received = listen(names.POWER_STATE, PowerState)
+    wait_for(lambda: len(received) >= 100, timeout=20.0)
+    stamps = np.array([stamp_ns(msg) for msg in received])
+    energy = np.array([msg.energy for msg in received])
+    power = np.array([msg.power for msg in received])
+    assert np.allclose(np.diff(energy), power[1:] * np.diff(stamps) * 1e-9, rtol=1e-6)
+
+
+def test_a_trajectory_is_executed_to_its_end(make_driver, cell_client, listen, wait_for):
+    make_driver(backend="pybullet")
+    states = listen(names.JOINT_STATES, JointState)
+    feedback = []
+    trajectory = movement()
+    execution = cell_client.execute(trajectory, feedback=feedback.append, timeout=30.0)
+    assert execution.max_tool_deviation < 0.001
+    assert execution.energy > 0.0
+    wait_for(lambda: states and np.allclose(states[-1].position, trajectory.positions[-1], atol=1e-6))
+
+
+def test_a_bad_trajectory_is_aborted_with_a_sentence(make_driver, cell_client):
+    make_driver()
+    with pytest.raises(RequestRefusedError, match="velocity|needs") as refusal:
+        cell_client.execute(movement(step=1.0, duration=0.1), timeout=30.0)
+    assert refusal.value.code == ExecuteTrajectory.Result.INVALID_GOAL
+
+
+def test_bus_power_off_by_bits_and_back(make_driver, cell_client, listen, wait_for):
+    make_driver()
+    power = listen(names.POWER_STATE, PowerState)
+    outputs = listen(names.PLC_OUTPUTS, PlcOutputs, latched=True)
+    answer = cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
+    assert answer.inputs.ab
+    wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF, timeout=20.0)
+    wait_for(lambda: outputs and outputs[-1].ab)
+    with pytest.raises(RequestRefusedError, match="BUS_POWER_OFF"):
+        cell_client.execute(movement(), timeout=30.0)
+    cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=False))
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+
+
+def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wait_for, ros_node):
+    import socket
+
+    driver = make_driver()
+    states = listen(names.JOINT_STATES, JointState)
+    power = listen(names.POWER_STATE, PowerState)
+    publisher = ros_node.create_publisher(
+        PlcInputs, names.PLC_INPUTS, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    )
+    publisher.publish(PlcInputs(hib=True))
+    wait_for(lambda: power and power[-1].mode == PowerMode.HIBERNATION, timeout=20.0)
+    asleep_from = len(power)
+    with pytest.raises(RequestRefusedError, match="Wake-on-LAN"):
+        cell_client.ask(names.QUERY_MODES, QueryModes.Request())
+    with pytest.raises(RequestRefusedError, match="HIBERNATION"):
+        cell_client.execute(movement(), timeout=30.0)
+    silent = len(states)
+    wait_for(lambda: len(power) > asleep_from + 20, timeout=20.0)
+    assert len(states) <= silent + 1  # one may have been on its way
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(magic_packet("02:00:00:c4:02:11"), ("127.0.0.1", driver.wake_port))
+        sender.sendto(magic_packet(MAC), ("127.0.0.1", driver.wake_port))
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+    wait_for(lambda: len(states) > silent + 10)
+
+
+def test_a_pause_is_entered_and_ended(make_driver, cell_client, listen, wait_for):
+    make_driver(**{"transitions.hibernation_enter": 60.0})
+    power = listen(names.POWER_STATE, PowerState)
+    modes = cell_client.ask(names.QUERY_MODES, QueryModes.Request()).modes
+    assert [mode.mode for mode in modes] == [0, 2, 3, 4]
+    answer = cell_client.ask(names.START_PAUSE, StartPause.Request(pause=2.0))
+    wait_for(lambda: power and power[-1].mode == answer.mode.mode, timeout=20.0)
+    cell_client.ask(names.END_PAUSE, EndPause.Request())
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+
+
+def test_loads_and_their_refusals(make_driver, cell_client):
+    make_driver()
+    assert cell_client.ask(names.SET_LOAD, SetLoad.Request(load="none")).total_mass == 0.0
+    for request in (
+        SetLoad.Request(load="anvil"),
+        SetLoad.Request(load="custom", mass=-1.0),
+        SetLoad.Request(load="custom", mass=float("nan")),
+        SetLoad.Request(load="custom", mass=10_000.0),
+    ):
+        with pytest.raises(RequestRefusedError):
+            cell_client.ask(names.SET_LOAD, request)
+    assert cell_client.ask(names.SET_LOAD, SetLoad.Request(load="custom", mass=50.0)).total_mass == 50.0
+
+
+def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_client, listen, wait_for):
+    make_driver(backend="pybullet")
+    states, power = listen(names.JOINT_STATES, JointState), listen(names.POWER_STATE, PowerState)
+
+    pressed = []
+    wait_for(lambda: states, timeout=20.0)
+
+    def watch(feedback):
+        if not pressed:
+            pressed.append(feedback)
+            future = cell_client.node.create_client(SetPlcInput, names.SET_PLC_INPUT)
+            future.call_async(SetPlcInput.Request(name="emergency_stop", value=True))
+
+    with pytest.raises(RequestRefusedError, match="emergency stop"):
+        cell_client.execute(movement(0.3, 3.0), feedback=watch, timeout=30.0)
+    wait_for(lambda: power[-1].mode == PowerMode.EMERGENCY_STOP)
+    with pytest.raises(RequestRefusedError, match="release"):
+        cell_client.ask(names.RECOVER, Recover.Request())
+    cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="emergency_stop", value=False))
+    wait_for(lambda: np.abs(states[-1].velocity).max() == 0.0)
+    stopped = np.array(states[-1].position)
+    wait_for(lambda: cell_client.call(names.RECOVER, Recover.Request()).status.code == 1)
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+    assert np.allclose(states[-1].position, stopped, atol=1e-9)
