@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
@@ -21,9 +22,10 @@ from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.status import StatusCode
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ir_msgs_py import names
@@ -114,10 +116,9 @@ class RecorderNode(Node):
         if session is None:
             return None
         summary = session.finish()
-        if self.context.ok():  # after a signal nobody hears the log any more
-            self.get_logger().info(
-                f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, {self._lost} lost"
-            )
+        self.get_logger().info(
+            f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, {self._lost} lost"
+        )
         return summary
 
     def _on_start(self, request: Any, response: Any) -> Any:
@@ -281,45 +282,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
     parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
     options = parser.parse_args(remove_ros_args(["ir-record", *everything])[1:])
-    rclpy.init(args=everything)
-    node = None
-    try:
-        executor = SingleThreadedExecutor()
-        node = RecorderNode()
-        if options.path:
-            node.start(options.path, options.overwrite, options.topics, options.cell)
-        executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return _close(node)
-    except (RecorderError, MsgsError) as error:
-        _say(error)
-    except Exception:  # a signal ended the context in the middle of a call: rclpy raises nearly anything
-        if rclpy.ok():
-            raise
-        return _close(node)
-    _close(node)
-    return 1
-
-
-def _close(node: RecorderNode | None) -> int:
+    # rclpy's own handlers end the context, perhaps between two lines of finishing the file; a flag can't
+    stopping = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)  # a second one must not cut the end of the file off
+        signal.signal(number, lambda *_: stopping.set())
+    rclpy.init(args=everything, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        if node is not None:
-            node.finish()
-    except WriteError as error:
-        _say(error)
+        return _record(options, stopping)
+    except (RecorderError, MsgsError) as error:
+        sys.stderr.write(f"ir-record: {error}\n")
         return 1
     finally:
-        if node is not None:
-            node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _record(options: argparse.Namespace, stopping: threading.Event) -> int:
+    node = RecorderNode()
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        if options.path:
+            node.start(options.path, options.overwrite, options.topics, options.cell)
+        while not stopping.is_set():
+            executor.spin_once(timeout_sec=0.1)
+    finally:
+        try:
+            node.finish()
+        finally:
+            executor.remove_node(node)
+            node.destroy_node()
     return 0
-
-
-def _say(error: Exception) -> None:
-    sys.stderr.write(f"ir-record: {error}\n")
 
 
 if __name__ == "__main__":
