@@ -1,1 +1,3 @@
-"""Planning core: movements and programs of an industrial robot among machines, with joules, seconds and clearance."""
+"""Planning core: movements and programs of an industrial robot among machines, with joules, seconds and
+clearance.
+"""

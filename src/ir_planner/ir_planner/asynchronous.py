@@ -1,8 +1,8 @@
 """Asynchronous PTP: every joint takes its own time and stops when it has arrived.
 
-Each joint has its own fastest law. Together they may ask too much of some joint's torque; then all of them are slowed
-by one factor, found by halving. The joints leave the straight line between start and goal, so clearance is another
-question than for the synchronous movement.
+Each joint has its own fastest law. Together they may ask too much of some joint's torque; then all of them
+are slowed by one factor, found by halving. The joints leave the straight line between start and goal, so
+clearance is another question than for the synchronous movement.
 """
 
 import numpy as np
@@ -41,7 +41,8 @@ def own_laws(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics
         if use.max() > limits.torque_share:
             joint = int(np.argmax(use.max(axis=0)))
             raise TimingError(
-                f"joint {joint + 1} needs {use[:, joint].max():.2f} times its torque at a tenth of its acceleration",
+                f"joint {joint + 1} needs {use[:, joint].max():.2f} times its torque at a tenth of its "
+                "acceleration",
                 joint,
             )
     return best

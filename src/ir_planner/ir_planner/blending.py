@@ -1,10 +1,12 @@
 """Several straight movements in one: each has its law, and the next starts before the last has stopped.
 
-q(t) = q_0 + sum_k d_k s_k(t - o_k). While two laws overlap the arm cuts the corner inside the triangle of the two
-movements, as a controller's approximate positioning does; without overlap it stops at the corner. All terms are
-cubics between switches on the 1 ms grid, so their sum is one exact trajectory with a point per switch.
+q(t) = q_0 + sum_k d_k s_k(t - o_k). While two laws overlap the arm cuts the corner inside the triangle of
+the two movements, as a controller's approximate positioning does; without overlap it stops at the corner.
+All terms are cubics between switches on the 1 ms grid, so their sum is one exact trajectory with a point
+per switch.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +21,9 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class TimedPath:
-    """Waypoints (M, n) rad, the laws of each of the M-1 steps, and how long neighbours overlap [grid steps] (M-2)."""
+    """Waypoints (M, n) rad, the laws of each of the M-1 steps, and how long neighbours overlap [grid steps]
+    (M-2).
+    """
 
     waypoints: FloatArray
     laws: tuple[StepLaws, ...]
@@ -39,14 +43,16 @@ class TimedPath:
         return int(self.starts[-1]) + self.laws[-1].total
 
     def corner_window(self, corner: int) -> tuple[int, int]:
-        """Grid steps between which the movements before and after inner waypoint `corner` (0-based) overlap."""
+        """Grid steps between which the movements before and after inner waypoint `corner` (0-based)
+        overlap.
+        """
         begin = int(self.starts[corner + 1])
         return begin, begin + self.overlaps[corner]
 
 
 def largest_overlaps(laws: tuple[StepLaws, ...]) -> tuple[int, ...]:
     """Overlap in which one movement brakes while the next speeds up; never more than two laws at a time."""
-    return tuple(min(before.ramp_down, after.ramp_up) for before, after in zip(laws, laws[1:], strict=False))
+    return tuple(min(before.ramp_down, after.ramp_up) for before, after in itertools.pairwise(laws))
 
 
 def blended(path: TimedPath, joint_names: tuple[str, ...]) -> JointTrajectory:

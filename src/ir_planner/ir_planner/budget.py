@@ -1,4 +1,5 @@
-"""How much work a request may cost: counted in certified edges, with time only as a ceiling, and a way to stop it.
+"""How much work a request may cost: counted in certified edges, with time only as a ceiling, and a way to
+stop it.
 
 Counting work keeps answers reproducible; a clock that cuts an answer short makes it say `truncated`.
 """
@@ -15,7 +16,8 @@ Clock = Callable[[], float]
 class Budget:
     """Work left for one request.
 
-    `max_iterations`: edges that searches may certify. `deadline` [s] on `clock`. `cancelled` is asked at every step.
+    `max_iterations`: edges that searches may certify. `deadline` [s] on `clock`. `cancelled` is asked at
+    every step.
     """
 
     max_iterations: int

@@ -1,4 +1,6 @@
-"""Metric distances at configurations and along a trajectory: the nearest pair, its closest points, a profile."""
+"""Metric distances at configurations and along a trajectory: the nearest pair, its closest points, a
+profile.
+"""
 
 from dataclasses import dataclass
 
@@ -19,8 +21,8 @@ _PER_ZOOM = 9
 class ClearanceProfile:
     """times (N,) s and distances (N,) m of the nearest pair without an allowed contact (inf: no pair).
 
-    smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs with a safety distance of
-    their own, where they are nearest. path_length [m] of the tcp.
+    smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs with a safety
+    distance of their own, where they are nearest. path_length [m] of the tcp.
     """
 
     times: FloatArray
@@ -90,11 +92,10 @@ def clearance_profile(
         if closer.distance[k] < best.distance[row]:
             best, row, at = closer, k, float(zoom[k])
         half /= (_PER_ZOOM - 1) / 2
-    contacts = []
+    contacts: list[DistancePair] = []
     if allowed.any():
-        distances = scene.collision.distances(q)
-        for z in np.flatnonzero(allowed):
-            contacts.append(pair_value(scene, q[int(np.argmin(distances[:, z]))], int(z), True))
+        lowest = np.argmin(scene.collision.distances(q), axis=0)
+        contacts.extend(pair_value(scene, q[lowest[z]], int(z), True) for z in np.flatnonzero(allowed))
     tcp = scene.chain.tcp_poses(q)[:, :3, 3]
     return ClearanceProfile(
         times=times,

@@ -1,4 +1,5 @@
-"""Simple ways round: over the named postures, with the arm drawn back first, or over one configuration beside.
+"""Simple ways round: over the named postures, with the arm drawn back first, or over one configuration
+beside.
 
 Candidates are generated in one go and judged in one batch; which of them are free is another question.
 """
@@ -12,7 +13,7 @@ _SPREADS = (0.15, 0.35, 0.7)  # rad: how far vias are scattered around the strai
 
 
 def over_postures(start: FloatArray, goal: FloatArray, postures: list[FloatArray]) -> list[FloatArray]:
-    """Paths (3, n) over each posture, and over each posture turned to where start, goal or the middle look."""
+    """Paths (3, n) over each posture, and over each turned to where start, goal or the middle look."""
     paths = []
     for posture in postures:
         paths.append(np.stack([start, posture, goal]))

@@ -1,7 +1,8 @@
 """Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is always drawn.
 
-Energy = base + sum of the axes (signed) + burnt + change of the capacitor. The power is taken at the middles of steps
-of at most 1 ms. Each movement starts with an empty capacitor; what is left in it at the end is not credited.
+Energy = base + sum of the axes (signed) + burnt + change of the capacitor. The power is taken at the
+middles of steps of at most 1 ms. Each movement starts with an empty capacitor; what is left in it at the
+end is not credited.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,8 @@ STEP_S = 1e-3
 
 @dataclass(frozen=True)
 class MovementEnergy:
-    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), burnt, capacitor.
+    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), burnt,
+    capacitor.
 
     peak [W] at the mains; times (N,) s (middles of the steps) and watts (N,) at the mains: its profile.
     """

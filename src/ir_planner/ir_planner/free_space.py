@@ -1,4 +1,6 @@
-"""Where a search may go: configurations and straight joint movements whose distances all exceed their thresholds."""
+"""Where a search may go: configurations and straight joint movements whose distances all exceed their
+thresholds.
+"""
 
 from dataclasses import dataclass
 
@@ -23,7 +25,9 @@ class FreeSpace:
 
     @staticmethod
     def of(scene: PlanningScene, safety_distance: float, budget: Budget, station: str = "") -> "FreeSpace":
-        """Free space for S_m, or what `station` allows its pairs; half of the proof's tolerance is kept in hand."""
+        """Free space for S_m, or what `station` allows its pairs; half of the proof's tolerance is kept in
+        hand.
+        """
         return FreeSpace(scene, scene.thresholds(safety_distance, station) - PROOF_TOLERANCE / 2, budget)
 
     @property
@@ -54,7 +58,9 @@ class FreeSpace:
         return np.asarray(self.certificates(q0, q1).verdict == FREE)
 
     def paths_free(self, paths: list[FloatArray]) -> BoolArray:
-        """Which paths (M_k, n) are free in all their steps; configurations are asked first, they are cheaper."""
+        """Which paths (M_k, n) are free in all their steps; configurations are asked first, they are
+        cheaper.
+        """
         result = np.ones(len(paths), dtype=bool)
         inner = [path[1:-1] for path in paths]
         owner = np.repeat(np.arange(len(paths)), [len(points) for points in inner])

@@ -1,7 +1,7 @@
 """What a person types as a goal: a station, a posture, joint values in degrees, or a pose of the tcp.
 
-"lathe" | "park" | "home" | "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0" | "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m and degrees, KUKA's
-A, B, C: Z-Y'-X'').
+"lathe" | "park" | "home" | "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0" | "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m and
+degrees, KUKA's A, B, C: Z-Y'-X'').
 """
 
 import math
@@ -26,7 +26,9 @@ _LENGTH_MAX = 100.0  # m
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Exactly one of configuration (n,) rad and pose (4, 4) of the tcp in the cell; station: its name, "" for none."""
+    """Exactly one of configuration (n,) rad and pose (4, 4) of the tcp in the cell; station: its name, ""
+    for none.
+    """
 
     configuration: FloatArray | None = None
     pose: FloatArray | None = None
@@ -78,7 +80,8 @@ def parse_goal(text: str, cell: Cell) -> Goal:
         if max(abs(x), abs(y), abs(z)) > _LENGTH_MAX:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"goal lies at ({x:g}, {y:g}, {z:g}) m: X, Y and Z must be in [-{_LENGTH_MAX:g}, {_LENGTH_MAX:g}] m",
+                f"goal lies at ({x:g}, {y:g}, {z:g}) m: X, Y and Z must be in "
+                f"[-{_LENGTH_MAX:g}, {_LENGTH_MAX:g}] m",
             )
         pose = np.eye(4)
         pose[:3, :3] = rotation_from_abc(abc)
@@ -97,7 +100,9 @@ def parse_goal(text: str, cell: Cell) -> Goal:
 
 
 def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> FloatArray:
-    """Joint values (n,) rad within the robot's limits; else RequestError with joint, value and bounds in degrees."""
+    """Joint values (n,) rad within the robot's limits; else RequestError with joint, value and bounds in
+    degrees.
+    """
     robot = cell.robot
     for i, value in enumerate(q):
         low, high = float(robot.position_min[i]), float(robot.position_max[i])
@@ -117,7 +122,8 @@ def _numbers(keys: list[str], values: list[str], expected: list[str], unit: str)
     if sorted(keys) != sorted(expected) or len(values) != len(keys):
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"goal names {' '.join(keys)[:80]}: it must give each of {' '.join(expected)} once, with a number",
+            f"goal names {' '.join(keys)[:80]}: it must give each of "
+            f"{' '.join(expected)} once, with a number",
         )
     numbers: dict[str, float] = {}
     for key, value in zip(keys, values, strict=True):

@@ -1,6 +1,7 @@
 """Configurations that reach a pose: the complete closed-form set, filtered by clearance, ranked by cost.
 
-Rank: W of eq. (9) from a given configuration, then clearance. What is dropped is counted by the pair in the way.
+Rank: W of eq. (9) from a given configuration, then clearance. What is dropped is counted by the pair in the
+way.
 """
 
 from collections import Counter
@@ -58,7 +59,8 @@ def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configuratio
         away = float(np.linalg.norm(np.array([x, y, z]) - wrist))
         return Status(
             StatusCode.NO_IK_SOLUTION,
-            f"{place} can't be reached in this orientation within the joint limits (the tcp would be {away:.2f} m from "
+            f"{place} can't be reached in this orientation within the joint limits "
+            f"(the tcp would be {away:.2f} m from "
             "the robot's base)",
         )
     reasons = ", ".join(f"{reason} ({count})" for reason, count in found.rejected.most_common(4))

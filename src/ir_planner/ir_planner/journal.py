@@ -1,4 +1,4 @@
-"""How an answer came about: stages with their seconds, what was rejected and why; becomes the PlanningInfo."""
+"""How an answer came about: stages with their seconds, what was rejected and why."""
 
 from collections import Counter
 from collections.abc import Iterator

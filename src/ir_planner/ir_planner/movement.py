@@ -1,10 +1,13 @@
-"""From waypoints to a certified movement: laws in time, corners cut as far as allowed, the duration that pays.
+"""From waypoints to a certified movement: laws in time, corners cut as far as allowed, the duration that
+pays.
 
-Proved free are the straight steps between waypoints. Cutting corners leaves them, so the blended trajectory is
-certified itself, and each corner that is in the way is cut less, down to a stop. Then the whole movement is stretched
-to the duration that the objective likes best, and what is sent is verified as it is interpolated.
+Proved free are the straight steps between waypoints. Cutting corners leaves them, so the blended trajectory
+is certified itself, and each corner that is in the way is cut less, down to a stop. Then the whole movement
+is stretched to the duration that the objective likes best, and what is sent is verified as it is
+interpolated.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +36,9 @@ _DURATION_SLACK = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class TimedMovement:
-    """A trajectory with everything that is known about it; `note` says where it differs from what was asked."""
+    """A trajectory with everything that is known about it; `note` says where it differs from what was
+    asked.
+    """
 
     waypoints: FloatArray
     trajectory: JointTrajectory
@@ -49,7 +54,8 @@ class TimedMovement:
 def timed_movement(
     waypoints: FloatArray, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = ""
 ) -> TimedMovement:
-    """The movement over `waypoints` (M, n), whose straight steps are free, at the best duration for the objective.
+    """The movement over `waypoints` (M, n), whose straight steps are free, at the best duration for the
+    objective.
 
     Raises TimingError when a torque does not suffice, RequestError when the wished duration is too short.
     """
@@ -65,7 +71,7 @@ def timed_movement(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
         fastest, note = _fastest(waypoints, scene, options, limits, budget, station)
-        trajectory = _stretched_to_wish(fastest, scene, options)
+        trajectory = stretched_to_wish(fastest, scene, options)
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
         if violation is None or violation.what != "torque":
@@ -94,7 +100,7 @@ def _fastest(
     station: str,
 ) -> tuple[JointTrajectory, str]:
     names, dynamics = scene.cell.robot.joint_names, scene.dynamics
-    steps = list(zip(waypoints, waypoints[1:], strict=False))
+    steps = list(itertools.pairwise(waypoints))
     note = ""
     if options.timing == "asynchronous":
         laws = tuple(own_laws(a, b, limits, dynamics) for a, b in steps)
@@ -170,14 +176,19 @@ def _guilty_corners(
     return guilty
 
 
-def _stretched_to_wish(
+def stretched_to_wish(
     fastest: JointTrajectory, scene: PlanningScene, options: PlanOptions
 ) -> JointTrajectory:
+    """The fastest trajectory at the wished duration, or at the one the objective likes best.
+
+    Raises RequestError when the wished duration is shorter than the fastest.
+    """
     if options.duration > 0.0:
         if options.duration < fastest.duration * (1.0 - _DURATION_SLACK):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"duration is {options.duration:g} s: the shortest within the limits is {fastest.duration:.4g} s",
+                f"duration is {options.duration:g} s: the shortest within the limits is "
+                f"{fastest.duration:.4g} s",
             )
         return stretched(fastest, max(options.duration / fastest.duration, 1.0))
     return stretched(fastest, best_stretch(fastest, scene, options.objective, options.time_value))

@@ -1,9 +1,11 @@
 """Cost of a movement by the masses that it swings: eq. (9).
 
-W = sum_i w_i |q_{s+1}^i - q_s^i| with w_i = 1/2 sum_{l=i..n} m_l qd_{l,max}^2: a joint near the base carries more of
-the arm and counts more. (As printed the lower index of the sum makes all weights equal; it starts at the joint.)
-W ranks movements; it is not their energy.
+W = sum_i w_i |q_{s+1}^i - q_s^i| with w_i = 1/2 sum_{l=i..n} m_l qd_{l,max}^2: a joint near the base
+carries more of the arm and counts more. (As printed the lower index of the sum makes all weights equal; it
+starts at the joint.) W ranks movements; it is not their energy.
 """
+
+import itertools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +16,8 @@ FloatArray = NDArray[np.float64]
 def movement_weights(link_mass: FloatArray, velocity_max: FloatArray, load_mass: float = 0.0) -> FloatArray:
     """Weights w (n,) of eq. (9) [kg rad^2/s^2].
 
-    `link_mass` (n+1,) kg from the base on (the base never moves and does not count), `velocity_max` (n,) rad/s,
-    `load_mass` kg is carried by the last link.
+    `link_mass` (n+1,) kg from the base on (the base never moves and does not count), `velocity_max` (n,)
+    rad/s, `load_mass` kg is carried by the last link.
     """
     mass = np.array(link_mass[1:], dtype=float)
     mass[-1] += load_mass
@@ -40,7 +42,7 @@ def cheapest_chain(layers: list[FloatArray], weights: FloatArray) -> tuple[list[
     """
     cost = np.zeros(len(layers[0]))
     came: list[NDArray[np.intp]] = []
-    for here, there in zip(layers, layers[1:], strict=False):
+    for here, there in itertools.pairwise(layers):
         through = cost[:, None] + movement_cost(weights, here[:, None, :], there[None, :, :])
         came.append(np.argmin(through, axis=0))
         cost = np.min(through, axis=0)

@@ -3,6 +3,8 @@
 Everything is tried in batches of certified edges, so a polished path is as free as the one it came from.
 """
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,9 @@ _CORNER = 0.04  # what a corner costs, as a share of the straight movement's W: 
 
 
 def fewest_corners(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray:
-    """The cheapest path over points of `path` (M, n): all shortcuts certified in one call, then shortest path."""
+    """The cheapest path over points of `path` (M, n): all shortcuts certified in one call, then shortest
+    path.
+    """
     points = densified(path, _POINTS)
     count = len(points)
     first, last = np.triu_indices(count, 1)
@@ -44,7 +48,7 @@ def densified(path: FloatArray, count: int) -> FloatArray:
     """The path with points added in its longest steps until there are `count`."""
     points = [np.asarray(q) for q in path]
     while len(points) < count:
-        steps = [float(np.linalg.norm(b - a)) for a, b in zip(points, points[1:], strict=False)]
+        steps = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(points)]
         k = int(np.argmax(steps))
         points.insert(k + 1, 0.5 * (points[k] + points[k + 1]))
     return np.array(points)
@@ -53,8 +57,8 @@ def densified(path: FloatArray, count: int) -> FloatArray:
 def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray:
     """The path with every inner waypoint moved towards the straight line as far as certified edges allow.
 
-    W of eq. (9) only asks that a joint does not turn back: so each joint is also moved alone into the range of the
-    neighbours.
+    W of eq. (9) only asks that a joint does not turn back: so each joint is also moved alone into the range
+    of the neighbours.
     """
     path = path.copy()
     for _ in range(_ROUNDS):

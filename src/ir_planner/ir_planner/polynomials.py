@@ -1,8 +1,8 @@
 """Exact extremes of a trajectory between its points: what a limit is compared with.
 
-A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, 6). An extreme of a
-polynomial lies at an end or at a root of its derivative; roots are bracketed between the roots of the next
-derivative, down to a line, so none is missed and no sampling takes part.
+A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, 6). An extreme
+of a polynomial lies at an end or at a root of its derivative; roots are bracketed between the roots of the
+next derivative, down to a line, so none is missed and no sampling takes part.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,9 @@ _HALVINGS = 30  # a root to 1e-9 of the segment: the value at an extreme is off 
 
 @dataclass(frozen=True)
 class Extremes:
-    """Largest values per segment and joint, each (S, n): rad, rad/s, rad/s^2, rad/s^3; `travel` is sum |dq|."""
+    """Largest values per segment and joint, each (S, n): rad, rad/s, rad/s^2, rad/s^3; `travel` is sum
+    |dq|.
+    """
 
     lowest: FloatArray
     highest: FloatArray
@@ -41,7 +43,8 @@ def derivative(polynomial: FloatArray) -> FloatArray:
 
 
 def roots_between(polynomial: FloatArray, turning: FloatArray) -> FloatArray:
-    """Roots in [0, 1] of polynomials (P, k+1), given points (P, k-1) that hold the roots of their derivatives.
+    """Roots in [0, 1] of polynomials (P, k+1), given points (P, k-1) that hold the roots of their
+    derivatives.
 
     Returns (P, k), ascending; where a piece has no root, one of its ends stands in.
     """

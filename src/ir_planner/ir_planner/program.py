@@ -1,11 +1,13 @@
-"""A whole program: configurations at the stations, all movements and pauses between them, loads and power modes.
+"""A whole program: configurations at the stations, all movements and pauses between them, loads and power
+modes.
 
-Configurations first (shortest path of eq. 9), then the movements in order, each with what is held at that moment.
+Configurations first (shortest path of eq. 9), then the movements in order, each with what is held at that
+moment.
 """
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from ir_kernels.power import Regeneration
@@ -30,6 +32,7 @@ from ir_planner.regional import search_regional
 from ir_planner.reporting import total_report
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ServiceLine, timed_service
+from ir_planner.settings import PauseSettings
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int, float], None]
@@ -43,12 +46,14 @@ class ProgramPlan:
     info: PlanningInfo
     program_id: str = ""
     movements: tuple[PlannedMovement, ...] = ()
-    report: TrajectoryReport = TrajectoryReport()
+    report: TrajectoryReport = field(default_factory=TrajectoryReport)
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramRequest:
-    """What to plan: the cell, its stations to visit (empty: its program), from `start` (n,), in `cycle_time` s (0: free)."""
+    """What to plan: the cell, its stations to visit (empty: its program), from `start` (n,), in
+    `cycle_time` s (0: free).
+    """
 
     cell: Cell
     power: PowerData
@@ -57,10 +62,10 @@ class ProgramRequest:
     options: PlanOptions
     cycle_time: float = 0.0
     regeneration: Regeneration = "shared"
-    transition_scale: float = 1.0
+    pauses: PauseSettings = field(default_factory=PauseSettings)
 
 
-class _Failed(Exception):
+class _FailedError(Exception):
     """A stage found nothing; carries the status."""
 
     def __init__(self, status: Status) -> None:
@@ -74,7 +79,7 @@ def plan_program(request: ProgramRequest, budget: Budget, progress: Progress) ->
     try:
         movements, elapsed = _Planner(request, journal, progress).run()
         status = Status.success()
-    except _Failed as failed:
+    except _FailedError as failed:
         movements, elapsed, status = (), (), failed.status
     except TimingError as error:
         movements, elapsed, status = (), (), Status(StatusCode.PLANNING_FAILED, str(error))
@@ -90,9 +95,9 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
     """Id of a program: hash of its steps and the ids of their trajectories."""
     digest = hashlib.sha256()
     for m in movements:
-        fields = (m.kind, m.from_station, m.to_station, m.trajectory_id, repr(m.duration), m.power_mode, m.attach,
-                  m.detach, m.load, *m.wait_for, "|", *m.set_signals)  # fmt: skip
-        digest.update("\0".join(str(value) for value in fields).encode() + b"\n")
+        texts = (m.kind, m.from_station, m.to_station, m.trajectory_id, repr(m.duration), m.power_mode)
+        handling = (m.attach, m.detach, m.load, *m.wait_for, "|", *m.set_signals)
+        digest.update("\0".join(str(value) for value in (*texts, *handling)).encode() + b"\n")
     return digest.hexdigest()[:16]
 
 
@@ -108,7 +113,8 @@ class _Planner:
         if request.options.load not in ("", NO_LOAD):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"load is {request.options.load!a}: in a program the steps say what is attached, leave it empty",
+                f"load is {request.options.load!a}: in a program the steps say what is "
+                "attached, leave it empty",
             )
         bare = request.options.load == NO_LOAD
         self.scenes = Scenes(cell, request.power, request.regeneration, bare)
@@ -146,7 +152,7 @@ class _Planner:
                 )
                 found, status = self._nodes(k, self.scenes.of(leaving), layers[-1][0].outside)
                 if not status.ok:
-                    raise _Failed(status)
+                    raise _FailedError(status)
                 layers.append(found)
             notes.append(" x ".join(str(len(layer)) for layer in layers))
         if not stops:
@@ -161,7 +167,7 @@ class _Planner:
             chosen, cost = graph.solve(lambda best: self.progress("station graph", 0, total, best))
             notes.append(f"W {cost:.0f}, {graph.settled} settled")
         if not np.isfinite(cost):
-            raise _Failed(self._unreachable)
+            raise _FailedError(self._unreachable)
         return [layer[k] for layer, k in zip(layers, chosen, strict=True)]
 
     def _nodes(self, k: int, leaving: PlanningScene, near: FloatArray) -> tuple[list[Node], Status]:
@@ -229,7 +235,7 @@ class _Planner:
         if np.abs(second.outside - first.outside).max() > 1e-9:
             across = self._movement(stops, place, first, second)
             if across is None:
-                raise _Failed(self._unreachable)
+                raise _FailedError(self._unreachable)
             movements.append((MovementKind.REGIONAL, across))
         if len(second.line.points) > 1:
             entering = timed_service(second.line, True, to_name, scene, self.options, budget)
@@ -239,16 +245,16 @@ class _Planner:
     def _proved(self, movement: TimedMovement, what: str) -> TimedMovement:
         if movement.violation is not None:
             sentence = f"{what}: {movement.violation.sentence}"
-            raise _Failed(Status(StatusCode.PLANNING_FAILED, sentence))
+            raise _FailedError(Status(StatusCode.PLANNING_FAILED, sentence))
         return movement
 
     def _assembled(self, legs: dict[int, Leg]) -> tuple[PlannedMovement, ...]:
-        return assembled(self.steps, legs, self.scenes, self.request.transition_scale, self.request.start)
+        return assembled(self.steps, legs, self.scenes, self.request.pauses, self.request.start)
 
     def _within_cycle(
         self, planned: tuple[PlannedMovement, ...], legs: dict[int, Leg], stops: list[int], nodes: list[Node]
     ) -> tuple[PlannedMovement, ...]:
-        """The movements at the pace that fills the cycle time: all stretched alike, or as fast as they can."""
+        """The movements at the pace that fills the cycle time: stretched alike, or as fast as they can."""
         cycle = self.request.cycle_time
         standing, moving = _seconds(planned)
         wanted = cycle - standing
@@ -260,7 +266,8 @@ class _Planner:
         if wanted < moving * (1.0 - 1e-9):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"cycle_time is {cycle:g} s: the shortest is {moving + standing:.3f} s, of which {standing:.3f} s are "
+                f"cycle_time is {cycle:g} s: the shortest is {moving + standing:.3f} s, "
+                f"of which {standing:.3f} s are "
                 "pauses",
             )
         factor = wanted / moving if moving > 0.0 else 1.0

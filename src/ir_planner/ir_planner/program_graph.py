@@ -1,9 +1,9 @@
 """Which configuration at which station: the shortest path of eq. (9) over stations x configurations.
 
-Each stop of a program is a layer of configurations; the cost between two of them is W. A straight movement may
-collide, so costs are settled lazily: the shortest path is found with what is known, the steps on it are certified (or
-a way round is planned), their true cost is entered, and the search repeats until all steps of the shortest path are
-settled.
+Each stop of a program is a layer of configurations; the cost between two of them is W. A straight movement
+may collide, so costs are settled lazily: the shortest path is found with what is known, the steps on it are
+certified (or a way round is planned), their true cost is entered, and the search repeats until all steps of
+the shortest path are settled.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,9 @@ _DETOUR = 1.6  # a first guess: a way round costs this times the straight moveme
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A way to stand at a stop: where the arm works, and where it is while nothing else may be near (`outside`)."""
+    """A way to stand at a stop: where the arm works, and where it is while nothing else may be near
+    (`outside`).
+    """
 
     line: ServiceLine
 
@@ -66,7 +68,9 @@ Plan = Callable[[int, Node, Node], float | None]
 
 @dataclass
 class StationGraph:
-    """Gaps in order. certify(gap, q0 (K, n), q1 (K, n)): which are free; plan(gap, a, b): W of a way round, or None."""
+    """Gaps in order. certify(gap, q0 (K, n), q1 (K, n)): which are free; plan(gap, a, b): W of a way round,
+    or None.
+    """
 
     gaps: list[Gap]
     certify: Certify

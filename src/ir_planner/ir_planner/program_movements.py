@@ -11,6 +11,7 @@ from ir_planner.movement import TimedMovement
 from ir_planner.program_steps import PlacedStep, Scenes, signal_text
 from ir_planner.reporting import evaluate_trajectory
 from ir_planner.scene import PlanningScene
+from ir_planner.settings import PauseSettings
 from ir_planner.standby import pause_energy, plan_standby
 
 FloatArray = NDArray[np.float64]
@@ -19,7 +20,7 @@ AUTO = "AUTO"
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """How a stop is reached: its movements with their kind, and the scene (what is held) in which they run."""
+    """How a stop is reached: its movements with their kind, and the scene in which they run."""
 
     from_name: str
     to_name: str
@@ -53,9 +54,13 @@ class Leg:
 
 
 def assembled(
-    steps: tuple[PlacedStep, ...], legs: dict[int, Leg], scenes: Scenes, scale: float, start: FloatArray
+    steps: tuple[PlacedStep, ...],
+    legs: dict[int, Leg],
+    scenes: Scenes,
+    times: PauseSettings,
+    start: FloatArray,
 ) -> tuple[PlannedMovement, ...]:
-    """Movements and pauses in order. `legs`: by the step they belong to. `scale`: of the power modes' transitions.
+    """Movements and pauses in order. `legs`: by the step they belong to. `times`: of the power modes.
 
     A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
     """
@@ -78,7 +83,7 @@ def assembled(
         if step.dwell > 0.0 or (not moves and (handling or waiting)):
             late = not moves
             scene = scenes.of(placed.after if moves else placed.before)
-            pause = _pause(here, step.dwell, step.power_mode, q, scene, scale)
+            pause = _pause(here, step.dwell, step.power_mode, q, scene, times)
             result.append(
                 replace(
                     pause,
@@ -111,16 +116,16 @@ def _moves(leg: Leg) -> list[PlannedMovement]:
 
 
 def _pause(
-    here: str, duration: float, wish: str, q: FloatArray, scene: PlanningScene, scale: float
+    here: str, duration: float, wish: str, q: FloatArray, scene: PlanningScene, times: PauseSettings
 ) -> PlannedMovement:
     mode = wish
     if duration > 0.0 and wish == AUTO:
-        mode = plan_standby(duration, q, scene, scale).chosen.name
+        mode = plan_standby(duration, q, scene, times).chosen.name
     elif wish == AUTO:
         mode = ""
-    energy = pause_energy(mode or "STAND_ON_MOTORS", duration, q, scene, scale) if duration > 0.0 else 0.0
+    energy = pause_energy(mode or "STAND_ON_MOTORS", duration, q, scene, times) if duration > 0.0 else 0.0
     if not np.isfinite(energy):  # asked for by name though it is too short: it is spent coming and going
-        energy = pause_energy("STAND_ON_MOTORS", duration, q, scene, scale)
+        energy = pause_energy("STAND_ON_MOTORS", duration, q, scene, times)
     return PlannedMovement(
         kind=MovementKind.PAUSE,
         from_station=here,

@@ -1,4 +1,6 @@
-"""The ways to stand at a stop of a program: configurations that can be entered and left with what is held then."""
+"""The ways to stand at a stop of a program: configurations that can be entered and left with what is held
+then.
+"""
 
 from collections import Counter
 
@@ -39,7 +41,9 @@ def station_nodes(
     near: FloatArray,
     journal: Journal,
 ) -> tuple[list[Node], Status]:
-    """Configurations at a station, cheapest from `near` (n,) first, with a free way in and out; or none and why."""
+    """Configurations at a station, cheapest from `near` (n,) first, with a free way in and out; or none and
+    why.
+    """
     station = arriving.station(name)
     threshold = arriving.thresholds(safety_distance, name)
     found = free_configurations(station.pose, arriving, threshold, near)

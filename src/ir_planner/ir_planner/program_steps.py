@@ -1,4 +1,6 @@
-"""A program as its planner sees it: every step with what is held and where the parts lie before and after it."""
+"""A program as its planner sees it: every step with what is held and where the parts lie before and after
+it.
+"""
 
 from dataclasses import dataclass, field, replace
 

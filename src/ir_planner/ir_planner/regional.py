@@ -1,8 +1,9 @@
 """Regional movement: from one free configuration to another, round everything, at least cost.
 
-First the straight movement of all joints (PTP, cost W of eq. 9). Where it collides: simple detours, and as the last
-resort two trees. The cheapest few by W are polished, timed and certified, and the objective decides among them.
-Nothing found is an answer too: which pair is in the way, where, by how much, and what was tried.
+First the straight movement of all joints (PTP, cost W of eq. 9). Where it collides: simple detours, and as
+the last resort two trees. The cheapest few by W are polished, timed and certified, and the objective
+decides among them. Nothing found is an answer too: which pair is in the way, where, by how much, and what
+was tried.
 """
 
 from dataclasses import dataclass, replace
@@ -66,7 +67,7 @@ def search_regional(
 ) -> tuple[Status, TimedMovement | None]:
     """The best movement found, with the status that says so or says why not."""
     space = FreeSpace.of(scene, options.safety_distance, journal.budget)
-    blocked = _end_in_collision(start, goal, space, options.safety_distance)
+    blocked = end_in_collision(start, goal, space, options.safety_distance)
     if blocked is not None:
         return blocked, None
     for name, search in _searches(options.planner_id):
@@ -165,9 +166,10 @@ def _best_of(
     return best
 
 
-def _end_in_collision(
+def end_in_collision(
     start: FloatArray, goal: FloatArray, space: FreeSpace, safety_distance: float
 ) -> Status | None:
+    """The status for a start or goal that is not free; None where both are."""
     for q, what, code in (
         (start, "start", StatusCode.START_STATE_IN_COLLISION),
         (goal, "goal", StatusCode.GOAL_IN_COLLISION),
@@ -184,7 +186,8 @@ def too_near(q: FloatArray, space: FreeSpace, what: str, safety_distance: float)
         return f"{what} is not free"
     where = "in penetration" if pair.distance < 0.0 else "too near"
     return (
-        f"{what}: {pair.body_a} and {pair.body_b} ({pair.kind}) are {where}: distance {pair.distance * 1e3:.1f} mm, "
+        f"{what}: {pair.body_a} and {pair.body_b} ({pair.kind}) are {where}: "
+        f"distance {pair.distance * 1e3:.1f} mm, "
         f"it must be more than {safety_distance * 1e3:.1f} mm"
     )
 
@@ -210,7 +213,8 @@ def _blocked_status(
         StatusCode.PLANNING_FAILED,
         f"no way found{cut}: on the straight movement {pair.body_a} and {pair.body_b} ({pair.kind}) come to "
         f"{pair.distance * 1e3:.1f} mm at {100 * share:.0f} % of it (tcp at {x:.2f}, {y:.2f}, {z:.2f} m), "
-        f"{max(needed - pair.distance, 0.0) * 1e3:.1f} mm less than the {needed * 1e3:.1f} mm they must keep; "
+        f"{max(needed - pair.distance, 0.0) * 1e3:.1f} mm less than the "
+        f"{needed * 1e3:.1f} mm they must keep; "
         f"tried: {tried}; another start or goal configuration, or a smaller safety distance, may help",
     )
 

@@ -1,4 +1,6 @@
-"""The report of a trajectory: what it costs, how near it comes to its limits, and whether all that is proved."""
+"""The report of a trajectory: what it costs, how near it comes to its limits, and whether all that is
+proved.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -52,7 +54,9 @@ def evaluate_trajectory(
 
 
 def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ...]) -> TrajectoryReport:
-    """Report of steps one after the other; `elapsed` (N,) s: when each starts. Pauses have a report as well."""
+    """Report of steps one after the other; `elapsed` (N,) s: when each starts. Pauses have a report as
+    well.
+    """
     moving = [report for report in reports if len(report.velocity_ratio)]
     if not reports or not moving:
         return TrajectoryReport(duration=sum(report.duration for report in reports))
@@ -62,7 +66,7 @@ def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ..
         for name in ("velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio")
     }
     n = len(moving[0].velocity_ratio)
-    first = replace(
+    return replace(
         reports[tightest],
         duration=sum(report.duration for report in reports),
         movement_cost=sum(report.movement_cost for report in reports),
@@ -82,4 +86,3 @@ def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ..
         jerk_ratio=ratios["jerk_ratio"],
         torque_ratio=ratios["torque_ratio"],
     )
-    return first

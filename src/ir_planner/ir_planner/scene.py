@@ -1,4 +1,5 @@
-"""What one request plans in: the cell as it stands, what the robot holds, and the models of both. Never changed.
+"""What one request plans in: the cell as it stands, what the robot holds, and the models of both. Never
+changed.
 
 A request takes its snapshot once; a cell that changes meanwhile does not reach it.
 """
@@ -33,7 +34,9 @@ def load_text(cell: Cell, held: str = "") -> str:
 
 @dataclass(frozen=True, eq=False)
 class PlanningScene:
-    """cell: its parts lie where they are for this request. loads: what is attached, in the frame of the last link."""
+    """cell: its parts lie where they are for this request. loads: what is attached, in the frame of the
+    last link.
+    """
 
     cell: Cell
     loads: tuple[Load, ...]

@@ -1,8 +1,8 @@
 """Service movement: out of a station along -x of the tool (exit), or into it the same way (entry).
 
-The straight line of the tcp over the station's approach distance is followed through closed-form configurations of
-one branch, point by point; a joint spline (eq. 10) runs through them. On the way the station's allowed contacts hold;
-the outer end keeps S_m from everything.
+The straight line of the tcp over the station's approach distance is followed through closed-form
+configurations of one branch, point by point; a joint spline (eq. 10) runs through them. On the way the
+station's allowed contacts hold; the outer end keeps S_m from everything.
 """
 
 from collections import Counter
@@ -38,16 +38,20 @@ class ServiceLine:
     @property
     def work(self) -> FloatArray:
         """At the station."""
-        return self.points[0]
+        first: FloatArray = self.points[0]
+        return first
 
     @property
     def outside(self) -> FloatArray:
         """At the outer end."""
-        return self.points[-1]
+        last: FloatArray = self.points[-1]
+        return last
 
 
 def retreat_poses(station: Station) -> FloatArray:
-    """Poses (L, 4, 4) of the tcp from the station backwards along its -x; one pose where the approach is 0 m."""
+    """Poses (L, 4, 4) of the tcp from the station backwards along its -x; one pose where the approach is 0
+    m.
+    """
     count = int(np.ceil(station.approach_distance / SPACING)) + 1
     back = np.linspace(0.0, station.approach_distance, max(count, 1))
     poses = np.repeat(np.asarray(station.pose)[None], len(back), axis=0)
@@ -58,7 +62,9 @@ def retreat_poses(station: Station) -> FloatArray:
 def service_lines(
     work: FloatArray, station: Station, scene: PlanningScene, rejected: Counter[str]
 ) -> list[ServiceLine]:
-    """Lines from work configurations (K, n); those that leave the limits or change branch are counted and dropped."""
+    """Lines from work configurations (K, n); those that leave the limits or change branch are counted and
+    dropped.
+    """
     poses = retreat_poses(station)
     found = scene.inverse_kinematics.solve(poses)
     lines = []

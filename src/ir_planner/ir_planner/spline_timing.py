@@ -1,8 +1,9 @@
-"""Time for the spline of eq. (10) through given points: interval by interval, until nothing exceeds its limit.
+"""Time for the spline of eq. (10) through given points: interval by interval, until nothing exceeds its
+limit.
 
-The first guess runs every interval at the speed limit of its fastest joint. Then each interval is lengthened or
-shortened by how much of the limits it uses, and at last all of them together until the largest use is 1.
-Durations are whole grid steps (even, the virtual knots halve the first and the last).
+The first guess runs every interval at the speed limit of its fastest joint. Then each interval is
+lengthened or shortened by how much of the limits it uses, and at last all of them together until the
+largest use is 1. Durations are whole grid steps (even, the virtual knots halve the first and the last).
 """
 
 import numpy as np
@@ -32,8 +33,8 @@ def time_spline(
 ) -> JointTrajectory:
     """Trajectory through `points` (M, n), M >= 3, within the limits; neighbouring points differ.
 
-    `given` (M-1,) s: wished durations; their proportions are kept, and all are stretched where limits ask for it.
-    Raises TimingError when a joint's torque does not suffice however slowly.
+    `given` (M-1,) s: wished durations; their proportions are kept, and all are stretched where limits ask
+    for it. Raises TimingError when a joint's torque does not suffice however slowly.
     """
     if given is None:
         steps = _even(1.5 * natural_durations(points, limits.velocity))

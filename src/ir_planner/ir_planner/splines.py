@@ -1,10 +1,10 @@
 """Joint splines of eq. (10): cubics through given points with speed and acceleration given at both ends.
 
-Each segment runs in its own normalised time u in [0, 1]. The first and the last segment carry the conditions at the
-ends, the middle ones join with continuous q, qd and qdd. Giving q, qd and qdd at both ends leaves no room for two of
-the inner positions: the second and the second last knot are virtual, their positions follow.
-(As printed the linear coefficient of the last segment ends in a_f t_n / 2; only with a_f t_n^2 / 2 do the end
-conditions hold.)
+Each segment runs in its own normalised time u in [0, 1]. The first and the last segment carry the
+conditions at the ends, the middle ones join with continuous q, qd and qdd. Giving q, qd and qdd at both
+ends leaves no room for two of the inner positions: the second and the second last knot are virtual, their
+positions follow. (As printed the linear coefficient of the last segment ends in a_f t_n / 2; only with a_f
+t_n^2 / 2 do the end conditions hold.)
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,9 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class JointSpline:
-    """Knots (K,) s with q, qd, qdd (K, n) at each; between knots every joint is a cubic, so nothing else is needed."""
+    """Knots (K,) s with q, qd, qdd (K, n) at each; between knots every joint is a cubic, so nothing else is
+    needed.
+    """
 
     times: FloatArray
     positions: FloatArray
@@ -27,18 +29,24 @@ class JointSpline:
 
 
 def first_segment(q0: float, q1: float, v0: float, a0: float, t1: float) -> FloatArray:
-    """Coefficients (4,) in u, lowest first, of the cubic from q0 with speed v0 and acceleration a0 to q1 in t1 s."""
+    """Coefficients (4,) in u, lowest first, of the cubic from q0 with speed v0 and acceleration a0 to q1 in
+    t1 s.
+    """
     delta = q1 - q0
     return np.array([q0, v0 * t1, a0 * t1**2 / 2, delta - v0 * t1 - a0 * t1**2 / 2])
 
 
 def middle_segment(q0: float, q1: float, v0: float, a0: float, t: float) -> FloatArray:
-    """Coefficients (4,) of a middle cubic: it takes over speed v0 and acceleration a0 of the segment before."""
+    """Coefficients (4,) of a middle cubic: it takes over speed v0 and acceleration a0 of the segment
+    before.
+    """
     return first_segment(q0, q1, v0, a0, t)
 
 
 def last_segment(q0: float, qf: float, vf: float, af: float, tn: float) -> FloatArray:
-    """Coefficients (4,) of the cubic from q0 to qf, where it ends with speed vf and acceleration af after tn s."""
+    """Coefficients (4,) of the cubic from q0 to qf, where it ends with speed vf and acceleration af after
+    tn s.
+    """
     delta = qf - q0
     return np.array(
         [
@@ -57,7 +65,8 @@ def end_state(coefficients: FloatArray, t: float) -> tuple[float, float, float]:
 
 
 def virtual_knots(point_times: FloatArray) -> FloatArray:
-    """Knots (M+2,) for points passed at `point_times` (M,): one virtual knot halves the first and last interval.
+    """Knots (M+2,) for points passed at `point_times` (M,): one virtual knot halves the first and last
+    interval.
 
     With two points the three intervals are equal: a movement of three cubics.
     """
@@ -74,10 +83,11 @@ def spline_through(
     start: tuple[FloatArray, FloatArray] | None = None,
     end: tuple[FloatArray, FloatArray] | None = None,
 ) -> JointSpline:
-    """The C2 spline of eq. (10) through `points` (M, n) at `point_times` (M,) s, cubic between `knots` (M+2,) s.
+    """The C2 spline of eq. (10) through `points` (M, n) at `point_times` (M,) s, cubic between `knots`
+    (M+2,) s.
 
-    `start` and `end`: speed and acceleration (n,) there; None is rest. The knots are the point times and two virtual
-    ones. Raises ValueError when times do not increase.
+    `start` and `end`: speed and acceleration (n,) there; None is rest. The knots are the point times and
+    two virtual ones. Raises ValueError when times do not increase.
     """
     points = np.asarray(points, dtype=float)
     if np.any(np.diff(knots) <= 0.0) or np.any(np.diff(point_times) <= 0.0):

@@ -1,9 +1,11 @@
-"""Time laws s(t) of piecewise constant jerk from 0 to 1, at rest at both ends: seven phases on a grid of 1 ms.
+"""Time laws s(t) of piecewise constant jerk from 0 to 1, at rest at both ends: seven phases on a grid of 1
+ms.
 
-Phases: jerk up, constant acceleration, jerk down, constant speed, and the same for braking; the two halves may
-differ. All durations are whole milliseconds: switches of several laws then never come closer than 1 ms, stretching
-by a factor of six decimals keeps whole nanoseconds, and the interpolant of the points is the law itself.
-Given the durations, speed, accelerations and jerks follow from the distance: rounding durations up never breaks a limit.
+Phases: jerk up, constant acceleration, jerk down, constant speed, and the same for braking; the two halves
+may differ. All durations are whole milliseconds: switches of several laws then never come closer than 1 ms,
+stretching by a factor of six decimals keeps whole nanoseconds, and the interpolant of the points is the law
+itself. Given the durations, speed, accelerations and jerks follow from the distance: rounding durations up
+never breaks a limit.
 """
 
 from dataclasses import dataclass
@@ -20,7 +22,9 @@ _HALVINGS = 60
 
 @dataclass(frozen=True)
 class LawLimits:
-    """Bounds of s, arrays (K,) of K candidate laws: speed 1/s, acceleration and braking 1/s^2, their jerks 1/s^3."""
+    """Bounds of s, arrays (K,) of K candidate laws: speed 1/s, acceleration and braking 1/s^2, their jerks
+    1/s^3.
+    """
 
     speed: FloatArray
     acceleration: FloatArray
@@ -58,7 +62,7 @@ def reached_speed(limits: LawLimits) -> FloatArray:
 
 
 def phase_steps(limits: LawLimits) -> IntArray:
-    """Durations (K, 7) in grid steps of the fastest laws within `limits`; each rounded up, so never faster."""
+    """Durations (K, 7) in grid steps of the fastest laws within `limits`; rounded up, so never faster."""
     speed = reached_speed(limits)
     up, steady = _ramp(speed, limits.acceleration, limits.jerk)
     down, slowing = _ramp(speed, limits.braking, limits.jerk)
@@ -82,7 +86,9 @@ class LawStates:
 
 
 def law_states(steps: IntArray) -> LawStates:
-    """States of the laws with phases `steps` (K, 7): the first half is integrated from 0, the second back from 1."""
+    """States of the laws with phases `steps` (K, 7): the first half is integrated from 0, the second back
+    from 1.
+    """
     t = steps * GRID_S
     rise = t[:, 0] * (t[:, 0] + t[:, 1])
     fall = t[:, 4] * (t[:, 4] + t[:, 5])
@@ -163,7 +169,9 @@ class StepLaws:
 
     @property
     def ramp_up(self) -> int:
-        """Grid steps at the start in which the next-door movement may still brake; none where joints differ."""
+        """Grid steps at the start in which the next-door movement may still brake; none where joints
+        differ.
+        """
         return self.laws[0].ramp_up if len(self.laws) == 1 else 0
 
     @property

@@ -1,9 +1,9 @@
 """Time for a straight movement of all joints (PTP): as fast as speed, acceleration, jerk and torque allow.
 
-All joints follow one law s(t) (synchronous). The limits of the joints bound s'; the torque envelope is not a bound
-of s' alone: it depends on where the arm is and what it carries. So laws of several cruising speeds are tried, and for
-each the acceleration and the braking are raised, by halving, as far as the torque of every joint stays within its
-share of the envelope along the whole law; the shortest wins.
+All joints follow one law s(t) (synchronous). The limits of the joints bound s'; the torque envelope is not
+a bound of s' alone: it depends on where the arm is and what it carries. So laws of several cruising speeds
+are tried, and for each the acceleration and the braking are raised, by halving, as far as the torque of
+every joint stays within its share of the envelope along the whole law; the shortest wins.
 """
 
 from dataclasses import dataclass
@@ -108,7 +108,8 @@ def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynam
     if best is None:
         joint = int(np.argmax(use[0].max(axis=0)))
         raise TimingError(
-            f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full speed and too much at "
+            f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full speed and "
+            "too much at "
             "1/256 of it as well: the load is too heavy for this movement",
             joint,
         )

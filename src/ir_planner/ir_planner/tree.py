@@ -1,8 +1,9 @@
-"""The last resort: two trees grow from start and goal towards each other (RRT-Connect), over certified edges.
+"""The last resort: two trees grow from start and goal towards each other (RRT-Connect), over certified
+edges.
 
-J. Kuffner and S. LaValle, "RRT-Connect", ICRA 2000; here in batches: one round draws many targets, extends the tree
-towards all of them and tries to join every new node with the other tree, in two calls of the kernels. An edge that
-hits something is used as far as it is proved free.
+J. Kuffner and S. LaValle, "RRT-Connect", ICRA 2000; here in batches: one round draws many targets, extends
+the tree towards all of them and tries to join every new node with the other tree, in two calls of the
+kernels. An edge that hits something is used as far as it is proved free.
 """
 
 from dataclasses import dataclass, field

@@ -1,5 +1,6 @@
-"""What holds along a trajectory, for every instant of its interpolant: limits by exact extremes of the polynomials,
-torque by guaranteed bounds, clearance by a certificate. The first violation is named with place, limit and excess.
+"""What holds along a trajectory, for every instant of its interpolant: limits by exact extremes of the
+polynomials, torque by guaranteed bounds, clearance by a certificate. The first violation is named with
+place, limit and excess.
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,9 @@ AT_REST = 1e-6  # rad/s and rad/s^2 that count as rest
 
 @dataclass(frozen=True)
 class Violation:
-    """The first one: time [s] and segment (waypoint index before it), what, value, limit and unit, and a sentence."""
+    """The first one: time [s] and segment (waypoint index before it), what, value, limit and unit, and a
+    sentence.
+    """
 
     time: float
     waypoint: int
@@ -109,7 +112,8 @@ def clearance_violation(
     k = _segment(trajectory, time)
     excess = allowed - pair.distance
     sentence = (
-        f"{pair.body_a} and {pair.body_b} ({pair.kind}) come to {pair.distance * 1e3:.1f} mm after waypoint {k} at "
+        f"{pair.body_a} and {pair.body_b} ({pair.kind}) come to {pair.distance * 1e3:.1f} mm "
+        f"after waypoint {k} at "
         f"{time:.3f} s: they must stay {allowed * 1e3:.1f} mm apart (excess {excess * 1e3:.1f} mm)"
     )
     return Violation(start + begin, k, "clearance", excess, sentence, pair)
@@ -155,7 +159,8 @@ def _rest_violation(trajectory: JointTrajectory, scene: PlanningScene) -> Violat
             if abs(values[j]) > AT_REST:
                 where = "starts" if k == 0 else "ends"
                 sentence = (
-                    f"the movement {where} with {what} {values[j]:.4g} {unit} of {names[j]} at waypoint {k}: it must "
+                    f"the movement {where} with {what} {values[j]:.4g} {unit} of {names[j]} "
+                    f"at waypoint {k}: it must "
                     f"be 0 {unit} within {AT_REST:g}"
                 )
                 return Violation(
@@ -172,7 +177,8 @@ def _share_violation(
         return None
     k, j = (int(i) for i in beyond[0])
     sentence = (
-        f"{joint_names[j]} needs {share[k, j]:.3f} times its {name} limit after waypoint {k}: it must be at most 1 "
+        f"{joint_names[j]} needs {share[k, j]:.3f} times its {name} limit after waypoint {k}: "
+        "it must be at most 1 "
         f"(excess {100.0 * (share[k, j] - 1.0):.1f} %)"
     )
     return Violation(float(trajectory.times[k]), k, name, float(share[k, j] - 1.0), sentence)

@@ -1,0 +1,293 @@
+"""The planner as a whole, without ROS: the cell as it stands, what is attached, and what was planned.
+
+Every request takes one immutable snapshot of the cell; changing the cell meanwhile reaches the next one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import DistancePair, PlannedMovement, PlanningInfo, PlanningStage, TrajectoryReport
+from ir_msgs_py.stations import IkSolution
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_description import Cell, PowerData, cell_from_yaml, load_cell, load_power_data
+from ir_planner.bounds import bounded, checked_options, chosen, safety_distance
+from ir_planner.budget import Budget, Clock
+from ir_planner.clearance import nearest_pairs
+from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.following import Reference, plan_through
+from ir_planner.goals import Goal, within_limits
+from ir_planner.inverse_kinematics import free_configurations, no_configuration, ranked_solutions
+from ir_planner.journal import Journal
+from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.regional import MovementPlan, plan_regional
+from ir_planner.reporting import Evaluation, evaluate_trajectory
+from ir_planner.scene import PlanningScene, load_text, scene_with
+from ir_planner.settings import PauseSettings, PlannerSettings
+from ir_planner.standby import Standby, plan_standby
+from ir_planner.store import Store
+
+FloatArray = NDArray[np.float64]
+IK_METHODS = ("analytic",)
+PAIRS_MAX = 1000
+_NEVER: Callable[[], bool] = lambda: False  # noqa: E731 - a default argument
+
+
+@dataclass(frozen=True, eq=False)
+class StateCheck:
+    """Whether a state is free, its smallest distance [m] (inf: no pair) and the nearest pairs."""
+
+    status: Status
+    valid: bool
+    min_distance: float
+    pairs: tuple[DistancePair, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class IkAnswer:
+    """Ranked solutions; empty with a status that says why."""
+
+    status: Status
+    solutions: tuple[IkSolution, ...]
+    info: PlanningInfo
+
+
+@dataclass(frozen=True, eq=False)
+class StoredProgram:
+    """A planned program."""
+
+    program_id: str
+    movements: tuple[PlannedMovement, ...]
+    report: TrajectoryReport
+
+
+class Planner:
+    """Answers requests about one cell. Methods raise RequestError for requests that make no sense.
+
+    clock: seconds, only for ceilings and for the times that answers report.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        settings: PlannerSettings | None = None,
+        pauses: PauseSettings | None = None,
+        power: PowerData | None = None,
+    ) -> None:
+        self.clock = clock
+        self.settings = settings or PlannerSettings()
+        self.pauses = pauses or PauseSettings()
+        self.power = power or load_power_data()
+        self._cell: Cell | None = None
+        self.trajectories: Store[JointTrajectory] = Store(
+            "trajectory", self.settings.stored_trajectories, lambda trajectory: trajectory.trajectory_id
+        )
+        self.programs: Store[StoredProgram] = Store(
+            "program", self.settings.stored_programs, lambda program: program.program_id
+        )
+
+    # -- the cell --------------------------------------------------------------------------------------------
+
+    @property
+    def cell(self) -> Cell:
+        """The cell as it stands. Raises RequestError while there is none."""
+        if self._cell is None:
+            raise RequestError(StatusCode.INVALID_OBJECT_NAME, "no cell is loaded: call set_cell first")
+        return self._cell
+
+    @property
+    def has_cell(self) -> bool:
+        """Whether a cell is loaded."""
+        return self._cell is not None
+
+    def set_cell(self, cell_yaml: str, cell_file: str) -> Cell:
+        """Load a cell from its text, or from a path or the name of a bundled cell.
+
+        Raises RequestError where not exactly one is given, DescriptionError for what is wrong with the cell.
+        """
+        if bool(cell_yaml) == bool(cell_file):
+            given = "both are" if cell_yaml else "neither is"
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"exactly one of cell_yaml and cell_file must be given, {given}",
+            )
+        self._cell = cell_from_yaml(cell_yaml) if cell_yaml else load_cell(cell_file)
+        return self._cell
+
+    def set_equipment(self, name: str, pose: FloatArray | None, enabled: bool, state: str) -> Cell:
+        """Move a machine, switch it on or off, or change its state (None, "": unchanged)."""
+        cell = self.cell
+        if name not in [machine.name for machine in cell.equipment]:
+            raise UnknownNameError("equipment", name, (machine.name for machine in cell.equipment))
+        self._cell = cell.with_equipment(name, pose, enabled, state or None)
+        return self._cell
+
+    def scene(self, load: str = "") -> PlanningScene:
+        """Snapshot of the cell with `load` attached; "" = what is attached when its program starts: the
+        tool.
+        """
+        cell = self.cell
+        return scene_with(cell, load or load_text(cell), self.power, self.settings.regeneration)  # type: ignore[arg-type]
+
+    # -- questions -------------------------------------------------------------------------------------------
+
+    def check_state(
+        self, q: FloatArray, margin: float, max_pairs: int, load: str, station: str
+    ) -> StateCheck:
+        """Nearest pairs at q (n,), and whether all keep S_m (or what `station` allows)."""
+        safety_distance(margin)
+        bounded(max_pairs, 0, PAIRS_MAX, "max_pairs")
+        scene = self.scene(load)
+        q = within_limits(q, scene.cell, "state", StatusCode.INVALID_ROBOT_STATE)
+        threshold = scene.thresholds(margin, station)
+        distance = scene.collision.distances(q[None])[0]
+        valid = bool((distance > threshold - 1e-6).all())
+        pairs = nearest_pairs(scene, q, threshold, max_pairs, station)
+        smallest = float(distance.min(initial=np.inf))
+        if valid or not len(distance):
+            return StateCheck(Status.success(), valid, smallest, pairs)
+        worst = nearest_pairs(scene, q, threshold, 1, station)[0]
+        kept = float(threshold[int(np.argmin(distance - threshold))])
+        sentence = (
+            f"{worst.body_a} and {worst.body_b} ({worst.kind}) are {worst.distance * 1e3:.1f} mm apart, they "
+            f"must keep {kept * 1e3:.1f} mm"
+        )
+        return StateCheck(Status.success(sentence), False, smallest, pairs)
+
+    def compute_ik(self, goal: Goal, method: str, margin: float, near: FloatArray, load: str) -> IkAnswer:
+        """All free configurations that reach the goal's pose, ranked by W from `near` (n,)."""
+        chosen(method, IK_METHODS, "method")
+        safety_distance(margin)
+        if goal.pose is None:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                "goal is a configuration: compute_ik takes a pose or a station",
+            )
+        journal = Journal(self._budget(PlanOptions(), _NEVER), 0, planner_id=method)
+        scene = self.scene(load)
+        threshold = scene.thresholds(margin, goal.station)
+        with journal.stage("closed form") as notes:
+            found = free_configurations(goal.pose, scene, threshold, near)
+            notes.append(f"{found.reached} reach the pose")
+        journal.rejected.update(found.rejected)
+        names = scene.cell.robot.joint_names
+        if len(found.q) == 0:
+            status = no_configuration(goal.pose, scene, found, goal.text or "goal")
+            return IkAnswer(status, (), journal.info(near, names))
+        solutions = ranked_solutions(found, goal.pose, scene, threshold, near)
+        return IkAnswer(Status.success(), solutions, journal.info(near, names))
+
+    def evaluate(self, trajectory: JointTrajectory, margin: float, load: str, station: str) -> Evaluation:
+        """Everything that is known about a trajectory, with the first violation."""
+        safety_distance(margin)
+        scene = self.scene(load)
+        if station:
+            scene.station(station)
+        return evaluate_trajectory(trajectory, scene, margin, station)
+
+    def standby(self, pause: float, q: FloatArray | None, load: str) -> Standby:
+        """The power mode of least energy for a pause [s] at q (n,), None: machine home."""
+        scene = self.scene(load)
+        return plan_standby(pause, scene.cell.machine_home if q is None else q, scene, self.pauses)
+
+    # -- plans -----------------------------------------------------------------------------------------------
+
+    def plan_regional(
+        self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER
+    ) -> MovementPlan:
+        """Movement from start (n,) to a goal; of a pose the cheapest reachable configuration is taken."""
+        options, note = checked_options(options)
+        scene = self.scene(options.load)
+        start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
+        budget = self._budget(options, cancelled)
+        if goal.configuration is not None:
+            candidates = goal.configuration[None]
+        else:
+            assert goal.pose is not None  # a Goal has one of both
+            threshold = scene.thresholds(options.safety_distance)
+            found = free_configurations(goal.pose, scene, threshold, start)
+            if len(found.q) == 0:
+                status = no_configuration(goal.pose, scene, found, goal.text or "goal")
+                info = Journal(budget, options.seed).info(start, scene.cell.robot.joint_names)
+                return MovementPlan(status, info, TrajectoryReport())
+            candidates = found.q
+        plan = self._first_planned(start, candidates, scene, options, budget)
+        return self._kept(plan, note)
+
+    def _first_planned(
+        self,
+        start: FloatArray,
+        candidates: FloatArray,
+        scene: PlanningScene,
+        options: PlanOptions,
+        budget: Budget,
+    ) -> MovementPlan:
+        """To the cheapest candidate that can be reached: those straight ahead first, then all."""
+        if len(candidates) > 1 and options.planner_id == "":
+            for q in candidates:
+                direct = plan_regional(start, q, scene, replace(options, planner_id="direct"), budget)
+                if direct.status.ok:
+                    return direct
+        for q in candidates:
+            plan = plan_regional(start, q, scene, options, budget)
+            if plan.status.ok or budget.exhausted:
+                break
+        return plan
+
+    def plan_trajectory(
+        self, reference: Reference, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER
+    ) -> MovementPlan:
+        """Trajectory through points."""
+        options, note = checked_options(options)
+        scene = self.scene(options.load)
+        return self._kept(plan_through(reference, scene, options, self._budget(options, cancelled)), note)
+
+    def plan_program(
+        self,
+        stations: tuple[str, ...],
+        cycle_time: float,
+        options: PlanOptions,
+        start: FloatArray,
+        progress: Callable[[str, int, int, float], None] = lambda phase, done, total, cost: None,
+        cancelled: Callable[[], bool] = _NEVER,
+    ) -> ProgramPlan:
+        """The cell's program, or a visit of stations, from start (n,)."""
+        options, note = checked_options(options)
+        cell = self.cell
+        start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
+        request = ProgramRequest(
+            cell,
+            self.power,
+            stations,
+            start,
+            options,
+            bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s"),
+            self.settings.regeneration,  # type: ignore[arg-type]
+            self.pauses,
+        )
+        plan = plan_program(request, self._budget(options, cancelled), progress)
+        if plan.status.ok:
+            for movement in plan.movements:
+                if movement.trajectory is not None:
+                    self.trajectories.add(movement.trajectory)
+            self.programs.add(StoredProgram(plan.program_id, plan.movements, plan.report))
+        return replace(plan, info=_noted(plan.info, note))
+
+    def _kept(self, plan: MovementPlan, note: str) -> MovementPlan:
+        if plan.trajectory is not None:
+            self.trajectories.add(plan.trajectory)
+        return replace(plan, info=_noted(plan.info, note))
+
+    def _budget(self, options: PlanOptions, cancelled: Callable[[], bool]) -> Budget:
+        work = options.max_iterations or self.settings.max_iterations
+        return Budget(work, self.clock() + options.planning_time, self.clock, cancelled)
+
+
+def _noted(info: PlanningInfo, note: str) -> PlanningInfo:
+    if not note:
+        return info
+    return replace(info, stages=(*info.stages, PlanningStage("options", 0.0, note)))
