@@ -65,8 +65,8 @@ class ProgramRunnerNode(Node):
     ) -> None:
         super().__init__(names.PROGRAM_RUNNER, **node_arguments)
         self._progress: Progress | None = None
-        self._parameters = declare_parameters(self, lambda: self._progress is not None)
-        links = self._parameters.links.value
+        self._settings = declare_parameters(self, lambda: self._progress is not None)
+        links = self._settings.links.value
         self._send = send
         self._machines = (
             Machines(load_cell(links.cell).signals if links.cell else ()) if machines is None else machines
@@ -103,7 +103,8 @@ class ProgramRunnerNode(Node):
 
     async def _run(self, goal: Any) -> RunProgram.Result:
         if self._progress is not None:
-            sentence = f"program {self._progress.program_id} is running: one program at a time"
+            running = f"program {self._progress.program_id}".strip()
+            sentence = f"{running} is running: one program at a time"
             return self._end(
                 goal, ProgramResult(Status(StatusCode.INVALID_ROBOT_STATE, sentence), 0), 0.0, 0.0
             )
@@ -112,13 +113,13 @@ class ProgramRunnerNode(Node):
             status, movements = await self._fetch(goal.request)
             # a driver that has just been started gets the time to be heard
             await self._waiting.until(
-                lambda: not self._driver.silent, self._parameters.links.value.response_timeout
+                lambda: not self._driver.silent, self._settings.links.value.response_timeout
             )
             energy = self._driver.energy
             result = ProgramResult(status, 0)
             if status.ok:
                 progress.movements = movements
-                result = await self._fulfil_all(goal, Program(movements, self._parameters.program.value))
+                result = await self._fulfil_all(goal, Program(movements, self._settings.program.value))
         finally:
             self._progress = None
         return self._end(goal, result, time.monotonic() - progress.started, self._driver.energy - energy)
@@ -213,7 +214,7 @@ class ProgramRunnerNode(Node):
         return driver.state() if driver.silent else Status(StatusCode.TIMED_OUT, f"not within {timeout:g} s")
 
     def _send_wake_packet(self) -> Status:
-        links = self._parameters.links.value
+        links = self._settings.links.value
         try:
             self._send(magic_packet(links.mac), links.wake_address, links.wake_port)
         except OSError as error:

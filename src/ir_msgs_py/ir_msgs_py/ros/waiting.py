@@ -48,7 +48,7 @@ class Waiting:
         return await self.until(future.done, timeout)
 
     async def ask(self, client: Any, request: Any, timeout: float) -> Any:
-        """Call a service: its response, or a TIMED_OUT Status that says why there is none in `timeout` [s]."""
+        """Call a service: its response, or a TIMED_OUT Status when there is none in `timeout` [s]."""
         if not await self.until(client.service_is_ready, timeout):
             return Status(StatusCode.TIMED_OUT, f"nobody offers {client.srv_name} within {timeout:g} s")
         future: Future = client.call_async(request)

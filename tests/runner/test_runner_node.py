@@ -1,0 +1,409 @@
+"""The runner's node in this process, against a small fake driver and planner over real services."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from ir_msgs.action import ExecuteTrajectory, RunProgram
+from ir_msgs.msg import PowerState, ProgramState, Status
+from ir_msgs.msg import Signal as SignalMsg
+from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes, SetLoad, SetPlcInput
+from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.power import Mode
+from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import planned_movement_to_msg, power_mode_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.waiting import Waiting
+from ir_msgs_py.status import StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_program_runner.machines import Machines
+from ir_program_runner.node import ProgramRunnerNode
+from ir_program_runner.settings import ProgramSettings
+from ir_program_runner.wake_on_lan import magic_packet
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+
+MAC = "02:00:00:00:00:01"
+TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**7], np.zeros((2, 6)))
+LONG = JointTrajectory(JOINT_NAMES, [0, 60 * 10**9], np.zeros((2, 6)))
+OK = Status(code=1)
+REST = {"ab": Mode.BUS_POWER_OFF, "hib": Mode.HIBERNATION, "drives_off": Mode.STAND_ON_BRAKES}
+
+
+class FakeDriver(Node):
+    """Keeps the driver's interfaces; modes change at once, a movement lasts as long as its trajectory."""
+
+    def __init__(self, context):
+        super().__init__("ir_sim_driver", context=context)
+        self.waiting = Waiting(self, period=0.002)
+        self.mode = Mode.STAND_ON_MOTORS
+        self.energy = 0.0
+        self.log = []
+        self.answer = ExecuteTrajectory.Result()
+        self.meter = self.create_publisher(PowerState, "~/power_state", 100)
+        self.timer = self.create_timer(0.01, self.read_meter)
+        self.create_service(SetPlcInput, "~/set_plc_input", self.set_plc_input)
+        self.create_service(SetLoad, "~/set_load", self.set_load)
+        self.create_service(QueryModes, "~/query_modes", self.query_modes)
+        self.server = ActionServer(
+            self,
+            ExecuteTrajectory,
+            "~/execute_trajectory",
+            self.execute,
+            cancel_callback=lambda goal: CancelResponse.ACCEPT,
+        )
+
+    def destroy_node(self):
+        self.server.destroy()
+        super().destroy_node()
+
+    def read_meter(self):
+        self.energy += 4.0
+        self.meter.publish(PowerState(mode=self.mode, energy=self.energy, power=400.0))
+
+    def set_plc_input(self, request, response):
+        self.log.append(f"{request.name}={int(request.value)}")
+        if request.name in REST:
+            if request.value:
+                self.mode = REST[request.name]
+            elif request.name == "ab":
+                self.mode = Mode.STAND_ON_MOTORS
+        elif request.name == "drives_on" and request.value:
+            self.mode = Mode.STAND_ON_MOTORS
+        response.status = OK
+        return response
+
+    def set_load(self, request, response):
+        self.log.append(f"load {request.load}")
+        known = request.load in ("gripper", "gripper+part")
+        response.status = OK if known else Status(code=-19, message="load: known are gripper, part")
+        return response
+
+    def query_modes(self, request, response):
+        response.status = OK
+        settings = ProgramSettings(
+            **{
+                f"{name}_{way}": 0.0
+                for name in ("bus_power_off", "hibernation")
+                for way in ("enter", "leave", "stay")
+            }
+        )
+        response.modes = [
+            power_mode_to_msg(settings.times(mode)) for mode in (Mode.BUS_POWER_OFF, Mode.HIBERNATION)
+        ]
+        return response
+
+    async def execute(self, goal):
+        duration = goal.request.trajectory.points[-1].time_from_start
+        self.log.append("drive")
+        self.mode = Mode.MOVING
+        stopped = await self.waiting.until(
+            lambda: goal.is_cancel_requested, timeout=duration.sec + duration.nanosec * 1e-9
+        )
+        self.mode = Mode.STAND_ON_MOTORS
+        if stopped:
+            self.log.append("stopped")
+            goal.canceled()
+            return ExecuteTrajectory.Result(error_string="canceled; stopped on the path")
+        if self.answer.error_code:
+            goal.abort()
+        else:
+            goal.succeed()
+        return self.answer
+
+    def receive(self, packet, address, port):
+        self.log.append(f"packet {address}:{port}")
+        if packet == magic_packet(MAC) and self.mode is Mode.HIBERNATION:
+            self.mode = Mode.STAND_ON_MOTORS
+
+
+class FakePlanner(Node):
+    """Gives one program of two movements, and their points by id."""
+
+    def __init__(self, context):
+        super().__init__("ir_planner", context=context)
+        self.create_service(GetProgram, "~/get_program", self.get_program)
+        self.create_service(GetTrajectory, "~/get_trajectory", self.get_trajectory)
+
+    def get_program(self, request, response):
+        if request.program_id != "known":
+            response.status = Status(code=-19, message=f'unknown program "{request.program_id}"')
+            return response
+        response.status = OK
+        response.movements = [planned_movement_to_msg(move(), include_points=False)] * 2
+        return response
+
+    def get_trajectory(self, request, response):
+        response.status = OK
+        response.trajectory = trajectory_to_msg(TRAJECTORY)
+        return response
+
+
+@dataclass(frozen=True)
+class Described:
+    name: str
+    initial: bool = False
+    follows: str = ""
+    delay: float = 0.0
+
+
+class Cell:
+    """Everything of one test: the node, the fakes, a client, and what was published."""
+
+    def __init__(self, context, executor, machines=None, **overrides):
+        self.executor = executor
+        self.driver = executor.add_node(FakeDriver(context))
+        values = {"mac": MAC, "wake_margin": 0.0, "wake_repeat": 0.1, "silence_timeout": 0.5, **overrides}
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        self.runner = executor.add_node(
+            ProgramRunnerNode(self.driver.receive, machines, context=context, parameter_overrides=parameters)
+        )
+        self.planner = executor.add_node(FakePlanner(context))
+        self.test = executor.add_node(Node("test", context=context))
+        self.client = Client(context=context, timeout=5.0)
+        self.states = []
+        self.set_by_program = []
+        kept = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.test.create_subscription(
+            ProgramState, "ir_program_runner/program_state", self.states.append, kept
+        )
+        self.test.create_subscription(
+            SignalMsg, "ir_program_runner/machine_signals", self.set_by_program.append, 100
+        )
+        self.machines = self.test.create_publisher(SignalMsg, "ir_program_runner/signals", 100)
+
+    def run(self, movements=(), program_id="", feedback=None, timeout=20.0):
+        goal = RunProgram.Goal(
+            program_id=program_id, movements=[planned_movement_to_msg(each) for each in movements]
+        )
+        return self.client.send_goal("ir_program_runner/run_program", goal, feedback, timeout)
+
+    def events(self):
+        return [f"{state.index} {state.event}" for state in self.states]
+
+
+@pytest.fixture
+def cell(ros_context, ros_executor):
+    cell = Cell(ros_context, ros_executor)
+    yield cell
+    cell.client.close()
+
+
+def move(trajectory=TRAJECTORY, **fields):
+    defaults = {
+        "kind": "regional",
+        "trajectory": trajectory,
+        "trajectory_id": trajectory.trajectory_id,
+        "duration": trajectory.duration,
+        "load": "gripper",
+    }
+    return PlannedMovement(**{**defaults, **fields})
+
+
+def pause(duration, mode=""):
+    return PlannedMovement(kind="pause", duration=duration, power_mode=mode)
+
+
+def test_a_program_is_fetched_by_its_id_and_run(cell, wait_for):
+    phases = []
+    result = cell.run(
+        program_id="known", feedback=lambda at: phases.append((at.movement, at.total, at.phase))
+    )
+    assert result.status.code == StatusCode.SUCCESS, result.status.message
+    assert result.status.source == "ir_program_runner"
+    assert result.executed == 2
+    assert result.energy > 0.0
+    assert result.duration > 0.02
+    assert cell.driver.log == ["ab=0", "hib=0", "load gripper", "drive", "drive"]
+    wait_for(lambda: cell.events() == ["0 started", "0 ended", "1 started", "1 ended"])
+    assert cell.states[0].program_id == "known"
+    assert (1, 2, "moving") in phases
+
+
+def test_pauses_switch_the_bits_and_wake_by_a_packet(cell):
+    result = cell.run([pause(0.3, "BUS_POWER_OFF"), pause(0.3, "HIBERNATION"), move()])
+    assert result.status.code == StatusCode.SUCCESS, result.status.message
+    assert cell.driver.log == [
+        "ab=0",
+        "hib=0",
+        "ab=1",
+        "ab=0",
+        "hib=1",
+        "packet 127.0.0.1:9009",
+        "hib=0",
+        "load gripper",
+        "drive",
+    ]
+
+
+def test_a_step_waits_for_the_signal_of_a_machine_and_sets_its_own(cell, wait_for):
+    waiting = []
+
+    def open_the_door(at):
+        if at.phase == "waiting for door_open" and not waiting:
+            waiting.append(at.movement)
+            cell.machines.publish(SignalMsg(name="door_open", value=True))
+
+    result = cell.run([move(wait_for=("door_open",), set_signals=("start=1",))], feedback=open_the_door)
+    assert result.status.code == StatusCode.SUCCESS
+    assert waiting == [0]
+    message = wait_for(lambda: cell.set_by_program)[0]
+    assert (message.name, message.value) == ("start", True)
+    assert message.stamp.sec > 0
+
+
+def test_the_soft_plc_answers_for_a_machine(ros_context, ros_executor):
+    machines = Machines([Described("door_open", follows="open_door", delay=0.05)])
+    cell = Cell(ros_context, ros_executor, machines)
+    heard = []
+    cell.test.create_subscription(SignalMsg, "ir_program_runner/signals", heard.append, 100)
+    result = cell.run([move(set_signals=("open_door",)), move(wait_for=("door_open",))])
+    assert result.status.code == StatusCode.SUCCESS, result.status.message
+    assert [message.name for message in heard] == ["door_open"]
+    cell.client.close()
+
+
+def test_a_cancel_stops_along_the_path(cell, wait_for):
+    with pytest.raises(Exception, match=r"had no result within 0\.2 s: the goal was canceled"):
+        cell.run([move(LONG), move()], timeout=0.2)
+    assert cell.driver.log[-2:] == ["drive", "stopped"]
+    wait_for(lambda: cell.events() == ["0 started", "0 canceled"])
+    assert cell.states[-1].note == "canceled; stopped on the path"
+
+
+def test_a_cancel_in_a_pause_takes_the_bit_back(cell, wait_for):
+    with pytest.raises(Exception, match="the goal was canceled"):
+        cell.run([pause(60.0, "BUS_POWER_OFF")], timeout=0.3)
+    wait_for(lambda: cell.events() == ["0 started", "0 canceled"])
+    assert cell.driver.log[-2:] == ["ab=1", "ab=0"]
+
+
+def test_the_drivers_abort_ends_the_program_with_its_sentence(cell, wait_for):
+    cell.driver.answer = ExecuteTrajectory.Result(
+        error_code=-4, error_string="joint_a2 is 0.2 rad off its path"
+    )
+    result = cell.run([move(from_station="lathe"), move()])
+    assert result.status.message == (
+        "step 1 of 2 (regional lathe): the driver aborted with -4: joint_a2 is 0.2 rad off its path"
+    )
+    assert result.executed == 0
+    wait_for(lambda: cell.events() == ["0 started", "0 failed"])
+
+
+def test_a_driver_that_falls_silent_ends_the_program(cell, wait_for):
+    def fall_silent(at):
+        if at.phase == "moving":
+            cell.driver.timer.cancel()
+
+    result = cell.run([move(LONG)], feedback=fall_silent)
+    assert result.status.code == StatusCode.ROBOT_STATE_STALE
+    assert "nothing was heard from ir_sim_driver for 0.5 s" in result.status.message
+    wait_for(lambda: cell.driver.log[-1] == "stopped")
+
+
+def test_a_driver_that_hibernates_during_a_movement_ends_the_program(cell):
+    def hibernate(at):
+        if at.phase == "moving":
+            cell.driver.mode = Mode.HIBERNATION
+
+    result = cell.run([move(LONG)], feedback=hibernate)
+    assert result.status.code == StatusCode.INVALID_ROBOT_STATE
+    assert "ir_sim_driver went into hibernation during the movement" in result.status.message
+
+
+def test_a_program_does_not_start_while_the_robot_sleeps(ros_context, ros_executor):
+    cell = Cell(ros_context, ros_executor, ready_timeout=0.1)
+    cell.driver.mode = Mode.BUS_POWER_OFF
+    result = cell.run([move()])
+    assert result.status.code == StatusCode.INVALID_ROBOT_STATE
+    assert result.status.message.startswith("the power mode is BUS_POWER_OFF: a program starts in")
+    assert cell.driver.log == []
+    cell.client.close()
+
+
+def test_one_program_at_a_time(cell, wait_for):
+    second = []
+
+    def send_another(at):
+        if at.phase == "moving" and not second:
+            second.append(cell.runner._progress)
+
+    first = cell.run([move()], feedback=send_another)
+    assert first.status.code == StatusCode.SUCCESS
+    cell.runner._progress = second[0]
+    result = cell.run([move()])
+    assert result.status.message == "program is running: one program at a time"
+    cell.runner._progress = None
+
+
+def test_parameters_do_not_change_while_a_program_runs(cell):
+    answers = []
+
+    def change(at):
+        if at.phase == "moving" and not answers:
+            answers.append(cell.runner.set_parameters([Parameter("wake_margin", value=1.0)])[0].reason)
+
+    cell.run([move()], feedback=change)
+    assert answers == ["a program runs: wake_margin can be changed when it has ended"]
+    changed = cell.executor.run(lambda: cell.runner.set_parameters([Parameter("wake_margin", value=1.0)]))
+    assert changed[0].successful
+
+
+@pytest.mark.parametrize(
+    ("request_fields", "code", "sentence"),
+    [
+        ({}, -16, "give either program_id or movements"),
+        ({"program_id": "other"}, -19, 'unknown program "other"'),
+        ({"movements": [pause(1.0)], "program_id": "known"}, -16, "give either program_id or movements"),
+        ({"movements": [move(set_signals=("x=7",))]}, -2, 'signal "x=7" has level "7": known are 0, 1'),
+        ({"movements": [move(load="anvil")]}, -19, "load: known are gripper, part"),
+    ],
+)
+def test_a_bad_request_is_answered_by_a_sentence_and_the_node_lives(cell, request_fields, code, sentence):
+    result = cell.run(**request_fields)
+    assert result.status.code == code
+    assert sentence in result.status.message
+    assert "drive" not in cell.driver.log
+    assert cell.run([move()]).status.code == StatusCode.SUCCESS
+
+
+def test_a_bad_kind_of_movement_is_answered_by_a_sentence(cell):
+    goal = RunProgram.Goal(movements=[planned_movement_to_msg(move())])
+    goal.movements[0].kind = "jump"
+    result = cell.client.send_goal("ir_program_runner/run_program", goal)
+    assert result.status.code == -2
+    assert result.status.message.startswith('kind of movement is "jump": known are service_exit')
+
+
+def test_a_packet_that_cannot_be_sent_is_named(ros_context, ros_executor):
+    def unplugged(packet, address, port):
+        raise OSError("Network is unreachable")
+
+    cell = Cell(ros_context, ros_executor)
+    cell.runner._send = unplugged
+    result = cell.run([pause(0.1, "HIBERNATION")])
+    assert (
+        "no Wake-on-LAN packet could be sent to 127.0.0.1 port 9009: Network is unreachable"
+        in result.status.message
+    )
+    cell.client.close()
+
+
+def test_a_bad_signal_is_ignored_and_the_node_lives(cell):
+    cell.machines.publish(SignalMsg(name="", value=True))
+    cell.machines.publish(SignalMsg(name="a\nb", value=True))
+    assert cell.run([move()]).status.code == StatusCode.SUCCESS
+
+
+def test_a_cancel_after_the_end_and_twice_is_harmless(cell):
+    started = time.monotonic()
+    for _ in range(2):
+        with pytest.raises(Exception, match="the goal was canceled"):
+            cell.run([move(LONG)], timeout=0.1)
+    assert cell.run([move()]).status.code == StatusCode.SUCCESS
+    assert time.monotonic() - started < 10.0
