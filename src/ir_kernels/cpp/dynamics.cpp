@@ -12,6 +12,8 @@ namespace py = pybind11;
 
 namespace {
 
+namespace core = ir::dynamics;
+
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 std::vector<double> flat(const py::object& data, const char* name) {
@@ -19,12 +21,12 @@ std::vector<double> flat(const py::object& data, const char* name) {
   return {array.data(), array.data() + array.size()};
 }
 
-ir::ChainInput input_of(const py::object& data) {
-  ir::ChainInput in;
+core::ChainInput input_of(const py::object& data) {
+  core::ChainInput in;
   in.n = data.attr("n").cast<int>();
-  if (in.n < 1 || in.n > ir::kMaxJoints)
+  if (in.n < 1 || in.n > core::kMaxJoints)
     throw std::invalid_argument("robot has " + std::to_string(in.n) + " joints: the compiled core takes 1 to " +
-                                std::to_string(ir::kMaxJoints));
+                                std::to_string(core::kMaxJoints));
   in.origin = flat(data, "origin");
   in.axis = flat(data, "axis");
   in.mass = flat(data, "mass");
@@ -60,26 +62,26 @@ class Dynamics {
 
   py::tuple inverse_dynamics(const Array& q, const Array& qd, const Array& qdd) const {
     return run(q, {&qd, &qdd}, [&](double* tau) {
-      return ir::inverse_dynamics(model_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
+      return core::inverse_dynamics(model_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
     });
   }
   py::tuple inverse_dynamics_single(const Array& q, const Array& qd, const Array& qdd) const {
     return run(q, {&qd, &qdd}, [&](double* tau) {
-      return ir::inverse_dynamics(single_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
+      return core::inverse_dynamics(single_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
     });
   }
   py::tuple bias(const Array& q, const Array& qd) const {
-    return run(q, {&qd}, [&](double* tau) { return ir::bias(model_, q.data(), qd.data(), q.shape(0), tau); });
+    return run(q, {&qd}, [&](double* tau) { return core::bias(model_, q.data(), qd.data(), q.shape(0), tau); });
   }
   py::tuple gravity(const Array& q) const {
-    return run(q, {}, [&](double* tau) { return ir::bias(model_, q.data(), nullptr, q.shape(0), tau); });
+    return run(q, {}, [&](double* tau) { return core::bias(model_, q.data(), nullptr, q.shape(0), tau); });
   }
   py::tuple counterbalance(const Array& q) const {
-    return run(q, {}, [&](double* tau) { return ir::counterbalance(model_, q.data(), q.shape(0), tau); });
+    return run(q, {}, [&](double* tau) { return core::counterbalance(model_, q.data(), q.shape(0), tau); });
   }
   py::tuple forward_dynamics(const Array& q, const Array& qd, const Array& tau) const {
     return run(q, {&qd, &tau}, [&](double* qdd) {
-      return ir::forward_dynamics(model_, q.data(), qd.data(), tau.data(), q.shape(0), qdd);
+      return core::forward_dynamics(model_, q.data(), qd.data(), tau.data(), q.shape(0), qdd);
     });
   }
   py::tuple torque_limit(const Array& qd) const {
@@ -87,7 +89,7 @@ class Dynamics {
   }
   py::tuple axis_power(const Array& qd, const Array& tau) const {
     return run(qd, {&tau}, [&](double* power) {
-      return ir::axis_power(model_, qd.data(), tau.data(), qd.shape(0), power);
+      return core::axis_power(model_, qd.data(), tau.data(), qd.shape(0), power);
     });
   }
   py::tuple mass_matrix(const Array& q) const {
@@ -96,7 +98,7 @@ class Dynamics {
     bool finite;
     {
       py::gil_scoped_release released;
-      finite = ir::mass_matrix(model_, q.data(), q.shape(0), H.mutable_data());
+      finite = core::mass_matrix(model_, q.data(), q.shape(0), H.mutable_data());
     }
     return py::make_tuple(H, finite);
   }
@@ -106,7 +108,7 @@ class Dynamics {
     bool finite;
     {
       py::gil_scoped_release released;
-      finite = ir::torque_gradients(model_, q.data(), qd.data(), qdd.data(), q.shape(0), of_q.mutable_data(),
+      finite = core::torque_gradients(model_, q.data(), qd.data(), qdd.data(), q.shape(0), of_q.mutable_data(),
                                     of_qd.mutable_data(), of_qdd.mutable_data());
     }
     return py::make_tuple(py::make_tuple(of_q, of_qd, of_qdd), finite);
@@ -115,12 +117,12 @@ class Dynamics {
   // upper, sampled, time (n,) and the number of intervals
   py::tuple torque_bounds(const Array& coefficients, const Array& durations, double tolerance, long most) const {
     if (coefficients.ndim() != 3 || coefficients.shape(1) != model_.n || durations.ndim() != 1 ||
-        durations.shape(0) != coefficients.shape(0) || coefficients.shape(2) > ir::kMaxTerms)
+        durations.shape(0) != coefficients.shape(0) || coefficients.shape(2) > core::kMaxTerms)
       throw std::invalid_argument("coefficients have to be (S, n, d + 1) and durations (S,)");
-    ir::TorqueBounds bounds;
+    core::TorqueBounds bounds;
     {
       py::gil_scoped_release released;
-      bounds = ir::torque_bounds(model_, envelope_, coefficients.data(), durations.data(), coefficients.shape(0),
+      bounds = core::torque_bounds(model_, envelope_, coefficients.data(), durations.data(), coefficients.shape(0),
                                  static_cast<int>(coefficients.shape(2)), tolerance, most);
     }
     const auto n = static_cast<py::ssize_t>(model_.n);
@@ -129,9 +131,9 @@ class Dynamics {
   }
 
  private:
-  explicit Dynamics(const ir::ChainInput& in)
-      : model_(ir::build_model(in)),
-        single_(ir::to_single(model_)),
+  explicit Dynamics(const core::ChainInput& in)
+      : model_(core::build_model(in)),
+        single_(core::to_single(model_)),
         envelope_(in.n, in.knots, in.envelope_speed, in.envelope_torque) {}
 
   void check(const Array& first, std::initializer_list<const Array*> others) const {
@@ -155,24 +157,24 @@ class Dynamics {
     return py::make_tuple(result, finite);
   }
 
-  ir::Model<double> model_;
-  ir::Model<float> single_;
-  ir::Envelope envelope_;
+  core::Model<double> model_;
+  core::Model<float> single_;
+  core::Envelope envelope_;
 };
 
 py::tuple dc_bus(const Array& power, const Array& dt, double capacity, const std::string& regeneration,
                  double stored) {
   if (power.ndim() != 2 || dt.ndim() != 1 || dt.shape(0) != power.shape(0))
     throw std::invalid_argument("axis_power has to be (N, n) and dt (N,)");
-  const ir::Regeneration kind = regeneration == "shared" ? ir::Regeneration::kShared
-                                : regeneration == "none" ? ir::Regeneration::kNone
-                                                         : ir::Regeneration::kFedBack;
+  const core::Regeneration kind = regeneration == "shared" ? core::Regeneration::kShared
+                                : regeneration == "none" ? core::Regeneration::kNone
+                                                         : core::Regeneration::kFedBack;
   const py::ssize_t N = power.shape(0);
   Array mains(N), burnt(N), level(N);
   double *m = mains.mutable_data(), *b = burnt.mutable_data(), *l = level.mutable_data();
   {
     py::gil_scoped_release released;
-    ir::dc_bus(power.data(), dt.data(), N, static_cast<int>(power.shape(1)), capacity, kind, stored, m, b, l);
+    core::dc_bus(power.data(), dt.data(), N, static_cast<int>(power.shape(1)), capacity, kind, stored, m, b, l);
   }
   return py::make_tuple(mains, burnt, level);
 }

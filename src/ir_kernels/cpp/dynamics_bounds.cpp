@@ -7,7 +7,7 @@
 #include "dynamics_numbers.hpp"
 #include "dynamics_recursion.hpp"
 
-namespace ir {
+namespace ir::dynamics {
 namespace {
 
 constexpr double kFirstPiece = 0.05;       // s, longest piece to begin with
@@ -205,4 +205,4 @@ TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, con
   return bounds;
 }
 
-}  // namespace ir
+}  // namespace ir::dynamics

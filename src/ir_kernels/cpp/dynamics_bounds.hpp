@@ -5,7 +5,7 @@
 
 #include "dynamics_kernels.hpp"
 
-namespace ir {
+namespace ir::dynamics {
 
 constexpr int kMaxTerms = 8;  // of a polynomial segment
 
@@ -20,4 +20,4 @@ struct TorqueBounds {
 TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, const double* coefficients,
                            const double* durations, long S, int terms, double tolerance, long most);
 
-}  // namespace ir
+}  // namespace ir::dynamics

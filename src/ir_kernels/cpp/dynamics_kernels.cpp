@@ -7,7 +7,7 @@
 #include "dynamics_numbers.hpp"
 #include "dynamics_recursion.hpp"
 
-namespace ir {
+namespace ir::dynamics {
 namespace {
 
 // Sum of x - x over all that was read: zero, or NaN when something was not finite. Costs nothing beside the recursion.
@@ -322,4 +322,4 @@ void dc_bus(const double* power, const double* dt, long N, int n, double capacit
   }
 }
 
-}  // namespace ir
+}  // namespace ir::dynamics

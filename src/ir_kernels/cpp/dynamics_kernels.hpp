@@ -5,7 +5,7 @@
 
 #include "dynamics_model.hpp"
 
-namespace ir {
+namespace ir::dynamics {
 
 // Each returns whether all it read was finite.
 bool inverse_dynamics(const Model<double>& m, const double* q, const double* qd, const double* qdd, long N, double* tau);
@@ -37,4 +37,4 @@ enum class Regeneration { kShared, kNone, kFedBack };
 void dc_bus(const double* power, const double* dt, long N, int n, double capacity, Regeneration regeneration,
             double stored, double* mains, double* burnt, double* level);
 
-}  // namespace ir
+}  // namespace ir::dynamics

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace ir {
+namespace ir::dynamics {
 
 typedef double D8 __attribute__((vector_size(64)));
 typedef std::int64_t I8 __attribute__((vector_size(64)));
@@ -219,4 +219,4 @@ inline void store_columns(const V* columns, long count, int n, long first, doubl
     for (int j = 0; j < n; ++j) rows[(first + l) * n + j] = columns[j][l];
 }
 
-}  // namespace ir
+}  // namespace ir::dynamics

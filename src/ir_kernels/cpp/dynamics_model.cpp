@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace ir {
+namespace ir::dynamics {
 namespace {
 
 constexpr double kAligned = 1e-12;  // sines below this count as zero
@@ -283,4 +283,4 @@ Model<float> to_single(const Model<double>& m) {
   return s;
 }
 
-}  // namespace ir
+}  // namespace ir::dynamics

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-namespace ir {
+namespace ir::dynamics {
 
 constexpr int kMaxJoints = 16;
 
@@ -66,4 +66,4 @@ struct Model {
 Model<double> build_model(const ChainInput& input);
 Model<float> to_single(const Model<double>& model);
 
-}  // namespace ir
+}  // namespace ir::dynamics

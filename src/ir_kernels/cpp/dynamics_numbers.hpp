@@ -3,7 +3,7 @@
 
 #include "dynamics_lanes.hpp"
 
-namespace ir {
+namespace ir::dynamics {
 
 // Value and derivative along one direction.
 template <class S>
@@ -67,4 +67,4 @@ inline void sincos(const Interval& x, Interval& s, Interval& c) {
   c = range(cosine[0], cosine[1], -sine[0], -sine[1]);
 }
 
-}  // namespace ir
+}  // namespace ir::dynamics

@@ -7,7 +7,7 @@
 #include "dynamics_lanes.hpp"
 #include "dynamics_model.hpp"
 
-namespace ir {
+namespace ir::dynamics {
 
 template <class S>
 struct Vector {
@@ -180,4 +180,4 @@ inline S balance_torque(const Balance<T>& b, const S& s, const S& c) {
   return (even + odd * x) * (c * b.lever_cos + s * b.lever_sin);
 }
 
-}  // namespace ir
+}  // namespace ir::dynamics

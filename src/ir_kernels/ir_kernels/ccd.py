@@ -81,8 +81,8 @@ def ccd(
     settings = CcdSettings() if settings is None else settings
     target = data.pose(pose, "pose")
     first = checked("starts", starts, None, chain.n)
-    low = data.array(position_min, "position_min", (chain.n,))
-    high = data.array(position_max, "position_max", (chain.n,))
+    low = data.array(np.ascontiguousarray(position_min), "position_min", (chain.n,))
+    high = data.array(np.ascontiguousarray(position_max), "position_max", (chain.n,))
     if (low > high).any():
         j = int(np.argmax(low > high))
         raise InputError(f"position_min[{j}] is {low[j]} rad, above position_max[{j}], {high[j]} rad")

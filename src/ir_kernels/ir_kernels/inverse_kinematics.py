@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data
-from ir_kernels.arguments import Array, checked
+from ir_kernels.arguments import Array, shaped
 from ir_kernels.chain import Chain
 from ir_kernels.data import IntArray
 from ir_kernels.errors import InputError
@@ -50,8 +50,12 @@ class SphericalWristIk:
     ) -> None:
         self.chain = chain
         self.geometry = wrist_geometry(chain)
-        self.position_min = data.read_only(data.array(position_min, "position_min", (6,)).copy())
-        self.position_max = data.read_only(data.array(position_max, "position_max", (6,)).copy())
+        self.position_min = data.read_only(
+            data.array(np.ascontiguousarray(position_min), "position_min", (6,)).copy()
+        )
+        self.position_max = data.read_only(
+            data.array(np.ascontiguousarray(position_max), "position_max", (6,)).copy()
+        )
         if (self.position_min > self.position_max).any():
             j = int(np.argmax(self.position_min > self.position_max))
             low, high = self.position_min[j], self.position_max[j]
@@ -67,13 +71,12 @@ class SphericalWristIk:
         """All solutions for poses (N,4,4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
         1e-9 rad.
         """
-        targets = checked("poses", poses, None, 4, 4)
-        data.poses(targets, "poses")
-        if self._core is None:
+        targets = shaped("poses", poses, None, 4, 4)
+        result = None if self._core is None else self._core.solve(targets)
+        if result is None:  # no compiled core, or it refused a pose: the check says which and why
+            data.poses(targets, "poses")
             hand = self._to_base @ targets @ self._from_tcp
             result = reference.solve(self.geometry, hand, self.position_min, self.position_max)
-        else:
-            result = self._core.solve(targets)
         for array in result:
             array.setflags(write=False)
         return IkSet(*result)
