@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ir_description import load_cell
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
-from ir_msgs_py import names
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.trajectory import JointTrajectory
@@ -17,6 +15,9 @@ from ir_sim_driver.wake_on_lan import magic_packet
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
+
+from ir_description import load_cell
+from ir_msgs_py import names
 
 MAC = "02:00:00:c4:02:10"
 QUICK = {
@@ -108,7 +109,7 @@ def test_a_trajectory_is_executed_to_its_end(make_driver, cell_client, listen, w
 
 def test_a_bad_trajectory_is_aborted_with_a_sentence(make_driver, cell_client):
     make_driver()
-    with pytest.raises(RequestRefusedError, match="velocity|needs") as refusal:
+    with pytest.raises(RequestRefusedError, match=r"velocity|needs") as refusal:
         cell_client.execute(movement(step=1.0, duration=0.1), timeout=30.0)
     assert refusal.value.code == ExecuteTrajectory.Result.INVALID_GOAL
 

@@ -1,16 +1,11 @@
-"""Values of the driver as messages, and goals from messages. Knows message types, not rclpy."""
+"""Goals from messages, and values of the driver into messages that the node has made."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
-from ir_msgs.msg import ControllerState
 from ir_msgs_py.errors import JointNamesError, TrajectoryError
-from ir_msgs_py.names import WORLD_FRAME
 from ir_msgs_py.ros.conversions import (
     duration_to_msg,
     float_array,
@@ -18,10 +13,6 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
     trajectory_from_msg,
 )
-from sensor_msgs.msg import JointState
-from std_msgs.msg import ColorRGBA
-from trajectory_msgs.msg import JointTrajectoryPoint
-from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_sim_driver.arrays import Array
 from ir_sim_driver.errors import TrajectoryRefusedError
@@ -29,8 +20,6 @@ from ir_sim_driver.executor import Following
 from ir_sim_driver.goal import ErrorCode, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
-_ROBOT = ColorRGBA(r=1.0, g=0.45, b=0.1, a=1.0)
-_LOAD = ColorRGBA(r=0.35, g=0.4, b=0.45, a=1.0)
 
 
 def goal_from_trajectory(msg: Any, max_points: int) -> TrajectoryGoal:
@@ -65,7 +54,7 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
     )
 
 
-def fill_joint_state(msg: JointState, stamp_ns: int, q: Array, qd: Array, torque: Array) -> None:
+def fill_joint_state(msg: Any, stamp_ns: int, q: Array, qd: Array, torque: Array) -> None:
     """Write a state into a message that is used again and again."""
     msg.header.stamp.sec, msg.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
     msg.position = float_array(q)
@@ -73,101 +62,27 @@ def fill_joint_state(msg: JointState, stamp_ns: int, q: Array, qd: Array, torque
     msg.effort = float_array(torque)
 
 
-def controller_state(names: Sequence[str], stamp_ns: int, following: Following) -> ControllerState:
-    """Command, robot and their difference."""
-    reference, feedback, error = points_of(following)
-    msg = ControllerState(
-        joint_names=list(names),
-        reference=reference,
-        feedback=feedback,
-        error=error,
-        trajectory_id=following.label,
-        path_time=following.path_time,
-        speed_scaling=following.path_speed,
-        tool_deviation=following.deviation,
-    )
+def fill_controller_state(msg: Any, names: Sequence[str], stamp_ns: int, following: Following) -> None:
+    """Command, robot and their difference, into a ControllerState."""
     msg.header.stamp = time_to_msg(stamp_ns)
-    return msg
+    msg.joint_names = list(names)
+    fill_points(msg.reference, msg.feedback, msg.error, following)
+    msg.trajectory_id = following.label
+    msg.path_time, msg.speed_scaling = following.path_time, following.path_speed
+    msg.tool_deviation = following.deviation
 
 
-def points_of(following: Following) -> tuple[Any, Any, Any]:
-    """Desired, actual and error as trajectory points."""
+def fill_points(desired: Any, actual: Any, error: Any, following: Following) -> None:
+    """Command, robot and their difference, into three JointTrajectoryPoints."""
     command = following.command
     at = duration_to_msg(max(0, round(following.path_time / _NS)))
-    desired = JointTrajectoryPoint(
-        positions=float_array(command.q),
-        velocities=float_array(command.qd),
-        accelerations=float_array(command.qdd),
-        time_from_start=at,
-    )
-    actual = JointTrajectoryPoint(
-        positions=float_array(following.q), velocities=float_array(following.qd), time_from_start=at
-    )
-    error = JointTrajectoryPoint(
-        positions=float_array(command.q - following.q),
-        velocities=float_array(command.qd - following.qd),
-        time_from_start=at,
-    )
-    return desired, actual, error
-
-
-def status(name: str, level: int, sentence: str, values: dict[str, object]) -> DiagnosticStatus:
-    """One entry of /diagnostics."""
-    return DiagnosticStatus(
-        name=name,
-        level=bytes([level]),
-        message=sentence,
-        hardware_id="KR210 R2700 extra, simulated",
-        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-    )
-
-
-def robot_markers(
-    capsules: Sequence[Any], is_load: Sequence[bool], poses: Array, stamp_ns: int
-) -> MarkerArray:
-    """Capsules of robot and load as cylinders with round ends; poses (n+1, 4, 4) of the links in the
-    world.
-    """
-    stamp = time_to_msg(stamp_ns)
-    markers = []
-    for k, (capsule, load) in enumerate(zip(capsules, is_load, strict=True)):
-        T = poses[capsule.link]
-        ends = [T[:3, :3] @ p + T[:3, 3] for p in (capsule.p0, capsule.p1)]
-        d = 2.0 * float(capsule.radius)
-        colour = _LOAD if load else _ROBOT
-        length = float(np.linalg.norm(ends[1] - ends[0]))
-        body = Marker(type=Marker.CYLINDER, scale=Vector3(x=d, y=d, z=max(length, 1e-6)))
-        body.pose = Pose(
-            position=_point(0.5 * (ends[0] + ends[1])), orientation=_turn_z_to(ends[1] - ends[0])
-        )
-        balls = Marker(
-            type=Marker.SPHERE_LIST, scale=Vector3(x=d, y=d, z=d), points=[_point(p) for p in ends]
-        )
-        for number, (space, marker) in enumerate((("bodies", body), ("ends", balls))):
-            marker.header.frame_id = WORLD_FRAME
-            marker.header.stamp = stamp
-            marker.ns, marker.id = f"robot_{space}", 2 * k + number
-            marker.action, marker.color = Marker.ADD, colour
-            markers.append(marker)
-    return MarkerArray(markers=markers)
+    desired.time_from_start = actual.time_from_start = error.time_from_start = at
+    desired.positions, desired.velocities = float_array(command.q), float_array(command.qd)
+    desired.accelerations = float_array(command.qdd)
+    actual.positions, actual.velocities = float_array(following.q), float_array(following.qd)
+    error.positions = float_array(command.q - following.q)
+    error.velocities = float_array(command.qd - following.qd)
 
 
 def _tolerances(given: Sequence[Any]) -> tuple[JointTolerance, ...]:
     return tuple(JointTolerance(str(t.name), t.position, t.velocity, t.acceleration) for t in given)
-
-
-def _point(p: Array) -> Point:
-    return Point(x=float(p[0]), y=float(p[1]), z=float(p[2]))
-
-
-def _turn_z_to(direction: Array) -> Quaternion:
-    """Shortest turn of +z into a direction (3,)."""
-    length = float(np.linalg.norm(direction))
-    if length < 1e-9:
-        return Quaternion(w=1.0)
-    x, y, z = (direction / length).tolist()
-    if z < -1.0 + 1e-9:
-        return Quaternion(x=1.0, w=0.0)
-    w = 1.0 + z
-    norm = float(np.sqrt(w * w + x * x + y * y))
-    return Quaternion(x=-y / norm, y=x / norm, z=0.0, w=w / norm)

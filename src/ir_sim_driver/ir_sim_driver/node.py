@@ -5,26 +5,22 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Pose, Quaternion, Vector3
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import ControllerState, PowerState
 from ir_msgs.msg import PlcInputs as PlcInputsMsg
 from ir_msgs.msg import PlcOutputs as PlcOutputsMsg
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.ros.conversions import (
     plc_inputs_from_msg,
-    plc_inputs_to_msg,
     plc_outputs_to_msg,
-    power_mode_to_msg,
+    point_to_msg,
     power_state_to_msg,
-    status_to_msg,
     time_to_msg,
 )
-from ir_msgs_py.status import Status, StatusCode
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -32,37 +28,38 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, String
+from std_msgs.msg import ColorRGBA, Float64, String
 from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_description import DescriptionError, robot_urdf
 from ir_msgs_py import names
 from ir_sim_driver.assembly import make_simulation
-from ir_sim_driver.diagnostics import report
+from ir_sim_driver.diagnostics import Entry, report
 from ir_sim_driver.driver import Driver, Frame
-from ir_sim_driver.errors import DriverError, RequestRefusedError
+from ir_sim_driver.errors import DriverError
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.goal import ErrorCode, Outcome
-from ir_sim_driver.loads import CUSTOM, carried, custom_load
 from ir_sim_driver.messages import (
-    controller_state,
+    fill_controller_state,
     fill_joint_state,
+    fill_points,
     goal_from_action,
     goal_from_trajectory,
-    points_of,
-    robot_markers,
-    status,
 )
 from ir_sim_driver.notices import Level
 from ir_sim_driver.parameters import DriverParameters
 from ir_sim_driver.real_time import GridThread, ScaledClock
+from ir_sim_driver.services import Services
+from ir_sim_driver.shapes import Shape, shapes_of
 from ir_sim_driver.simulation import Simulation
 from ir_sim_driver.wake_on_lan import WakeListener
 
 _NS = 1_000_000_000
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STREAM = QoSProfile(depth=100)
+_ROBOT = ColorRGBA(r=1.0, g=0.45, b=0.1, a=1.0)
+_LOAD = ColorRGBA(r=0.35, g=0.4, b=0.45, a=1.0)
 _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
 
 
@@ -143,12 +140,15 @@ class SimDriver(Node):
             self._execute,
             cancel_callback=self._cancel,
         )
-        self.create_service(SetPlcInput, names.SET_PLC_INPUT, self._set_plc_input)
-        self.create_service(StartPause, names.START_PAUSE, self._start_pause)
-        self.create_service(EndPause, names.END_PAUSE, self._end_pause)
-        self.create_service(QueryModes, names.QUERY_MODES, self._query_modes)
-        self.create_service(Recover, names.RECOVER, self._recover)
-        self.create_service(SetLoad, names.SET_LOAD, self._set_load)
+        answers = Services(
+            self._driver, self.get_name(), self._parameters.node.mac, self._publish_description
+        )
+        self.create_service(SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input)
+        self.create_service(StartPause, names.START_PAUSE, answers.start_pause)
+        self.create_service(EndPause, names.END_PAUSE, answers.end_pause)
+        self.create_service(QueryModes, names.QUERY_MODES, answers.query_modes)
+        self.create_service(Recover, names.RECOVER, answers.recover)
+        self.create_service(SetLoad, names.SET_LOAD, answers.set_load)
 
     def _listen(self, host: str, port: int, mac: str) -> WakeListener | None:
         try:
@@ -169,7 +169,9 @@ class SimDriver(Node):
         if frame.power is not None:
             self._power_states.publish(power_state_to_msg(frame.power))
         if frame.following is not None:
-            self._controller_states.publish(controller_state(self._joint_names, stamp_ns, frame.following))
+            state = ControllerState()
+            fill_controller_state(state, self._joint_names, stamp_ns, frame.following)
+            self._controller_states.publish(state)
         if frame.outputs is not None:
             msg = plc_outputs_to_msg(frame.outputs)
             msg.header.stamp = time_to_msg(stamp_ns)
@@ -260,94 +262,8 @@ class SimDriver(Node):
             following = simulation.executor.following(backend.q, backend.qd)
         feedback = ExecuteTrajectory.Feedback(joint_names=self._joint_names)
         feedback.header.stamp = self.get_clock().now().to_msg()
-        feedback.desired, feedback.actual, feedback.error = points_of(following)
+        fill_points(feedback.desired, feedback.actual, feedback.error, following)
         handle.publish_feedback(feedback)
-
-    # services
-
-    def _answer(self, response: Any, work: Any) -> Any:
-        """Run work(simulation) under the lock unless the controller sleeps; errors become the status."""
-        try:
-            with self._driver.locked() as simulation:
-                if not simulation.on_the_network:
-                    raise RequestRefusedError(
-                        StatusCode.INVALID_ROBOT_STATE,
-                        f"the controller is off the network ({simulation.modes.mode.name}): only a "
-                        "Wake-on-LAN packet "
-                        f"for {self._parameters.node.mac} wakes it",
-                    )
-                remark = work(simulation)
-            answer = Status.success(remark or "", self.get_name())
-        except RequestRefusedError as error:
-            answer = Status(error.code, str(error), self.get_name())
-        except (MsgsError, DriverError) as error:
-            answer = Status(StatusCode.FAILURE, str(error), self.get_name())
-        response.status = status_to_msg(answer)
-        return response
-
-    def _set_plc_input(self, request: Any, response: Any) -> Any:
-        def work(simulation: Simulation) -> None:
-            try:
-                simulation.plc.raw.with_bit(request.name, request.value)
-            except MsgsError as error:
-                raise RequestRefusedError(StatusCode.INVALID_OBJECT_NAME, str(error)) from error
-            if request.name in OperatingMode.__members__:
-                simulation.plc.set_operating_mode(OperatingMode[request.name])
-            else:
-                simulation.plc.set_bit(request.name, bool(request.value))
-            response.inputs = plc_inputs_to_msg(simulation.plc.raw)
-
-        return self._answer(response, work)
-
-    def _start_pause(self, request: Any, response: Any) -> Any:
-        def work(simulation: Simulation) -> str:
-            mode = simulation.start_pause(float(request.pause))
-            response.mode = power_mode_to_msg(mode)
-            response.time_to_pause = mode.time_to_pause
-            response.regular_time_to_operate = mode.regular_time_to_operate
-            return f"{mode.name} for {request.pause:g} s"
-
-        return self._answer(response, work)
-
-    def _end_pause(self, request: Any, response: Any) -> Any:
-        def work(simulation: Simulation) -> None:
-            response.time_to_operate = simulation.end_pause()
-
-        return self._answer(response, work)
-
-    def _query_modes(self, request: Any, response: Any) -> Any:
-        def work(simulation: Simulation) -> None:
-            response.modes = [power_mode_to_msg(mode) for mode in simulation.query_modes()]
-            response.current = int(simulation.modes.mode)
-
-        return self._answer(response, work)
-
-    def _recover(self, request: Any, response: Any) -> Any:
-        return self._answer(response, lambda simulation: simulation.recover())
-
-    def _set_load(self, request: Any, response: Any) -> Any:
-        def work(simulation: Simulation) -> str:
-            cell = simulation.cell
-            if request.load == CUSTOM:
-                com = request.center_of_mass
-                load = custom_load(
-                    cell,
-                    float(request.mass),
-                    np.array((com.x, com.y, com.z)),
-                    np.array(request.inertia),
-                    float(request.watts_always),
-                    float(request.watts_drive_bus),
-                )
-            else:
-                load = carried(cell, request.load)
-            simulation.set_load(load)
-            response.total_mass = load.mass
-            return f"carrying {load.text}"
-
-        answer = self._answer(response, work)
-        if answer.status.code == StatusCode.SUCCESS:
-            self._publish_description()
-        return answer
 
     # slow topics out
 
@@ -362,9 +278,11 @@ class SimDriver(Node):
         robot, load = self._simulation.robot, self._simulation.load
         poses = self._simulation.tool.chain.link_poses(frame.q[None])[0]
         of_load = [capsule for item in load.loads for capsule in item.capsules]
-        capsules = [*robot.capsules, *of_load]
-        is_load = [False] * len(robot.capsules) + [True] * len(of_load)
-        self._markers.publish(robot_markers(capsules, is_load, poses, frame.stamp_ns))
+        markers = MarkerArray()
+        for capsules, name, colour in ((robot.capsules, "robot", _ROBOT), (of_load, "load", _LOAD)):
+            for k, shape in enumerate(shapes_of(capsules, poses)):
+                markers.markers += _markers_of(shape, name, k, colour, frame.stamp_ns)
+        self._markers.publish(markers)
 
     def _publish_diagnostics(self) -> None:
         with self._driver.locked() as simulation:
@@ -373,7 +291,7 @@ class SimDriver(Node):
         for level, sentence in notices:
             log = self.get_logger()
             (log.info if level is Level.OK else log.warning if level is Level.WARN else log.error)(sentence)
-        msg = DiagnosticArray(status=[status(*entry) for entry in entries])
+        msg = DiagnosticArray(status=[_diagnostic(entry) for entry in entries])
         msg.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(msg)
 
@@ -386,6 +304,31 @@ class SimDriver(Node):
     def _execution_changed(self, settings: ExecutionSettings) -> None:
         with self._driver.locked() as simulation:
             simulation.set_execution(settings)
+
+
+def _markers_of(shape: Shape, name: str, k: int, colour: ColorRGBA, stamp_ns: int) -> list[Marker]:
+    """A cylinder with round ends."""
+    d = 2.0 * shape.radius
+    body = Marker(type=Marker.CYLINDER, scale=Vector3(x=d, y=d, z=shape.length), id=2 * k)
+    x, y, z, w = shape.quaternion.tolist()
+    body.pose = Pose(position=point_to_msg(shape.centre), orientation=Quaternion(x=x, y=y, z=z, w=w))
+    balls = Marker(type=Marker.SPHERE_LIST, scale=Vector3(x=d, y=d, z=d), id=2 * k + 1)
+    balls.points = [point_to_msg(end) for end in shape.ends]
+    for marker in (body, balls):
+        marker.header.frame_id = names.WORLD_FRAME
+        marker.header.stamp = time_to_msg(stamp_ns)
+        marker.ns, marker.action, marker.color = name, Marker.ADD, colour
+    return [body, balls]
+
+
+def _diagnostic(entry: Entry) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        name=entry.name,
+        level=bytes([entry.level]),
+        message=entry.sentence,
+        hardware_id="KR210 R2700 extra, simulated",
+        values=[KeyValue(key=key, value=str(value)) for key, value in entry.values.items()],
+    )
 
 
 def main() -> None:

@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
-from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.power import Mode
 from ir_msgs_py.status import StatusCode
 
 from ir_sim_driver.arrays import Array
 from ir_sim_driver.backend import Backend
-from ir_sim_driver.emergency import Excursion
+from ir_sim_driver.emergency import EmergencyStop
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.executor import Executor
 from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.loads import Carried
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.pause import best_mode, mode_table
+from ir_sim_driver.pause import Pauses
 from ir_sim_driver.plc import Plc
 from ir_sim_driver.power_meter import BasePower, PowerMeter
 from ir_sim_driver.power_modes import OFF_THE_NETWORK, PowerModes, Wish
@@ -70,25 +70,24 @@ class Simulation:
         self.base = BasePower(data)
         self.meter = PowerMeter(cell.robot, data, settings.dt, settings.controller.regeneration_mode)
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
-        self._pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
+        pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
+        self.pauses = Pauses(self.modes, self.plc, self.standing_power, pe_ids)
         backend.reset(np.array(cell.machine_home))
         self.dynamics = DynamicsModel(self.robot, (), cell.base_pose)
         self.executor = Executor(
             self.robot, self.dynamics, self.tool, settings.execution, settings.dt, np.array(cell.machine_home)
         )
+        self.emergency = EmergencyStop(backend, self.executor, self.tool, self.notices)
         self.load = load
         self._carry(load)
         self.steps = 0
         self.speed_scaling = 1.0
-        self.pause: Mode | None = None
         self.fault = ""
-        self.last_excursion = 0.0
         self._goals = 0
         self._outcomes: list[Outcome] = []
         self._goal_energy = 0.0
         self._drives_off = False
-        self._wanted_on = self._wake = self._recover = self._confirmed = self._restart = False
-        self._excursion: Excursion | None = None
+        self._wake = self._recover = self._confirmed = self._restart = False
         self._last_mode = self.modes.mode
         self._last_operating_mode = self.plc.operating_mode
 
@@ -162,44 +161,6 @@ class Simulation:
             self.speed_scaling = min(factor, 1.0)
         return self.speed_scaling
 
-    def start_pause(self, pause: float) -> PowerMode:
-        """PROFIenergy Start_Pause of `pause` [s]: go to the mode that takes least energy. Raises
-        RequestRefusedError.
-        """
-        if not (np.isfinite(pause) and pause > 0.0):
-            raise RequestRefusedError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS, f"pause is {pause:g} s: it must be finite and above 0 s"
-            )
-        reason = ""
-        if self.plc.operating_mode is not OperatingMode.EXT:
-            reason = f"operating mode is {self.plc.operating_mode.name}, must be EXT"
-        elif self.plc.levels.ab or self.plc.levels.hib or self.plc.levels.ks:
-            reason = "a power bit of the PLC is 1: PROFIenergy and AB, HIB, KS exclude each other"
-        elif self.executor.active:
-            reason = "the robot is executing a trajectory"
-        elif self.modes.mode not in (Mode.STAND_ON_MOTORS, Mode.MOVING, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES):
-            reason = f"the mode is {self.modes.mode.name}, must be STAND_ON_MOTORS or STAND_ON_BRAKES"
-        if reason:
-            raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, f"no pause: {reason}")
-        chosen = best_mode(self.query_modes(), pause)
-        self.pause = None if chosen.mode is Mode.STAND_ON_MOTORS else chosen.mode
-        return chosen
-
-    def end_pause(self) -> float:
-        """PROFIenergy End_Pause: back to motors; returns the seconds it takes, rest of the minimum stay
-        included.
-        """
-        self.pause = None
-        self._wanted_on = True
-        return self.modes.time_to_ready()
-
-    def query_modes(self) -> tuple[PowerMode, ...]:
-        """All modes with the present load and posture, entered from where the robot is now."""
-        source = self.modes.level
-        if source not in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
-            source = Mode.STAND_ON_MOTORS
-        return mode_table(self.modes.rests, self.standing_power, self._pe_ids, source)
-
     def standing_power(self, level: Mode) -> float:
         """Watts at the mains when standing in a mode at the present posture."""
         watts = self.base.of(level)
@@ -241,9 +202,10 @@ class Simulation:
                 StatusCode.INVALID_ROBOT_STATE, "the emergency stop is still pressed: release it first"
             )
         if self.fault:
-            self.backend.reset(self.executor.command)
+            self.backend.reset(self.backend.q)
+            self.executor.hold(self.backend.q)
             self.fault = ""
-        self._recover = True
+        self._recover = self.modes.mode is Mode.EMERGENCY_STOP
         return "the brakes open where the robot stands; nothing resumes"
 
     def disturb(self, torque: Array | None) -> None:
@@ -276,7 +238,7 @@ class Simulation:
     def step(self) -> None:
         """Let dt pass."""
         dt = self.settings.dt
-        self.plc.step(dt, self.pause is not None)
+        self.plc.step(dt, self.pauses.rest is not None)
         self._react_to_plc()
         self.modes.step(dt, self._wish())
         if self.modes.mode is not self._last_mode:
@@ -299,36 +261,15 @@ class Simulation:
 
     def _move(self) -> None:
         backend, executor = self.backend, self.executor
-        mode = self.modes.mode
-        if mode is Mode.EMERGENCY_STOP:
-            if self.fault or not self.backend.qd.any():
-                backend.rest()
-            else:
-                self._brake()
+        if self.fault:
+            backend.rest()
+        elif self.modes.mode is Mode.EMERGENCY_STOP:
+            self.emergency.step()
         elif self.modes.level is Mode.STAND_ON_MOTORS:
             backend.track(executor.advance(self._scaling(), self.modes.motors_on))
             executor.supervise(backend.q, backend.qd)
         else:
             backend.rest()
-
-    def _brake(self) -> None:
-        self.backend.brake()
-        if self._excursion is not None:
-            self._excursion.add(self.backend.q)
-        if np.abs(self.backend.qd).max() < 1e-9:
-            self._brakes_hold()
-
-    def _brakes_hold(self) -> None:
-        self.backend.reset(self.backend.q)
-        self.executor.hold(self.backend.q)
-        if self._excursion is not None:
-            self.last_excursion = self._excursion.distance()
-            self._excursion = None
-            self.notices.add(
-                Level.WARN,
-                f"emergency stop: the tool left its path by {self.last_excursion * 1e3:.1f} mm; "
-                "recover to go on",
-            )
 
     def _scaling(self) -> float:
         scaling = self.speed_scaling if self.plc.levels.move_enable else 0.0
@@ -338,15 +279,18 @@ class Simulation:
         return scaling
 
     def _wish(self) -> Wish:
-        plc, executor = self.plc, self.executor
-        rest = plc.rest or self.pause
+        plc, executor, pauses = self.plc, self.executor, self.pauses
+        if self.modes.motors_on:
+            pauses.wants_motors = False
+        rest = plc.rest or pauses.rest
         if rest is None:
             if self._drives_off:
                 rest = Mode.STAND_ON_BRAKES
-            elif self._wanted_on:
+            elif pauses.wants_motors:
                 rest = Mode.STAND_ON_MOTORS
-        if rest not in (None, Mode.STAND_ON_MOTORS) and executor.active:
-            self.abort(f"{_name(rest)} was requested during the movement; stopped on the path")
+        if executor.active and (self._restart or rest not in (None, Mode.STAND_ON_MOTORS)):
+            what = "Cold start" if self._restart else _name(rest)
+            self.abort(f"{what} was requested during the movement; stopped on the path")
         wish = Wish(
             rest,
             executor.active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
@@ -369,7 +313,7 @@ class Simulation:
             self._drives_off = True
         if plc.drives_on and not plc.levels.drives_off:
             self._drives_off = False
-            self._wanted_on = True
+            self.pauses.wants_motors = True
             self._recover = self._recover or (self._confirmed and not plc.levels.emergency_stop)
         if plc.confirm and not plc.levels.emergency_stop:
             self._confirmed = True
@@ -380,29 +324,19 @@ class Simulation:
 
     def _mode_changed(self, before: Mode, now: Mode) -> None:
         if now is Mode.EMERGENCY_STOP:
-            self._start_emergency_stop()
+            self._recover = self._confirmed = self.pauses.wants_motors = False
+            self.emergency.start(self.fault or "emergency stop", self._standing())
         elif before is Mode.EMERGENCY_STOP:
             self._recover = self._confirmed = False
             self.executor.hold(self.backend.q)
-        if now is Mode.STAND_ON_MOTORS:
-            self._wanted_on = False
-            if before is Mode.FROM_HIBERNATION:
-                self.plc.wake()
+        elif before is Mode.FROM_HIBERNATION:
+            self.plc.wake()
+            self._restart = False
         if now in OFF_THE_NETWORK:
-            self.pause = None
+            self.pauses.rest = None
             self._restart = self._drives_off = False
         if now is not Mode.MOVING and before is not Mode.MOVING:
             self.notices.add(Level.OK, f"{before.name} -> {now.name}")
-
-    def _start_emergency_stop(self) -> None:
-        executor = self.executor
-        path, s = executor.path, executor.path_parameter
-        self._recover = self._confirmed = False
-        self._wanted_on = False
-        self._excursion = None if self._standing() else Excursion(self.tool, path, s, self.backend.q)
-        executor.drop(self.fault or "emergency stop")
-        if self._excursion is None:
-            executor.hold(self.backend.q)
 
     def _fail(self, error: BackendError) -> None:
         self.fault = str(error)
@@ -419,7 +353,7 @@ class Simulation:
             return "emergency stop: release it and recover first"
         if mode not in (*_READY, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES, Mode.FROM_BRAKES):
             return f"drives not powered ({mode.name})"
-        rest = plc.rest or self.pause
+        rest = plc.rest or self.pauses.rest
         if rest is not None:
             return f"drives not powered: {_name(rest)} is requested"
         if self._drives_off:
