@@ -16,6 +16,9 @@ from ir_description.poses import composed, pose_of
 ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
 ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)
 APPROACH_MAX = 5.0
+"""Longest retreat [m]."""
+ZONE_MAX = 10.0 * SIZE_MAX
+"""Largest edge [m] of a zone: it holds bodies far apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +37,9 @@ class Zone:
             raise InvalidValueError(f"kind of zone is {self.kind!r}, must be one of {', '.join(ZONE_KINDS)}")
         object.__setattr__(self, "pose", frozen_pose(self.pose, "pose of the zone"))
         object.__setattr__(self, "size", frozen(self.size, (3,), "size of the zone"))
-        if (self.size <= 0.0).any() or (self.size > SIZE_MAX).any():
+        if (self.size <= 0.0).any() or (self.size > ZONE_MAX).any():
             raise InvalidValueError(
-                f"size of the zone is {self.size.tolist()} m, must be in (0, {SIZE_MAX:g}] m"
+                f"size of the zone is {self.size.tolist()} m, must be in (0, {ZONE_MAX:g}] m"
             )
 
 

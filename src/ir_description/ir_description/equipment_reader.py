@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ir_description.arrays import Array
-from ir_description.body import SIZE_MAX, Body
+from ir_description.body import Body
 from ir_description.body_reader import POSE_KEYS, BodyReader, pose_in, read_pose
 from ir_description.equipment import (
     APPROACH_MAX,
     ZONE_KINDS,
+    ZONE_MAX,
     AllowedContact,
     Equipment,
     EquipmentState,
@@ -58,7 +59,7 @@ def _zone(table: Table, bodies: tuple[Body, ...]) -> Zone:
                 if key in zone:
                     zone[key].fail("belongs to a zone with a size")
             return zone_around(kind, bodies)  # type: ignore[arg-type]
-        size = zone["size"].numbers(3, 0.0, SIZE_MAX, "m", above=True)
+        size = zone["size"].numbers(3, 0.0, ZONE_MAX, "m", above=True)
         return Zone(kind, pose_in(zone), size)  # type: ignore[arg-type]
 
 

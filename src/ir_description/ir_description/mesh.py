@@ -30,7 +30,7 @@ def read_regular_file(path: Path, limit: int) -> bytes:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InvalidValueError(f"file {shown(str(path))} can't be opened: {reason}") from error
-    with os.fdopen(descriptor, "rb") as file:
+    try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
             raise InvalidValueError(f"file {shown(str(path))} is not a regular file")
@@ -38,7 +38,10 @@ def read_regular_file(path: Path, limit: int) -> bytes:
             raise InvalidValueError(
                 f"file {shown(str(path))} has {status.st_size} bytes, must be at most {limit} bytes"
             )
-        return file.read(limit)
+        with os.fdopen(descriptor, "rb", closefd=False) as file:
+            return file.read(limit)
+    finally:
+        os.close(descriptor)
 
 
 def mesh_path(folder: Path, name: str) -> Path:
