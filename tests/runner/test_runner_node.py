@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, ProgramState, Status
 from ir_msgs.msg import Signal as SignalMsg
@@ -27,6 +28,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 
 MAC = "02:00:00:00:00:01"
 TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**7], np.zeros((2, 6)))
@@ -407,3 +409,45 @@ def test_a_cancel_after_the_end_and_twice_is_harmless(cell):
             cell.run([move(LONG)], timeout=0.1)
     assert cell.run([move()]).status.code == StatusCode.SUCCESS
     assert time.monotonic() - started < 10.0
+
+
+class SimulatedTime:
+    """Publishes /clock a hundred times faster than real time."""
+
+    def __init__(self, cell):
+        self.now = 1000.0
+        self.publisher = cell.test.create_publisher(Clock, "/clock", 10)
+        cell.executor.run(lambda: cell.test.create_timer(0.005, self.tick))
+
+    def tick(self):
+        self.now += 0.5
+        self.publisher.publish(Clock(clock=Time(sec=int(self.now), nanosec=int(self.now % 1 * 1e9))))
+
+
+@pytest.fixture
+def simulated(ros_context, ros_executor):
+    cell = Cell(ros_context, ros_executor, use_sim_time=True)
+    yield cell, SimulatedTime(cell)
+    cell.client.close()
+
+
+def test_pauses_follow_the_clock_of_a_simulation(simulated):
+    cell, _ = simulated
+    started = time.monotonic()
+    result = cell.run([pause(60.0, "BUS_POWER_OFF")])
+    assert result.status.code == StatusCode.SUCCESS, result.status.message
+    assert 60.0 <= result.duration < 65.0
+    assert time.monotonic() - started < 10.0
+
+
+def test_a_clock_that_jumps_back_ends_the_program(simulated):
+    cell, clock = simulated
+
+    def jump(at):
+        if at.phase == "pause: BUS_POWER_OFF" and clock.now > 1000.0:
+            clock.now = 500.0
+
+    result = cell.run([pause(600.0, "BUS_POWER_OFF")], feedback=jump)
+    assert "step 1 of 1 (pause BUS_POWER_OFF): the clock jumped back by" in result.status.message
+    assert float(result.status.message.split()[-2]) > 500.0
+    assert cell.driver.log[-2:] == ["ab=1", "ab=0"]

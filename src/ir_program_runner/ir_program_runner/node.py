@@ -13,7 +13,6 @@ from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py.errors import InvalidValueError, ParameterError
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import PowerMode
 from ir_msgs_py.program import Event, ProgramState
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import (
@@ -28,20 +27,22 @@ from ir_msgs_py.ros.planner import Planner
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from rclpy.action import ActionServer, CancelResponse
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
+from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
 from ir_description import DescriptionError, load_cell
 from ir_msgs_py import names
-from ir_program_runner import requests as ask
 from ir_program_runner.checks import check_program
-from ir_program_runner.errors import CanceledError, ProgramError
+from ir_program_runner.errors import ProgramError
+from ir_program_runner.fulfilment import Fulfilment, Ports
 from ir_program_runner.machines import Machines
 from ir_program_runner.parameters import declare_parameters
 from ir_program_runner.program import Program, ProgramResult
 from ir_program_runner.progress import Progress
+from ir_program_runner.requests import Tell
 from ir_program_runner.wake_on_lan import magic_packet, send_packet
 
 _KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -82,6 +83,9 @@ class ProgramRunnerNode(Node):
             cancel_timeout=links.cancel_timeout,
             on_meter=self._waiting.look,
         )
+        self._jump = ""
+        back = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False)
+        self._jumps = self.get_clock().create_jump_callback(back, post_callback=self._clock_jumped)
         self._signals = self.create_publisher(SignalMsg, "~/signals", _SIGNALS)
         self._machine_signals = self.create_publisher(SignalMsg, "~/machine_signals", _SIGNALS)
         self._program_state = self.create_publisher(ProgramStateMsg, "~/program_state", _KEPT)
@@ -99,6 +103,7 @@ class ProgramRunnerNode(Node):
     def destroy_node(self) -> None:
         """Let go of the action server before the node."""
         self._server.destroy()
+        self._jumps.unregister()
         super().destroy_node()
 
     async def _run(self, goal: Any) -> RunProgram.Result:
@@ -108,21 +113,29 @@ class ProgramRunnerNode(Node):
             return self._end(
                 goal, ProgramResult(Status(StatusCode.INVALID_ROBOT_STATE, sentence), 0), 0.0, 0.0
             )
-        self._progress = progress = Progress(goal.request.program_id, (), time.monotonic())
+        self._progress = progress = Progress(goal.request.program_id, (), self._now())
         try:
             status, movements = await self._fetch(goal.request)
-            # a driver that has just been started gets the time to be heard
-            await self._waiting.until(
-                lambda: not self._driver.silent, self._settings.links.value.response_timeout
-            )
+            # a driver or a /clock that has just been started gets the time to be heard
+            patience = self._settings.links.value.response_timeout
+            await self._waiting.until(lambda: not self._driver.silent and self._now() > 0.0, patience)
+            progress.started = self._now()
+            self._jump = ""
             energy = self._driver.energy
             result = ProgramResult(status, 0)
             if status.ok:
                 progress.movements = movements
-                result = await self._fulfil_all(goal, Program(movements, self._settings.program.value))
+                result = await self._run_steps(goal, Program(movements, self._settings.program.value))
         finally:
             self._progress = None
-        return self._end(goal, result, time.monotonic() - progress.started, self._driver.energy - energy)
+        return self._end(goal, result, self._now() - progress.started, self._driver.energy - energy)
+
+    async def _run_steps(self, goal: Any, program: Program) -> ProgramResult:
+        feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._tell_feedback(goal))
+        try:
+            return await Fulfilment(self._ports(goal)).run(program)
+        finally:
+            self.destroy_timer(feedback)
 
     async def _fetch(self, request: Any) -> tuple[Status, tuple[PlannedMovement, ...]]:
         """Get the steps with all points, and check them as a whole."""
@@ -145,73 +158,28 @@ class ProgramRunnerNode(Node):
             return Status(error.code, str(error)), ()
         return status, movements
 
-    async def _fulfil_all(self, goal: Any, program: Program) -> ProgramResult:
-        """Drive the generator; a cancel is thrown into it once, at the request that it interrupts."""
-        steps = program.run()
-        feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._tell_feedback(goal))
-        canceled = False
+    def _ports(self, goal: Any) -> Ports:
+        return Ports(
+            driver=self._driver,
+            machines=self._machines,
+            until=self._waiting.until,
+            now=self._now,
+            fault=lambda: self._jump,
+            canceled=lambda: bool(goal.is_cancel_requested),
+            tell=self._tell,
+            tell_phase=lambda text: self._tell_phase(goal, text),
+            set_signal=self._set_signal,
+            send_wake_packet=self._send_wake_packet,
+        )
 
-        def stop() -> bool:
-            return bool(goal.is_cancel_requested) and not canceled
+    def _now(self) -> float:
+        """Time of the program [s]: /clock where that is used, else steady."""
+        clock = self.get_clock()
+        return clock.now().nanoseconds * 1e-9 if clock.ros_time_is_active else time.monotonic()
 
-        try:
-            request = next(steps)
-            while True:
-                interrupted = stop() and isinstance(request, ask.INTERRUPTIBLE)
-                outcome = ask.Outcome(time.monotonic(), self._driver.mode)
-                if not interrupted:
-                    outcome = await self._fulfil(request, stop)
-                    interrupted = stop() and isinstance(request, ask.INTERRUPTIBLE) and not outcome.status.ok
-                self._tell_feedback(goal)
-                if interrupted:
-                    canceled = True
-                    request = steps.throw(CanceledError(outcome.status.message))
-                else:
-                    request = steps.send(outcome)
-        except StopIteration as ended:
-            result: ProgramResult = ended.value
-            return result
-        finally:
-            self.destroy_timer(feedback)
-
-    async def _fulfil(self, request: ask.Request, stop: Callable[[], bool]) -> ask.Outcome:
-        status = Status.success()
-        modes: tuple[PowerMode, ...] = ()
-        match request:
-            case ask.Tell():
-                self._tell(request)
-            case ask.Phase(text):
-                assert self._progress is not None
-                self._progress.phase = text
-            case ask.WaitForSignals(signals, timeout):
-                status = await self._wait(lambda: self._machines.holds(signals), timeout, stop)
-            case ask.WaitForMode(wanted, timeout):
-                status = await self._wait(lambda: self._driver.mode in wanted, timeout, stop)
-            case ask.WaitUntil(moment):
-                status = await self._wait(lambda: time.monotonic() >= moment, float("inf"), stop)
-            case ask.SetSignal(signal):
-                self._set_signal(signal)
-            case ask.SetLoad(load):
-                status = await self._driver.set_load(load)
-            case ask.SetPlcInput(name, value):
-                status = await self._driver.set_plc_input(name, value)
-            case ask.AskModes():
-                status, modes = await self._driver.query_modes()
-            case ask.Drive(trajectory):
-                status = await self._driver.drive(trajectory, stop)
-            case ask.SendWakePacket():
-                status = self._send_wake_packet()
-        return ask.Outcome(time.monotonic(), self._driver.mode, status, modes)
-
-    async def _wait(self, condition: Callable[[], bool], timeout: float, stop: Callable[[], bool]) -> Status:
-        """Wait for the condition, but no longer than the driver is heard and nobody cancels."""
-        driver = self._driver
-        await self._waiting.until(lambda: condition() or stop() or driver.silent, timeout)
-        if condition():
-            return Status.success()
-        if stop():
-            return Status(StatusCode.PREEMPTED, "the wait was interrupted")
-        return driver.state() if driver.silent else Status(StatusCode.TIMED_OUT, f"not within {timeout:g} s")
+    def _clock_jumped(self, jump: TimeJump) -> None:
+        self._jump = f"the clock jumped back by {-jump.delta.nanoseconds * 1e-9:.3f} s"
+        self._waiting.look()
 
     def _send_wake_packet(self) -> Status:
         links = self._settings.links.value
@@ -223,28 +191,28 @@ class ProgramRunnerNode(Node):
         return Status.success()
 
     def _set_signal(self, signal: Signal) -> None:
-        self._machines.set(signal, time.monotonic())
+        self._machines.set(signal, self._now())
         self._machine_signals.publish(signal_to_msg(self._stamped(signal)))
 
     def _hear_signal(self, msg: SignalMsg) -> None:
         try:
-            self._machines.set(signal_from_msg(msg), time.monotonic())
+            self._machines.set(signal_from_msg(msg), self._now())
         except InvalidValueError as error:
             self.get_logger().warning(f"a signal is ignored: {error}")
         self._waiting.look()
 
     def _let_machines_answer(self) -> None:
-        for signal in self._machines.take_answers(time.monotonic()):
+        for signal in self._machines.take_answers(self._now()):
             self._signals.publish(signal_to_msg(self._stamped(signal)))
 
     def _stamped(self, signal: Signal) -> Signal:
         return Signal(signal.name, signal.value, self.get_clock().now().nanoseconds)
 
-    def _tell(self, tell: ask.Tell) -> None:
+    def _tell(self, tell: Tell) -> None:
         progress = self._progress
         assert progress is not None
         if tell.event is Event.STARTED:
-            progress.begin(tell.index, time.monotonic())
+            progress.begin(tell.index, self._now())
         state = ProgramState(
             stamp_ns=self.get_clock().now().nanoseconds,
             program_id=progress.program_id,
@@ -256,6 +224,11 @@ class ProgramRunnerNode(Node):
         )
         self._program_state.publish(program_state_to_msg(state))
 
+    def _tell_phase(self, goal: Any, text: str) -> None:
+        assert self._progress is not None
+        self._progress.phase = text
+        self._tell_feedback(goal)
+
     def _tell_feedback(self, goal: Any) -> None:
         progress = self._progress
         if progress is not None and goal.is_active:
@@ -264,7 +237,7 @@ class ProgramRunnerNode(Node):
                     movement=progress.index,
                     total=progress.total,
                     phase=progress.phase,
-                    remaining=progress.remaining(time.monotonic()),
+                    remaining=progress.remaining(self._now()),
                 )
             )
 

@@ -1,0 +1,148 @@
+"""Fulfils a program's requests one by one, through ports: the node plugs ROS in, a test whatever it likes."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from ir_msgs_py.plc import Signal
+from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_program_runner import requests as ask
+from ir_program_runner.errors import CanceledError
+from ir_program_runner.machines import Machines
+from ir_program_runner.program import Program, ProgramResult
+
+
+class DriverPort(Protocol):
+    """The driver as a program sees it; every answer is a Status, nothing waits without end."""
+
+    @property
+    def mode(self) -> Mode | None:
+        """Power mode by the meter's last reading."""
+
+    @property
+    def silent(self) -> bool:
+        """Whether the meter has not been heard for too long."""
+
+    def state(self) -> Status:
+        """Say whether the driver can be talked to."""
+
+    async def set_plc_input(self, name: str, value: bool) -> Status:
+        """Set one level."""
+
+    async def set_load(self, load: str) -> Status:
+        """Carry exactly this load text."""
+
+    async def query_modes(self) -> tuple[Status, tuple[PowerMode, ...]]:
+        """Tell the modes with their times."""
+
+    async def drive(self, trajectory: JointTrajectory, stop: Callable[[], bool]) -> Status:
+        """Execute a trajectory; stop along the path when `stop` is true."""
+
+
+@dataclass(frozen=True)
+class Ports:
+    """The world of one program.
+
+    until: waits for a condition. now: time of the program [s]. fault: why no wait may go on, "" = it may.
+    canceled: whether somebody asked to stop. The others do at once what they are called.
+    """
+
+    driver: DriverPort
+    machines: Machines
+    until: Callable[[Callable[[], bool]], Awaitable[bool]]
+    now: Callable[[], float]
+    fault: Callable[[], str]
+    canceled: Callable[[], bool]
+    tell: Callable[[ask.Tell], None]
+    tell_phase: Callable[[str], None]
+    set_signal: Callable[[Signal], None]
+    send_wake_packet: Callable[[], Status]
+
+
+class Fulfilment:
+    """One run of a program; `run` returns how it ended."""
+
+    def __init__(self, ports: Ports) -> None:
+        self._ports = ports
+        self._thrown = False
+
+    async def run(self, program: Program) -> ProgramResult:
+        """Drive the generator; a cancel is thrown into it once, at a request that takes time."""
+        steps = program.run()
+        try:
+            request = next(steps)
+            while True:
+                outcome = await self._outcome(request)
+                if isinstance(request, ask.INTERRUPTIBLE) and self._stop() and not outcome.status.ok:
+                    self._thrown = True
+                    request = steps.throw(CanceledError(outcome.status.message))
+                else:
+                    request = steps.send(outcome)
+        except StopIteration as ended:
+            result: ProgramResult = ended.value
+            return result
+
+    def _stop(self) -> bool:
+        return self._ports.canceled() and not self._thrown
+
+    async def _outcome(self, request: ask.Request) -> ask.Outcome:
+        ports = self._ports
+        modes: tuple[PowerMode, ...] = ()
+        if isinstance(request, ask.INTERRUPTIBLE) and self._stop():
+            status = Status(StatusCode.PREEMPTED)
+        elif isinstance(request, ask.AskModes):
+            status, modes = await ports.driver.query_modes()
+        else:
+            status = await self._fulfil(request)
+        return ask.Outcome(ports.now(), ports.driver.mode, status, modes)
+
+    async def _fulfil(self, request: ask.Request) -> Status:
+        ports = self._ports
+        match request:
+            case ask.Tell():
+                ports.tell(request)
+            case ask.Phase(text):
+                ports.tell_phase(text)
+            case ask.SetSignal(signal):
+                ports.set_signal(signal)
+            case ask.SendWakePacket():
+                return ports.send_wake_packet()
+            case ask.SetLoad(load):
+                return await ports.driver.set_load(load)
+            case ask.SetPlcInput(name, value):
+                return await ports.driver.set_plc_input(name, value)
+            case ask.Drive(trajectory):
+                return await ports.driver.drive(trajectory, self._stop)
+            case ask.WaitForSignals(signals, timeout):
+                return await self._wait(lambda: ports.machines.holds(signals), timeout)
+            case ask.WaitForMode(wanted, timeout):
+                return await self._wait(lambda: ports.driver.mode in wanted, timeout)
+            case ask.WaitUntil(moment):
+                return await self._wait(lambda: ports.now() >= moment, float("inf"))
+        return Status.success()
+
+    async def _wait(self, condition: Callable[[], bool], timeout: float) -> Status:
+        """Wait for the condition, but no longer than the driver is heard, nobody cancels and time goes on."""
+        ports = self._ports
+        deadline = ports.now() + timeout
+
+        def over() -> bool:
+            return self._stop() or ports.driver.silent or bool(ports.fault()) or ports.now() >= deadline
+
+        await ports.until(lambda: condition() or over())
+        if condition():
+            return Status.success()
+        if self._stop():
+            return Status(StatusCode.PREEMPTED)
+        if ports.fault():
+            return Status(StatusCode.FAILURE, ports.fault())
+        return (
+            ports.driver.state()
+            if ports.driver.silent
+            else Status(StatusCode.TIMED_OUT, f"not within {timeout:g} s")
+        )
