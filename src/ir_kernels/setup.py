@@ -13,7 +13,8 @@ from setuptools.command.build_ext import build_ext
 
 PACKAGE = "ir_kernels"
 X86 = platform.machine().lower() in ("x86_64", "amd64")
-WARNINGS = ["-Wall", "-Wextra", "-Wno-psabi"]
+# GCC 12 takes the deliberately undefined values of its own AVX-512 header for a mistake.
+WARNINGS = ["-Wall", "-Wextra", "-Wno-psabi", "-Wno-uninitialized", "-Wno-maybe-uninitialized"]
 # No -ffast-math: NaN checks and the order of additions are part of what is promised.
 OPTIMISE = ["-O3", "-std=c++17", "-fvisibility=hidden", "-g0", "-fno-math-errno", "-fno-trapping-math"]
 SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-omit-frame-pointer"]

@@ -6,18 +6,18 @@ penetration, which is the shortest translation that parts them (for one capsule 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ir_kernels import data
+from ir_kernels import compiled, data
 from ir_kernels.chain import Chain
 from ir_kernels.data import BodyLike, BoolArray, CapsuleLike, FloatArray, IntArray
 from ir_kernels.errors import InputError
 from ir_kernels.geometry import Geometry, Pair, geometry
-from ir_kernels.reference import certify
-from ir_kernels.reference import collision as reference
 from ir_kernels.reference.certify import COLLIDES, FREE, UNDECIDED
+from ir_kernels.reference.model import Model
 
 __all__ = [
     "COLLIDES",
@@ -97,6 +97,7 @@ class CollisionModel:
         self.chain = chain
         self._geometry: Geometry = geometry(chain, capsules, bodies, self_pairs, ignored_pairs)
         self.pairs: tuple[Pair, ...] = self._geometry.pairs
+        self._core = _core(self._geometry)
 
     def _per_pair(self, value: ArrayLike, name: str) -> FloatArray:
         """`value` for every pair: one number, or (Z,); -inf is allowed, NaN and +inf aren't."""
@@ -109,10 +110,8 @@ class CollisionModel:
 
     def distances(self, q: ArrayLike) -> FloatArray:
         """(N, Z): signed distances [m] of all pairs at q (N, n)."""
-        q = self.chain.checked(q)
-        return reference.distances(
-            self._geometry, reference.ends(self._geometry, reference.poses(self._geometry, q))
-        )
+        found: FloatArray = self._core.distances(self.chain.checked(q))
+        return found
 
     def min_distance(self, q: ArrayLike, offset: ArrayLike | None = None) -> MinDistance:
         """The pair of least distance - offset (Z,) [m] at each q (N, n), and its true distance.
@@ -120,25 +119,16 @@ class CollisionModel:
         With the safety distances as offset it is the pair that comes nearest to violating its own; an offset
         of -inf leaves a pair out.
         """
-        q = self.chain.checked(q)
         shift = self._per_pair(0.0 if offset is None else offset, "offset")
-        pair = reference.nearest(self.distances(q), shift)
-        found = pair >= 0
-        near = self.witnesses(q[found], pair[found]) if found.any() else None
-        distance = np.full(len(q), np.inf)
-        point_a, point_b, normal = np.full((3, len(q), 3), np.nan)
-        if near is not None:
-            distance[found], point_a[found], point_b[found] = near.distance, near.point_a, near.point_b
-            normal[found] = near.normal
+        distance, pair, point_a, point_b, normal = self._core.min_distance(self.chain.checked(q), shift)
         return MinDistance(distance, pair, point_a, point_b, normal)
 
     def witnesses(self, q: ArrayLike, pair: ArrayLike) -> Witnesses:
         """Distance, nearest points and normal of one pair (N,) at each q (N, n)."""
         q = self.chain.checked(q)
         pair = data.indices(pair, "pair", (len(q),), len(self.pairs))
-        segments = reference.ends(self._geometry, reference.poses(self._geometry, q))
-        found = reference.witnesses(self._geometry, segments, pair)
-        return Witnesses(found.distance, pair, found.on_segment, found.on_body, found.normal)
+        distance, point_a, point_b, normal, _ = self._core.witnesses(q, pair, False)
+        return Witnesses(distance, pair, point_a, point_b, normal)
 
     def gradients(self, q: ArrayLike, pair: ArrayLike) -> FloatArray:
         """(N, n): derivative of the distance of one pair (N,) by the joint values at each q (N, n) [m/rad].
@@ -147,16 +137,16 @@ class CollisionModel:
         """
         q = self.chain.checked(q)
         pair = data.indices(pair, "pair", (len(q),), len(self.pairs))
-        poses = reference.poses(self._geometry, q)
-        found = reference.witnesses(self._geometry, reference.ends(self._geometry, poses), pair)
-        return reference.gradient(self._geometry, poses, found, pair)
+        gradient: FloatArray = self._core.witnesses(q, pair, True)[-1]
+        return gradient
 
     def is_free(self, q: ArrayLike, threshold: ArrayLike) -> BoolArray:
         """(N,): whether every pair's distance exceeds its threshold (one number or (Z,)) [m] at q (N, n).
 
         A threshold of -inf ignores the pair. Stops at the first pair that is too near.
         """
-        return reference.is_free(self.distances(q), self._per_pair(threshold, "threshold"))
+        free: BoolArray = self._core.is_free(self.chain.checked(q), self._per_pair(threshold, "threshold"))
+        return free
 
     def certify_edges(self, q0: ArrayLike, q1: ArrayLike, threshold: ArrayLike) -> Certificates:
         """Whether all distances exceed their threshold everywhere on the straight segments q0 (N, n) to q1
@@ -167,10 +157,8 @@ class CollisionModel:
         start, goal = self.chain.checked(q0, "q0"), self.chain.checked(q1, "q1")
         if len(start) != len(goal):
             raise InputError(f"q1 has {len(goal)} rows: expected {len(start)} as q0")
-        found = certify.certify(
-            self._geometry, certify.Edges(start, goal), self._per_pair(threshold, "threshold")
-        )
-        return Certificates(found.verdict, found.t0, found.t1, found.pair)
+        limit = self._per_pair(threshold, "threshold")
+        return Certificates(*self._core.certify_edges(start, goal, limit))
 
     def certify_trajectory(
         self, coefficients: ArrayLike, durations: ArrayLike, threshold: ArrayLike
@@ -181,23 +169,29 @@ class CollisionModel:
         """
         c = data.array(coefficients, "coefficients", (None, self.chain.n, None))
         span = data.array(durations, "durations", (len(c),))
-        if c.shape[2] == 0:
-            raise InputError("coefficients has shape (S, n, 0): expected at least the constant term")
         if (span < 0.0).any():
             raise InputError(f"durations holds {span.min()} s: expected at least 0")
-        found = certify.certify(
-            self._geometry, certify.Polynomials(c, span), self._per_pair(threshold, "threshold")
-        )
-        return _first(found, span)
+        limit = self._per_pair(threshold, "threshold")
+        verdict, begin, end, pair, bound = self._core.certify_trajectory(c, span, limit)
+        return Certificate(verdict, (begin, end), pair, bound)
 
 
-def _first(found: certify.Outcome, span: FloatArray) -> Certificate:
-    """The certificate of a trajectory, from those of its segments."""
-    unsafe = np.flatnonzero(found.verdict != FREE)
-    if not len(unsafe):
-        total = float(span.sum())
-        return Certificate(FREE, (total, total), -1, float(found.bound.min(initial=np.inf)))
-    k = int(unsafe[0])
-    begin = float(span[:k].sum())
-    interval = (begin + float(found.t0[k]), begin + float(found.t1[k]))
-    return Certificate(int(found.verdict[k]), interval, int(found.pair[k]), -np.inf)
+def _core(geometry: Geometry) -> Any:
+    """The compiled model, or the one in NumPy."""
+    if not hasattr(compiled.MODULE, "Model"):
+        return Model(geometry)
+    chain, capsules, scene = geometry.chain, geometry.capsules, geometry.scene
+    return compiled.MODULE.Model(
+        chain.joint_origin,
+        chain.joint_axis,
+        chain.base_pose,
+        capsules.link,
+        capsules.ends,
+        capsules.radius,
+        scene.kind,
+        scene.pose,
+        scene.size,
+        [(hull.vertices, hull.sides, hull.normals, hull.offsets) for hull in scene.hulls],
+        geometry.environment,
+        geometry.self_pairs,
+    )

@@ -29,6 +29,12 @@ class Hull:
     normals: FloatArray
     offsets: FloatArray
 
+    @property
+    def sides(self) -> FloatArray:
+        """(E, 3): the edges as vectors."""
+        vectors: FloatArray = self.vertices[self.edges[:, 1]] - self.vertices[self.edges[:, 0]]
+        return vectors
+
 
 NO_HULL = Hull(np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 2), int), np.zeros((0, 3)), np.zeros(0))
 

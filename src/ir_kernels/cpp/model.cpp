@@ -1,0 +1,171 @@
+#include "model.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+namespace ir {
+namespace {
+
+// Farthest that any capsule gets from the base's origin, whatever the joint values.
+double reach_of(const Model& m) {
+  std::vector<double> to_joint(m.chain.n + 1, 0.0);
+  for (int k = 0; k < m.chain.n; ++k) {
+    const double* s = m.chain.joints[k].shift;
+    to_joint[k + 1] = to_joint[k] + std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+  }
+  double reach = 0.0;
+  for (const Capsule& c : m.capsules)
+    for (const double* p : {c.p0, c.p1})
+      reach = std::max(reach, to_joint[c.link] + std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) + c.radius);
+  return reach;
+}
+
+// Orders bodies so that neighbours share a leaf: halved along the longest side, down to sixteen.
+void split(std::vector<int>& order, int begin, int end, const std::vector<std::array<double, 3>>& centre) {
+  if (end - begin <= 16) return;
+  int longest = 0;
+  double extent = -1.0;
+  for (int i = 0; i < 3; ++i) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (int k = begin; k < end; ++k) {
+      low = std::min(low, centre[order[k]][i]);
+      high = std::max(high, centre[order[k]][i]);
+    }
+    if (high - low > extent) extent = high - low, longest = i;
+  }
+  const int leaves = (end - begin + 15) / 16, middle = begin + (leaves + 1) / 2 * 16;
+  std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end, [&](int i, int j) {
+    return centre[i][longest] != centre[j][longest] ? centre[i][longest] < centre[j][longest] : i < j;
+  });
+  split(order, begin, middle, centre);
+  split(order, middle, end, centre);
+}
+
+}  // namespace
+
+void Model::finish() {
+  const double reach = reach_of(*this);
+  double extent = reach;
+  bodies_float.resize(kind.size());
+  std::vector<int> order;
+  std::vector<std::array<double, 3>> centre(kind.size()), radius(kind.size());
+  for (int k = 0; k < body_count(); ++k) {
+    const Body<double>& d = bodies_double[k];
+    Body<float>& f = bodies_float[k];
+    double largest = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) f.axis[i][j] = static_cast<float>(d.axis[i][j]);
+      f.offset[i] = static_cast<float>(d.offset[i]);
+      f.half[i] = static_cast<float>(d.half[i]);
+      largest = std::max(largest, d.half[i]);
+      centre[k][i] = radius[k][i] = 0.0;
+      for (int j = 0; j < 3; ++j) {
+        centre[k][i] += d.axis[j][i] * d.offset[j];
+        radius[k][i] += std::fabs(d.axis[j][i]) * d.half[j];
+      }
+    }
+    f.radius = static_cast<float>(d.radius);
+    f.half_length = static_cast<float>(d.half_length);
+    if (kind[k] == plane) {
+      planes.push_back(k);
+      extent = std::max(extent, std::fabs(d.offset[2]));
+      continue;
+    }
+    order.push_back(k);
+    double away = 0.0;
+    for (double c : centre[k]) away += c * c;
+    // what is out of reach is never nearer than the rest by less than its rounding
+    extent = std::max(extent, std::min(std::sqrt(away), 3.0 * reach + largest) + largest);
+  }
+  float_margin = 32.0 * std::ldexp(1.0, -24) * extent;
+  wide = extent > 12.0;
+  split(order, 0, static_cast<int>(order.size()), centre);
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (std::size_t first = 0; first < order.size(); first += 16) {
+    Leaf leaf;
+    for (int i = 0; i < 3; ++i) leaf.low[i] = leaf.high[i] = splat<Float16>(infinity);
+    for (int lane = 0; lane < 16; ++lane) {
+      leaf.body[lane] = -1;
+      if (first + lane >= order.size()) continue;
+      const int k = leaf.body[lane] = order[first + lane];
+      for (int i = 0; i < 3; ++i) {
+        const double slack = 1e-6 * (1.0 + std::fabs(centre[k][i]) + radius[k][i]);
+        leaf.low[i][lane] = static_cast<float>(centre[k][i] - radius[k][i] - slack);
+        leaf.high[i][lane] = static_cast<float>(centre[k][i] + radius[k][i] + slack);
+      }
+    }
+    leaves.push_back(leaf);
+  }
+  pair_of.assign(capsules.size() * kind.size(), -1);
+  for (std::size_t z = 0; z < environment.size(); ++z)
+    pair_of[environment[z][0] * kind.size() + environment[z][1]] = static_cast<std::int32_t>(z);
+  for (SelfPair& pair : self_pairs) {
+    const bool first = capsules[pair.a].link >= capsules[pair.b].link;
+    pair.outer = first ? pair.a : pair.b;
+    pair.inner = first ? pair.b : pair.a;
+  }
+}
+
+template <class V>
+Placement<V>::Placement(const Model& model)
+    : model_(model), q_(model.chain.n), frames_(model.chain.n + 1) {
+  const auto size = [&](auto& s) {
+    s.a.resize(model.capsules.size());
+    s.b.resize(model.capsules.size());
+    s.middle.resize(model.capsules.size());
+    s.axis.resize(model.chain.n);
+    s.origin.resize(model.chain.n);
+  };
+  size(state);
+  size(half[0]);
+  size(half[1]);
+}
+
+namespace {
+
+typedef float Float8 __attribute__((vector_size(32)));
+
+IR_INLINE void narrow(const Double8& from, Float16& to, int part) {
+  const Float8 converted = __builtin_convertvector(from, Float8);
+  std::memcpy(reinterpret_cast<char*>(&to) + 32 * part, &converted, 32);
+}
+IR_INLINE void narrow(const Vec<Double8>& from, Vec<Float16>& to, int part) {
+  narrow(from.x, to.x, part);
+  narrow(from.y, to.y, part);
+  narrow(from.z, to.z, part);
+}
+IR_INLINE void narrow(const Vec<Double8>& from, Vec<Double8>& to, int) { to = from; }
+
+}  // namespace
+
+template <class V> void Placement<V>::place(const double* const* rows, int count, bool with_axes) {
+  const int n = model_.chain.n;
+  for (int part = 0; part < Lanes<V>::width / 8; ++part) {
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < 8; ++k) q_[j][k] = rows[std::min(8 * part + k, count - 1)][j];
+    model_.chain.forward(q_.data(), frames_.data());
+    State<Double8>& exact = half[part];
+    for (std::size_t c = 0; c < model_.capsules.size(); ++c) {
+      const Capsule& capsule = model_.capsules[c];
+      const Frame<Double8>& f = frames_[capsule.link];
+      const Vec<Double8> a = ir::place(f, capsule.p0), b = ir::place(f, capsule.p1);
+      exact.a[c] = a;
+      exact.b[c] = b;
+      narrow(a, state.a[c], part);
+      narrow(b, state.b[c], part);
+      const Double8 one_half = splat<Double8>(0.5);
+      narrow(one_half * (a + b), state.middle[c], part);
+    }
+    if (!with_axes) continue;
+    for (int j = 0; j < n; ++j) {
+      narrow(frames_[j + 1].z, state.axis[j], part);
+      narrow(frames_[j + 1].origin, state.origin[j], part);
+    }
+  }
+}
+
+template class Placement<Float16>;
+template class Placement<Double8>;
+
+}  // namespace ir

@@ -1,0 +1,153 @@
+// The robot's capsules, the bodies of a scene and their pairs; and all of them at 16 (or 8) configurations at once.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "chain.hpp"
+#include "hull.hpp"
+#include "segments.hpp"
+
+namespace ir {
+
+enum Kind : int { box, cylinder, sphere, capsule, plane, mesh };  // the order of ir_kernels.scene.KINDS
+
+// A body in the precision of the lanes. Local coordinate i of a world point p is axis[i] . p - offset[i]; the solid
+// lies within +-half in them.
+template <class S> struct Body {
+  S axis[3][3], offset[3], half[3];
+  S radius, half_length;  // cylinder, sphere, capsule
+};
+
+struct Capsule {
+  int link;
+  double p0[3], p1[3];  // internal frame of the link
+  double radius, half, inverse_square;
+};
+
+struct SelfPair {
+  int a, b;          // capsules
+  int outer, inner;  // the same, the outer one on the link that is farther from the base
+};
+
+// Sixteen bodies' boxes in the world (relative to the base's origin), for culling; unused places are at infinity.
+struct Leaf {
+  Float16 low[3], high[3];
+  std::int32_t body[16];
+};
+
+class Model {
+ public:
+  Chain chain;
+  std::vector<Capsule> capsules;
+  std::vector<int> kind;
+  std::vector<Body<float>> bodies_float;
+  std::vector<Body<double>> bodies_double;
+  std::vector<Hull> hulls;
+  std::vector<std::array<int, 2>> environment;
+  std::vector<SelfPair> self_pairs;
+  std::vector<std::int32_t> pair_of;  // capsule x body -> pair, -1: not kept
+  std::vector<int> planes;
+  std::vector<Leaf> leaves;
+  double float_margin;  // [m] more than 16 lanes of floats lose
+  bool wide;            // too large for floats: 8 lanes of doubles throughout
+
+  explicit Model(Chain c) : chain(std::move(c)) {}
+  int pairs() const { return static_cast<int>(environment.size() + self_pairs.size()); }
+  int body_count() const { return static_cast<int>(kind.size()); }
+  template <class S> const std::vector<Body<S>>& bodies() const {
+    if constexpr (sizeof(S) == 4) return bodies_float;
+    else return bodies_double;
+  }
+  // Fills what follows from capsules, bodies and pairs.
+  void finish();
+};
+
+// Ends and middles of all capsules, and the joints' axes, in lanes.
+template <class V> struct State {
+  std::vector<Vec<V>> a, b, middle;  // per capsule
+  std::vector<Vec<V>> axis, origin;  // per joint
+};
+
+// Evaluates configurations, Lanes<V>::width at a time, without allocating again.
+template <class V> class Placement {
+ public:
+  explicit Placement(const Model& model);
+  // rows: q of each lane (n values); fills the state. Lanes beyond `count` repeat the last one.
+  void place(const double* const* rows, int count, bool with_axes);
+  State<V> state;
+  State<Double8> half[2];  // the same in double, for lanes 0..7 and 8..15 (only the first with eight lanes)
+
+ private:
+  const Model& model_;
+  std::vector<Double8> q_;
+  std::vector<Frame<Double8>> frames_;
+};
+
+template <class V> IR_INLINE Vec<V> to_local(const Body<Scalar<V>>& f, const Vec<V>& p) {
+  return {f.axis[0][0] * p.x + (f.axis[0][1] * p.y + (f.axis[0][2] * p.z - f.offset[0])),
+          f.axis[1][0] * p.x + (f.axis[1][1] * p.y + (f.axis[1][2] * p.z - f.offset[1])),
+          f.axis[2][0] * p.x + (f.axis[2][1] * p.y + (f.axis[2][2] * p.z - f.offset[2]))};
+}
+
+template <class V> IR_INLINE Vec<V> splat3(const Scalar<V> v[3]) {
+  return {splat<V>(v[0]), splat<V>(v[1]), splat<V>(v[2])};
+}
+
+// Signed distance of capsule axes from a body, both in the body's frame (surface of the body, axis of the capsule).
+template <class V>
+IR_INLINE V axis_distance(const Model& model, int body, int capsule_index, const Vec<V>& a, const Vec<V>& b) {
+  using S = Scalar<V>;
+  const Body<S>& f = model.bodies<S>()[body];
+  switch (model.kind[body]) {
+    case box:
+      return distance_box(a, b, splat3<V>(f.half));
+    case cylinder:
+      return segment_cylinder(a, b, splat<V>(f.radius), splat<V>(f.half_length)).distance;
+    case plane:
+      return min(a.z, b.z);
+    case sphere:
+    case capsule: {
+      const V zero{};
+      const Vec<V> from{zero, zero, splat<V>(-f.half_length)}, along{zero, zero, splat<V>(2 * f.half_length)};
+      const S inverse = f.half_length > 0 ? 1 / (4 * f.half_length * f.half_length) : 0;
+      const V own = splat<V>(static_cast<S>(model.capsules[capsule_index].inverse_square));
+      const auto p = segment_segment(a, b - a, own, from, along, splat<V>(inverse));
+      return sqrt(dot(p.gap, p.gap)) - f.radius;
+    }
+    default: {
+      V r;
+      for (int k = 0; k < Lanes<V>::width; ++k) {
+        const double from[3] = {double(a.x[k]), double(a.y[k]), double(a.z[k])};
+        const double to[3] = {double(b.x[k]), double(b.y[k]), double(b.z[k])};
+        double t = 0.0, n[3];
+        r[k] = static_cast<S>(segment_hull(model.hulls[body], from, to, t, n));
+      }
+      return r;
+    }
+  }
+}
+
+template <class V> IR_INLINE V self_distance(const Model& model, const State<V>& s, const SelfPair& pair) {
+  using S = Scalar<V>;
+  const Capsule &first = model.capsules[pair.a], &second = model.capsules[pair.b];
+  const auto p = segment_segment(s.a[pair.a], s.b[pair.a] - s.a[pair.a], splat<V>(S(first.inverse_square)),
+                                 s.a[pair.b], s.b[pair.b] - s.a[pair.b], splat<V>(S(second.inverse_square)));
+  return sqrt(dot(p.gap, p.gap)) - S(first.radius + second.radius);
+}
+
+template <class V> IR_INLINE V environment_distance(const Model& model, const State<V>& s, int c, int body) {
+  const auto& f = model.bodies<Scalar<V>>()[body];
+  return axis_distance<V>(model, body, c, to_local<V>(f, s.a[c]), to_local<V>(f, s.b[c])) -
+         Scalar<V>(model.capsules[c].radius);
+}
+
+template <class V> V pair_distance(const Model& model, const State<V>& s, int z) {
+  const int outside = static_cast<int>(model.environment.size());
+  if (z >= outside) return self_distance(model, s, model.self_pairs[z - outside]);
+  return environment_distance(model, s, model.environment[z][0], model.environment[z][1]);
+}
+
+}  // namespace ir
