@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import yaml
@@ -28,10 +29,24 @@ def test_the_launch_file_starts_executables_that_the_packages_declare() -> None:
         )
 
 
-def test_the_parameter_file_speaks_to_the_nodes_only() -> None:
+def leaves(block: dict[str, object]) -> Iterator[str]:
+    """Names of the parameters, without the prefixes they are nested in."""
+    for name, value in block.items():
+        if isinstance(value, dict):
+            yield from leaves(value)
+        else:
+            yield name
+
+
+def test_the_parameter_file_names_settings_of_the_nodes() -> None:
     parameters = yaml.safe_load((BRINGUP / "config" / "cell.yaml").read_text(encoding="utf-8"))
-    assert set(parameters) <= {"/**", *(f"/**/{node}" for node in NODES)}
-    assert all(set(block) == {"ros__parameters"} for block in parameters.values())
+    assert set(parameters) == {f"/**/{node}" for node in NODES}
+    for key, block in parameters.items():
+        package = key.removeprefix("/**/")
+        sources = "\n".join(path.read_text() for path in (ROOT / "src" / package / package).glob("*.py"))
+        declared = set(re.findall(r"^    (\w+): [\w\[\], .]+ = ", sources, re.MULTILINE))
+        assert set(block) == {"ros__parameters"}
+        assert set(leaves(block["ros__parameters"])) <= declared, f"{package} has no such setting"
 
 
 def test_views_show_topics_of_the_cell() -> None:
