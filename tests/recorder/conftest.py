@@ -50,25 +50,25 @@ parts:
     station: table
 equipment:
   - name: table
-    pose: {xyz: [2.0, 1.2, 0.0]}
+    pose: {xyz: [1.6, 1.0, 0.0]}
     zone: OPEN
     bodies:
-      - {name: table_top, kind: box, xyz: [0, 0, 0.4], size: [0.8, 0.8, 0.8]}
-      - {name: table_post, kind: cylinder, xyz: [0.8, 0, 0.6], radius: 0.1, length: 1.2}
+      - {name: table_top, kind: box, xyz: [0, 0, 0.06], size: [0.8, 0.8, 0.12]}
+      - {name: table_post, kind: cylinder, xyz: [0.9, 0, 0.6], radius: 0.1, length: 1.2}
     stations:
-      - {name: table, pose: {xyz: [0, 0, 1.0], abc_deg: [0, 90, 0]}, approach_distance: 0.2}
+      - {name: table, pose: {xyz: [0, 0, 0.314], abc_deg: [0, 90, 0]}, approach_distance: 0.2}
   - name: press
-    pose: {xyz: [2.0, -1.4, 0.0]}
+    pose: {xyz: [1.68, -1.13, 0.0]}
     zone: SEMI_CLOSED
     bodies:
-      - {name: press_bed, kind: box, xyz: [0, 0, 0.35], size: [0.9, 0.9, 0.7]}
+      - {name: press_bed, kind: box, xyz: [0, 0, 0.09], size: [0.9, 0.9, 0.18]}
       - name: press_head
         kind: mesh
-        vertices: [[-0.4, -0.4, 1.7], [0.4, -0.4, 1.7], [0.4, 0.4, 1.7], [-0.4, 0.4, 1.7], [0, 0, 2.2]]
+        vertices: [[0.8, -0.4, 0], [1.4, -0.4, 0], [1.4, 0.4, 0], [0.8, 0.4, 0], [1.1, 0, 1.2]]
     stations:
       - name: press
-        pose: {xyz: [0, 0, 0.95], abc_deg: [0, 90, 0]}
-        allowed_contacts: [{between: [t_f1, press_bed], safety_distance: 0.0}]
+        pose: {xyz: [0, 0, 0.263], abc_deg: [0, 90, 0]}
+        allowed_contacts: [{between: [p_body, press_bed], safety_distance: 0.001}]
 program:
   - {station: table, attach: part}
   - {station: press, detach: part, dwell: 1.0}
@@ -174,13 +174,10 @@ class _Recorder:
 
     def record(self) -> Path:
         steps = [phase for phase in self.run.phases if phase.step is not None]
-        load = None
         for phase in self.run.phases:
-            if phase.load != load:
-                load = phase.load
-                self._diagnostics(load)
+            self._diagnostics(phase.load)
             self._phase(phase, steps)
-        self._diagnostics(load)
+            self._diagnostics(phase.load)
         return self.session.finish().path
 
     def _put(self, topic: str, message: Any, ns: int) -> None:

@@ -1,1 +1,21 @@
 """Recordings of the cell: written by a node, read and explained without ROS."""
+
+from ir_recorder.analysis import Analysis, Finding, Tolerances, analyse, findings
+from ir_recorder.errors import PathError, ReadError, RecorderError, SchemaError, WriteError
+from ir_recorder.reader import read_recording
+from ir_recorder.recording import Recording
+
+__all__ = [
+    "Analysis",
+    "Finding",
+    "PathError",
+    "ReadError",
+    "RecorderError",
+    "Recording",
+    "SchemaError",
+    "Tolerances",
+    "WriteError",
+    "analyse",
+    "findings",
+    "read_recording",
+]

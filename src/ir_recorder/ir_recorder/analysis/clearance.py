@@ -1,0 +1,150 @@
+"""Executed clearance: exact distances along the recorded joint states, with the loads the program carried.
+
+Pairs that a station allows to touch don't count against the safety distance on the way to and from it; they
+are held against their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from ir_description.program import PartPlaces
+from ir_msgs_py.names import LOAD_SEPARATOR
+from numpy.typing import NDArray
+
+from ir_description import Cell
+from ir_kernels import Chain, CollisionModel
+from ir_recorder.analysis.loads import normal
+from ir_recorder.analysis.steps import ExecutedStep
+from ir_recorder.cdr import Numbers
+from ir_recorder.recording import JointSeries
+
+COARSE = 0.02  # s between samples of the profile; around the least distance every joint state is taken
+_NONE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class StepClearance:
+    """Along one step: time (N,) [s], distance (N,) [m] of the nearest pair that isn't allowed to touch,
+    point_a and point_b (N, 3) in the world; the least distance with its pair and time; contact_margin [m]:
+    least excess of an allowed pair over its own safety distance (inf: no such pair).
+    """
+
+    time: Numbers
+    distance: Numbers
+    point_a: Numbers
+    point_b: Numbers
+    pairs: tuple[str, ...]
+    least: float
+    least_pair: str
+    least_time: float
+    contact_margin: float
+
+
+def step_clearances(
+    cell: Cell, joints: JointSeries, steps: Sequence[ExecutedStep]
+) -> tuple[StepClearance | None, ...]:
+    """Clearance of each movement; None for pauses and where nothing was recorded."""
+    places = cell.parts_at_start()
+    result: list[StepClearance | None] = []
+    for step in steps:
+        result.append(None if step.movement.is_pause else _along(cell, joints, step, places))
+        if step.outcome == "ended":
+            places = places_after(cell, places, step)
+    return tuple(result)
+
+
+def places_after(cell: Cell, places: PartPlaces, step: ExecutedStep) -> PartPlaces:
+    """Where the parts are after a step that ended."""
+    movement, lying = step.movement, dict(places.lying)
+    parts = {part.name for part in cell.parts}
+    if movement.attach in parts:
+        return PartPlaces(movement.attach, {**lying, movement.attach: ""})
+    if movement.detach in parts:
+        stations = {station.name for station in cell.stations}
+        station = movement.to_station if movement.to_station in stations else ""
+        return PartPlaces("", {**lying, movement.detach: station})
+    return places
+
+
+def held_part(cell: Cell, load: str) -> str:
+    """The part named in a load text, "" for none."""
+    names = normal(load).split(LOAD_SEPARATOR)
+    return next((part.name for part in cell.parts if part.name in names), "")
+
+
+def collision_model(cell: Cell, load: str, places: PartPlaces) -> CollisionModel:
+    """Exact distances for the robot with that load among the bodies as they stand."""
+    chain = Chain(cell.robot, cell.base_pose, cell.tcp)
+    tool = cell.tool is not None and cell.tool.name in normal(load).split(LOAD_SEPARATOR)
+    held = held_part(cell, load)
+    if tool or held or not load:
+        capsules, pairs = cell.capsules(held), cell.self_pairs(held)
+    else:
+        capsules, pairs = cell.robot.capsules, cell.robot.self_pairs
+    bodies = cell.bodies(PartPlaces(held, {**places.lying, held: ""} if held else places.lying))
+    return CollisionModel(chain, capsules, bodies, pairs, cell.ignored_pairs)
+
+
+def _along(cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlaces) -> StepClearance | None:
+    rows = np.flatnonzero((joints.time >= step.start - 1e-9) & (joints.time <= step.end + 1e-9))
+    rows = rows[np.isfinite(joints.position[rows]).all(axis=1)]
+    if not len(rows) or joints.position.shape[1] != cell.robot.n:
+        return None
+    model = collision_model(cell, step.movement.load, places)
+    own = _allowed(cell, step, model)
+    offset = np.where(np.isnan(own), 0.0, -np.inf)
+    stride = (
+        max(1, round(COARSE / max(float(np.median(np.diff(joints.time[rows]))), 1e-4)))
+        if len(rows) > 1
+        else 1
+    )
+    coarse = rows[::stride]
+    near = model.min_distance(joints.position[coarse], offset)
+    best = int(np.argmin(near.distance))
+    fine = rows[max(0, (best - 1) * stride) : (best + 1) * stride + 1]
+    finer = model.min_distance(joints.position[fine], offset)
+    least = int(np.argmin(finer.distance))
+    return StepClearance(
+        joints.time[coarse],
+        near.distance,
+        near.point_a,
+        near.point_b,
+        tuple(_pair(model, index) for index in near.pair),
+        float(finer.distance[least]),
+        _pair(model, finer.pair[least]),
+        float(joints.time[fine[least]]),
+        _contact_margin(model, joints.position[coarse], own),
+    )
+
+
+def _stride(time: Numbers) -> int:
+    """How many joint states lie between two coarse samples."""
+    return max(1, round(COARSE / max(float(np.median(np.diff(time))), 1e-4))) if len(time) > 1 else 1
+
+
+def _allowed(cell: Cell, step: ExecutedStep, model: CollisionModel) -> NDArray[np.float64]:
+    """Own safety distance (Z,) of pairs that the step's stations allow to touch, NaN for all others."""
+    own = np.full(len(model.pairs), np.nan)
+    ends = (step.movement.from_station, step.movement.to_station)
+    for station in cell.stations:
+        if station.name in ends:
+            for contact in station.allowed_contacts:
+                for z, pair in enumerate(model.pairs):
+                    if {pair.body_a, pair.body_b} == {contact.body_a, contact.body_b}:
+                        own[z] = contact.safety_distance
+    return own
+
+
+def _contact_margin(model: CollisionModel, q: Numbers, own: NDArray[np.float64]) -> float:
+    allowed = ~np.isnan(own)
+    if not allowed.any():
+        return float("inf")
+    near = model.min_distance(q, np.where(allowed, own, -np.inf))
+    return float((near.distance - own[near.pair]).min())
+
+
+def _pair(model: CollisionModel, index: int) -> str:
+    return "" if index == _NONE else f"{model.pairs[index].body_a} – {model.pairs[index].body_b}"

@@ -1,0 +1,51 @@
+"""Joules between two times, read off the mains meter.
+
+A reading's power is the mean since the reading before, so energies are exact at readings and linear between
+them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_recorder.cdr import Numbers
+from ir_recorder.recording import PowerSeries
+
+
+class Meter:
+    """Cumulative energies over the readings; times [s] outside of them count as the nearest reading."""
+
+    def __init__(self, power: PowerSeries) -> None:
+        self.time = power.time
+        self.power = power.power
+        step = np.diff(power.time, prepend=power.time[:1])
+        self._energy = power.energy - power.energy[:1]
+        self._joints = np.cumsum(np.nan_to_num(power.joint_power) * step[:, None], axis=0)
+        self._base = np.cumsum(np.nan_to_num(power.base_power) * step)
+        self._burnt = np.cumsum(np.nan_to_num(power.burnt_power) * step)
+
+    def energy(self, start: float, end: float) -> float:
+        """J at the mains."""
+        return self._between(self._energy, start, end)
+
+    def base(self, start: float, end: float) -> float:
+        """J of controller, drives and tool."""
+        return self._between(self._base, start, end)
+
+    def burnt(self, start: float, end: float) -> float:
+        """J in the brake resistor."""
+        return self._between(self._burnt, start, end)
+
+    def joints(self, start: float, end: float) -> Numbers:
+        """J per joint (n,) at the DC bus, signed."""
+        return np.array([self._between(column, start, end) for column in self._joints.T])
+
+    def peak(self, start: float, end: float) -> float:
+        """Largest W of a reading in the interval; NaN where there is none."""
+        inside = (self.time > start) & (self.time <= end + 1e-6)
+        return float(self.power[inside].max()) if inside.any() else float("nan")
+
+    def _between(self, cumulative: Numbers, start: float, end: float) -> float:
+        ends: NDArray[np.float64] = np.interp([start, end], self.time, cumulative)
+        return float(ends[1] - ends[0])

@@ -1,0 +1,111 @@
+"""What an analysis finds, as values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ir_description import Cell
+from ir_recorder.analysis.clearance import StepClearance
+from ir_recorder.analysis.grid import GridCheck
+from ir_recorder.analysis.loads import LoadTimeline
+from ir_recorder.analysis.plateaus import Plateau
+from ir_recorder.analysis.steps import ExecutedStep
+from ir_recorder.cdr import Numbers
+from ir_recorder.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class StepResult:
+    """A step with what it took, measured at the mains meter.
+
+    energy, base_energy, burnt_energy [J]; joint_energy (n,) [J] at the DC bus; peak_power [W];
+    indirect_energy [J]: from recorded motion and torque; tool_deviation [m]: largest between commanded and
+    simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
+    """
+
+    step: ExecutedStep
+    energy: float
+    joint_energy: Numbers
+    base_energy: float
+    burnt_energy: float
+    peak_power: float
+    indirect_energy: float
+    tool_deviation: float
+    clearance: StepClearance | None
+
+    @property
+    def seconds(self) -> float:
+        """How long it took [s]."""
+        return self.step.seconds
+
+    @property
+    def mean_power(self) -> float:
+        """Mean W at the mains."""
+        return self.energy / self.seconds if self.seconds > 0.0 else float("nan")
+
+
+@dataclass(frozen=True)
+class Share:
+    """Time [s] and energy [J] of one mode, or of one kind of work at a station."""
+
+    name: str
+    seconds: float
+    energy: float
+
+
+@dataclass(frozen=True)
+class StationUse:
+    """Time [s] and energy [J] that belong to a station: resting there, going in and out, and the way to
+    it.
+    """
+
+    station: str
+    rest: Share
+    service: Share
+    travel: Share
+
+    @property
+    def seconds(self) -> float:
+        """All time of the station [s]."""
+        return self.rest.seconds + self.service.seconds + self.travel.seconds
+
+    @property
+    def energy(self) -> float:
+        """All energy of the station [J]."""
+        return self.rest.energy + self.service.energy + self.travel.energy
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """All results; parts whose topics are missing are empty or NaN, `problems` says which and why.
+
+    seconds, energy [J], mean_power, peak_power [W]: of the whole recording, at the mains meter.
+    """
+
+    recording: Recording
+    cell: Cell | None
+    loads: LoadTimeline
+    seconds: float
+    energy: float
+    mean_power: float
+    peak_power: float
+    steps: tuple[StepResult, ...]
+    stations: tuple[StationUse, ...]
+    modes: tuple[Share, ...]
+    grid: GridCheck | None
+    plateaus: tuple[Plateau, ...]
+    problems: tuple[str, ...]
+
+    @property
+    def movements(self) -> tuple[StepResult, ...]:
+        """The steps in which the robot moved."""
+        return tuple(result for result in self.steps if not result.step.movement.is_pause)
+
+    @property
+    def elsewhere(self) -> Share:
+        """Time and energy outside of the program's steps: before, between and after them."""
+        return Share(
+            "outside of the program's steps",
+            self.seconds - sum(result.seconds for result in self.steps),
+            self.energy - sum(result.energy for result in self.steps),
+        )
