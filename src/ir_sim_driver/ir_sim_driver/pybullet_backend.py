@@ -43,9 +43,11 @@ class PyBulletBackend:
         base_pose: Array | None = None,
         control: ControlSettings | None = None,
     ) -> None:
-        self._bullet, self._client = _connect(dt)
+        # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no base pose
+        self._base: Array = np.eye(4) if base_pose is None else np.array(base_pose)
+        self._gravity = (self._base[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
+        self._bullet, self._client = _connect(dt, self._gravity)
         self._robot, self._dt, self._urdf = robot, dt, urdf
-        self._base = np.eye(4) if base_pose is None else base_pose
         self._n = len(robot.joint_names)
         self._drives = Drivetrain(robot)
         self._follower = CommandFollower(dt, control)
@@ -72,7 +74,7 @@ class PyBulletBackend:
     def reset(self, q: Array) -> None:
         """Stand still at q; starts the physics server again when it is gone."""
         if not self._bullet.isConnected(self._client):
-            self._bullet, self._client = _connect(self._dt)
+            self._bullet, self._client = _connect(self._dt, self._gravity)
             self._body = -1
             self.set_load(self._loads)
         self.q, self.qd, self._speed = np.array(q, dtype=np.float64), self._still, self._still
@@ -93,7 +95,6 @@ class PyBulletBackend:
                 str(path), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
             )
         self._joints = self._movable_joints()
-        self._place_base()
         for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
             bullet.changeDynamics(
                 self._body,
@@ -165,17 +166,16 @@ class PyBulletBackend:
         """h = C qd + g (n,) at the present state."""
         return self._inverse_dynamics(self._still)
 
-    def link_com_pose(self, link: int) -> tuple[Array, Array]:
-        """Position (3,) and quaternion xyzw (4,) of the centre-of-mass frame of link 1..n in the world.
+    def link_com_position(self, link: int) -> Array:
+        """Centre of mass (3,) of link 1..n in the world [m].
 
         Bullet keeps this frame in double precision, the link frame itself only in single.
         """
         state = self._bullet.getLinkState(
             self._body, self._joints[link - 1], computeForwardKinematics=True, physicsClientId=self._client
         )
-        position: Array = np.array(state[0])
-        quaternion: Array = np.array(state[1], dtype=np.float64)
-        return position, quaternion
+        position: Array = self._base[:3, :3] @ np.array(state[0]) + self._base[:3, 3]
+        return position
 
     def _driven(self, torque: Array, resistance: Array) -> tuple[Array, Array]:
         """Torque on the links and acceleration under motor torque and disturbance."""
@@ -228,17 +228,8 @@ class PyBulletBackend:
             by_name[info[1].decode()] = joint
         return [by_name[name] for name in self._robot.joint_names]
 
-    def _place_base(self) -> None:
-        """Put base_link, which Bullet moves by its centre of mass, to the base pose."""
-        bullet, client = self._bullet, self._client
-        com = bullet.getDynamicsInfo(self._body, -1, physicsClientId=client)[3]
-        turn = bullet.getDynamicsInfo(self._body, -1, physicsClientId=client)[4]
-        position, rotation = self._base[:3, 3].tolist(), _quaternion(self._base[:3, :3])
-        position, rotation = bullet.multiplyTransforms(position, rotation, com, turn)
-        bullet.resetBasePositionAndOrientation(self._body, position, rotation, physicsClientId=client)
 
-
-def _connect(dt: float) -> tuple[Any, int]:
+def _connect(dt: float, gravity: list[float]) -> tuple[Any, int]:
     try:
         import pybullet  # a missing PyBullet is reported when it is wanted
     except ImportError as error:
@@ -246,12 +237,6 @@ def _connect(dt: float) -> tuple[Any, int]:
     client = pybullet.connect(pybullet.DIRECT)
     if client < 0:
         raise BackendError("PyBullet offers no physics server")
-    pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+    pybullet.setGravity(*gravity, physicsClientId=client)
     pybullet.setTimeStep(dt, physicsClientId=client)
     return pybullet, client
-
-
-def _quaternion(R: Array) -> list[float]:
-    from scipy.spatial.transform import Rotation  # slow import, needed once
-
-    return [float(x) for x in Rotation.from_matrix(R).as_quat()]

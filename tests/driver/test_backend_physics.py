@@ -1,0 +1,163 @@
+"""PyBullet's kinematics and dynamics against the project's own: two implementations, one robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ir_kernels.chain import Chain
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.power import Mode
+from ir_sim_driver.assembly import make_simulation
+from ir_sim_driver.drivetrain import Drivetrain
+from ir_sim_driver.ideal_backend import IdealBackend
+from ir_sim_driver.simulation_settings import ControllerSettings
+from scipy.spatial.transform import Rotation
+
+from ir_description import Load, load_power_data
+
+POSITION_TOLERANCE = 1e-9  # m; the centre-of-mass frame is double precision in Bullet
+TORQUE_TOLERANCE = 1e-6  # Nm; sums of a few thousand Nm in another order
+
+
+def configurations(robot, count, seed=1):
+    generator = np.random.default_rng(seed)
+    return generator.uniform(robot.position_min, robot.position_max, (count, 6))
+
+
+@pytest.fixture(scope="module")
+def backend(make):
+    return make("pybullet").backend
+
+
+def test_centres_of_mass_are_where_the_chain_puts_them(backend, cell):
+    robot = cell.robot
+    chain = Chain(robot, cell.base_pose, cell.tcp)
+    for q in configurations(robot, 20):
+        backend.reset(q)
+        poses = chain.link_poses(q[None])[0]
+        for link in range(1, 7):
+            position = backend.link_com_position(link)
+            expected = poses[link] @ np.append(robot.link_com[link], 1.0)
+            assert np.abs(position - expected[:3]).max() < POSITION_TOLERANCE
+
+
+def test_bias_and_mass_matrix_agree_with_the_kernels(backend, make, cell):
+    dynamics = make("ideal").dynamics
+    for q in configurations(cell.robot, 20, seed=2):
+        backend.reset(q)
+        assert np.abs(backend.bias() - dynamics.bias(q[None], np.zeros((1, 6)))[0]).max() < TORQUE_TOLERANCE
+        H = dynamics.mass_matrix(q[None])[0]
+        assert np.abs(backend.mass_matrix() - H).max() < 1e-9 * np.abs(H).max()
+
+
+def test_a_tilted_base_turns_gravity(cell, make):
+    tilted = np.eye(4)
+    tilted[:3, :3] = Rotation.from_euler("xyz", [0.3, -0.5, 0.7]).as_matrix()
+    tilted[:3, 3] = [0.4, -1.0, 0.2]
+    simulation = make_simulation(replace(cell, base_pose=tilted), backend="pybullet")
+    q = simulation.backend.q[None]
+    assert np.abs(simulation.backend.bias() - simulation.dynamics.gravity(q)[0]).max() < TORQUE_TOLERANCE
+    position = simulation.backend.link_com_position(6)
+    pose = Chain(cell.robot, tilted).link_poses(q)[0, 6]
+    assert np.abs(position - (pose @ np.append(cell.robot.link_com[6], 1.0))[:3]).max() < POSITION_TOLERANCE
+
+
+def test_a_lopsided_load_reaches_the_joints(cell, make):
+    simulation = make("pybullet")
+    inertia = np.array([[4.0, 0.5, -0.3], [0.5, 6.0, 0.2], [-0.3, 0.2, 5.0]])
+    load = Load("lopsided", "tool", 90.0, np.array([0.2, 0.05, -0.1]), inertia)
+    simulation.backend.set_load((load, cell.tool))
+    dynamics = DynamicsModel(cell.robot, (load, cell.tool), cell.base_pose)
+    for q in configurations(cell.robot, 5, seed=3):
+        simulation.backend.reset(q)
+        expected = dynamics.mass_matrix(q[None])[0]
+        assert np.allclose(simulation.backend.mass_matrix(), expected, atol=1e-6)
+        assert np.allclose(simulation.backend.bias(), dynamics.gravity(q[None])[0], atol=TORQUE_TOLERANCE)
+
+
+def test_counterbalance_has_the_published_torques(cell):
+    published = {-140: 5116, -120: 3254, -90: -234, -60: -3650, -45: -5023, -30: -6088, -5: -7081}
+    drives = Drivetrain(cell.robot)
+    for degrees, torque in published.items():
+        assert drives.counterbalance_torque(np.radians(degrees)) == pytest.approx(torque, abs=1.0)
+
+
+def test_envelope_and_friction_are_those_of_the_kernels(cell, make):
+    drives, dynamics = Drivetrain(cell.robot), make("ideal").dynamics
+    generator = np.random.default_rng(4)
+    qd = generator.uniform(-1.0, 1.0, (50, 6)) * 1.1 * cell.robot.velocity_max
+    assert np.allclose([drives.limit(v) for v in qd], dynamics.torque_limit(qd))
+    q = configurations(cell.robot, 50, seed=5)
+    still = np.zeros_like(q)
+    resistance = dynamics.inverse_dynamics(q, qd, still) - dynamics.bias(q, qd)
+    fast = np.abs(qd).min(axis=1) > 0.01  # friction is smoothed around rest only
+    mine = np.array([drives.resistance(a, b) for a, b in zip(q, qd, strict=True)])
+    assert np.allclose(mine[fast], resistance[fast], atol=1e-6)
+
+
+@pytest.mark.parametrize("backend_name", ["pybullet", "ideal"])
+@pytest.mark.parametrize(("load", "payload"), [("cell", 155.0), ("none", 0.0)])
+@pytest.mark.parametrize("mode", ["STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION"])
+def test_table_2_at_machine_home(make, backend_name, load, payload, mode):
+    simulation = make(backend_name, load, controller=ControllerSettings(start_mode=mode))
+    simulation.plc.rest = Mode[mode] if mode in ("BUS_POWER_OFF", "HIBERNATION") else None
+    simulation.run(0.1)
+    before = simulation.meter.reading()
+    simulation.run(0.5)
+    after = simulation.meter.reading()
+    watts = (after.energy - before.energy) / (after.time - before.time)
+    assert watts == pytest.approx(load_power_data().measured(payload, mode), rel=0.001)
+    assert simulation.standing_power(Mode[mode]) == pytest.approx(watts, rel=1e-9)
+
+
+def test_a_movement_with_155_kg_is_tracked_and_costs_what_the_model_says(make, plan, start, run_out, cell):
+    q0 = np.array(cell.machine_home)
+    there = plan(2.5, q0, q0 + np.array([1.2, 0.4, -0.4, 0.8, -0.5, 1.0]))
+    energies = {}
+    for name in ("pybullet", "ideal"):
+        simulation = make(name)
+        start(simulation, there)
+        outcome = run_out(simulation)
+        assert outcome.code == 0
+        assert outcome.max_tool_deviation < 0.001
+        energies[name] = outcome.energy
+    assert energies["pybullet"] == pytest.approx(energies["ideal"], rel=0.002)
+
+
+def test_a_torque_beyond_the_envelope_is_cut_and_the_tube_tells(make, cell):
+    simulation = make("pybullet")
+    q0 = np.array(cell.machine_home)
+    step = 0.02 * np.sin(np.linspace(0.0, np.pi, 30)) ** 2  # 30 ms: far beyond what the motors can do
+    for offset in step:
+        simulation.backend.track(q0 + offset)
+    work = simulation.backend.work()
+    limits = np.array([Drivetrain(cell.robot).limit(v) for v in work.speed])
+    assert (np.abs(work.torque) <= limits * 1.001 + 1e-9).all()
+    assert (np.abs(work.torque) >= limits * 0.99).any()
+
+
+def test_a_disturbance_pushes_the_robot_and_the_loop_holds_it(make):
+    simulation = make("pybullet")
+    simulation.run(0.1)
+    q = simulation.backend.q.copy()
+    simulation.disturb(np.array([800.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    simulation.run(1.0)
+    pushed = simulation.backend.q[0] - q[0]
+    assert 1e-5 < pushed < 1e-3
+    simulation.disturb(None)
+    simulation.run(1.0)
+    assert abs(simulation.backend.q[0] - q[0]) < 1e-7
+
+
+def test_ideal_torques_of_a_batch_equal_those_of_single_steps(cell):
+    batch, single = (IdealBackend(cell.robot, 0.001) for _ in range(2))
+    q = np.array(cell.machine_home)
+    torques = []
+    for k in range(20):
+        for backend in (batch, single):
+            backend.track(q + 1e-6 * k**2)
+        torques.append(single.torque.copy())
+    assert np.allclose(batch.work().torque, torques)
+    assert np.allclose(single.work().torque, torques)
