@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from ir_description.cell_review import check_cell
 from ir_description.errors import DescriptionError
 
 from ir_description import bundled_cells, load_cell
@@ -25,7 +26,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run_check(arguments: argparse.Namespace) -> int:
-    """Load the cell; print what it holds, or the sentence that says what is wrong."""
+    """Load the cell and look it over; exit code 1 when a finding will keep its program from running."""
     try:
         cell = load_cell(arguments.file)
     except DescriptionError as error:
@@ -42,7 +43,10 @@ def run_check(arguments: argparse.Namespace) -> int:
         f"stations: {', '.join(station.name for station in cell.stations) or 'none'}; "
         f"program: {len(cell.program)} steps\n"
     )
-    return 0
+    findings = check_cell(cell)
+    for finding in findings:
+        sys.stdout.write(f"{finding.severity}: {finding.subject}: {finding.sentence}\n")
+    return 1 if any(finding.severity == "error" for finding in findings) else 0
 
 
 def run_list(arguments: argparse.Namespace) -> int:

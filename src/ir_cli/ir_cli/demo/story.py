@@ -47,6 +47,7 @@ class Demonstration:
     def __init__(self, cell: str, out: Path, seed: int, progress: Progress) -> None:
         self._out, self._seed, self._progress = out, seed, progress
         self._cell = with_short_pauses(load_cell(cell), LONGEST_PAUSE)
+        self._loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
 
     def run(self) -> Outcome:
         """Start the nodes, run the story, stop the nodes, examine the recording."""
@@ -77,7 +78,7 @@ class Demonstration:
             nodes.check()
             client.ask("/" + names.STOP_RECORDING, StopRecording.Request())
         progress.begin("read the recording, write report and picture")
-        outcome = examine(recording, self._out / "report.html", self._out / "demo.png", plan)
+        outcome = examine(recording, self._out / "report.html", self._out / "demo.png", len(self._loads))
         progress.end(f"{self._out / 'report.html'}, {self._out / 'demo.png'}")
         return outcome
 
@@ -101,10 +102,7 @@ class Demonstration:
 
     def _tour(self, client: Client) -> None:
         self._progress.begin("visit the power modes at machine home")
-        tool = self._cell.tool.name if self._cell.tool else "none"
-        loads = ("none", tool) if tool != "none" else ("none",)
-        watch = PowerWatch(client)
-        tour(client, watch, loads, TOUR_STAY, wake, self._progress.update)
+        tour(client, PowerWatch(client), self._loads, TOUR_STAY, wake, self._progress.update)
         self._progress.end("motors, brakes, Bus Power Off, hibernation, with and without the tool")
 
     def _drive(self, client: Client, plan: ProgramPlan) -> None:
