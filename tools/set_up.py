@@ -177,7 +177,13 @@ def set_up() -> None:
         text=True,
         check=True,
     )
-    for stage in stages(asked.stdout.strip()):
+    own = asked.stdout.strip()
+    called = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    if own != called:
+        raise SetupError(
+            f".venv is of Python {own}, asked for is {called}. To change it: rm -rf .venv, then again."
+        )
+    for stage in stages(own):
         stamp = STAMPS / stage.name
         if stamp.exists() and stamp.read_text() == stage.fingerprint and stage.is_there():
             continue
