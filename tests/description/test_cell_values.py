@@ -225,7 +225,9 @@ def test_distances_of_the_review_agree_with_the_kernels(cell: Cell) -> None:
     """Two implementations that know nothing of each other."""
     rng = np.random.default_rng(11)
     chain = Chain(cell.robot)
-    base = next(capsule for capsule in cell.robot.capsules if capsule.link == 0)
+    home = cell.machine_home[None]
+    capsule = replace(cell.robot.capsules[0], link=cell.robot.n)
+    in_world = capsule.placed(chain.link_poses(home)[0, -1])
     tetrahedron = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.6, 0.0], [0.0, 0.0, 0.7]])
     shapes: list[tuple[BodyKind, list[float], Array]] = [
         ("box", [0.3, 0.5, 0.7], np.zeros((0, 3))),
@@ -239,6 +241,6 @@ def test_distances_of_the_review_agree_with_the_kernels(cell: Cell) -> None:
         for _ in range(10):
             place = pose_of(rng.uniform(-2, 2, 3), rotation_from_abc(rng.uniform(-180, 180, 3)))
             body = Body("body", kind, place, np.array(size), vertices)
-            exact = CollisionModel(chain, [base], [body], ()).distances(cell.machine_home[None])[0, 0]
-            if exact > -base.radius:  # where the capsule's axis is outside both mean the same
-                assert capsule_distance(body, base) == pytest.approx(exact, abs=1e-6), kind
+            exact = CollisionModel(chain, [capsule], [body], ()).distances(home)[0, 0]
+            if exact > -capsule.radius:  # where the capsule's axis is outside both mean the same
+                assert capsule_distance(body, in_world) == pytest.approx(exact, abs=1e-6), kind
