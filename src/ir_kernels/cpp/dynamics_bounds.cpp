@@ -188,7 +188,7 @@ TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, con
       bool sharp = true;
       for (int i = 0; i < n; ++i) {
         const double upper = upper_of[k * n + i], sampled = bounds.sampled[i];
-        sharp = sharp && upper <= sampled + tolerance && !(sampled <= 1.0 && upper > 1.0);
+        sharp = sharp && upper <= sampled + tolerance * std::max(sampled, 1.0) && !(sampled <= 1.0 && upper > 1.0);
       }
       const bool halve = !sharp && p.end - p.begin > kShortest * durations[p.segment] &&
                          bounds.intervals + static_cast<long>(next.size()) + 2 <= most;

@@ -59,8 +59,9 @@ inline void sincos(const Interval& x, Interval& s, Interval& c) {
   const auto range = [&](D8 a, D8 b, D8 slope_a, D8 slope_b) {
     D8 lo = min(a, b) - 1e-15, hi = max(a, b) + 1e-15;
     const D8 one = splat<D8>(1.0);
-    hi = ((slope_a >= -1e-15) & (slope_b <= 1e-15)) | wide ? one : hi;
-    lo = ((slope_a <= 1e-15) & (slope_b >= -1e-15)) | wide ? -one : lo;
+    // a turning point within rounding of an end is no higher than the end, to rounding squared
+    hi = ((slope_a > 0.0) & (slope_b < 0.0)) | wide ? one : hi;
+    lo = ((slope_a < 0.0) & (slope_b > 0.0)) | wide ? -one : lo;
     return Interval{max(lo, -one), min(hi, one)};
   };
   s = range(sine[0], sine[1], cosine[0], cosine[1]);

@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike
 from ir_kernels import compiled
 from ir_kernels.arguments import Array, checked, finite, same_length, shaped
 from ir_kernels.dynamics_data import STANDARD_GRAVITY, dynamics_data
+from ir_kernels.errors import InputError
+from ir_kernels.limits import segments
 from ir_kernels.reference import dynamics as reference
+from ir_kernels.reference import torque_bounds as bounds_reference
+from ir_kernels.torque_bounds import TorqueBounds, torque_bounds
+
+MAX_TERMS = 8  # of a polynomial segment
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,14 @@ class DynamicsModel:
         """Motor torque (N,n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
         return np.asarray(self._run("inverse_dynamics", q=q, qd=qd, qdd=qdd))
 
+    def inverse_dynamics_single(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """`inverse_dynamics` computed in single precision, in half the time; 1e-5 of the largest torque
+        exact.
+
+        For searches, not for proofs or reports. Without a compiled core it is `inverse_dynamics`.
+        """
+        return np.asarray(self._run("inverse_dynamics_single", q=q, qd=qd, qdd=qdd))
+
     def bias(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """C qd + g (N,n) Nm of the arm and its loads, without friction and counterbalance."""
         return np.asarray(self._run("bias", q=q, qd=qd))
@@ -128,3 +142,26 @@ class DynamicsModel:
             per_torque * of.qd + torque[:, :, None] * np.eye(self.n),
             per_torque * of.qdd,
         )
+
+    def torque_bounds(
+        self,
+        coefficients: ArrayLike,
+        durations: ArrayLike,
+        tolerance: float = 0.01,
+        max_intervals: int = 20000,
+    ) -> TorqueBounds:
+        """Enclose max |tau| / limit per joint along q(t) = sum_k c_k t^k: torque limits proved between
+        samples too.
+
+        coefficients (S,n,d+1), d <= 7, lowest power first in the local time of each segment; durations
+        (S,) s. Interval arithmetic over pieces of time that are halved until upper - sampled <=
+        `tolerance` and every joint is decided, or `max_intervals` pieces are spent. Raises InputError.
+        """
+        c, T = segments(coefficients, durations)
+        if c.shape[1] != self.n or not 1 <= c.shape[2] <= MAX_TERMS:
+            raise InputError(f"coefficients has shape {c.shape}, expected (S, {self.n}, 1..{MAX_TERMS})")
+        if not tolerance > 0.0:
+            raise InputError(f"tolerance is {tolerance}: it has to be above 0")
+        if self._core is None:
+            return torque_bounds(*bounds_reference.torque_bounds(self.data, c, T, tolerance, max_intervals))
+        return torque_bounds(*self._core.torque_bounds(c, T, tolerance, max_intervals))

@@ -44,7 +44,8 @@ class MotionExtrema:
     time_of_jerk: Array
 
 
-def _segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[Array, Array]:
+def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[Array, Array]:
+    """Coefficients (S,n,d+1) and durations (S,) checked, or InputError."""
     c = checked("coefficients", coefficients, None, None, None)
     T = checked("durations", durations, len(c))
     if (T <= 0.0).any():
@@ -57,7 +58,7 @@ def polynomial_extrema(coefficients: ArrayLike, durations: ArrayLike, derivative
 
     coefficients (S,n,d+1), durations (S,) s. Raises InputError.
     """
-    c, T = _segments(coefficients, durations)
+    c, T = segments(coefficients, durations)
     if derivative < 0:
         raise InputError(f"derivative is {derivative}: it has to be 0 or more")
     for _ in range(derivative):
@@ -70,7 +71,7 @@ def motion_extrema(coefficients: ArrayLike, durations: ArrayLike) -> MotionExtre
     """Extremes of q, |qd|, |qdd|, |qddd| per joint over all segments: coefficients (S,n,d+1), durations
     (S,) s.
     """
-    c, T = _segments(coefficients, durations)
+    c, T = segments(coefficients, durations)
     starts = np.concatenate([[0.0], np.cumsum(T)[:-1]])[:, None]
     joints = np.arange(c.shape[1])
     position = polynomial_extrema(c, T)

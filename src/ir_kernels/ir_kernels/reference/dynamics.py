@@ -121,6 +121,9 @@ def inverse_dynamics(data: DynamicsData, q: Array, qd: Array, qdd: Array) -> Arr
     return arm + data.rotor_inertia * qdd + friction(data, qd) - counterbalance(data, q)
 
 
+inverse_dynamics_single = inverse_dynamics  # the compiled core has one in single precision
+
+
 def gravity(data: DynamicsData, q: Array) -> Array:
     """Torque that holds the arm against gravity, without the counterbalance."""
     zero = np.zeros_like(q)

@@ -14,7 +14,7 @@ ITERATIONS = 80  # of bisection at most; Newton ends after a handful
 
 def evaluate(coefficients: Array, x: Array) -> Array:
     """sum_k c_k x^k for coefficients (..., d+1) at x (..., m)."""
-    value = np.broadcast_to(coefficients[..., -1:], x.shape)
+    value = coefficients[..., -1:] + 0.0 * x
     for k in reversed(range(coefficients.shape[-1] - 1)):
         value = value * x + coefficients[..., k : k + 1]
     return np.asarray(value)

@@ -1,0 +1,159 @@
+"""A proof of the torque limits by interval arithmetic over pieces of the trajectory, halved where it isn't
+sharp.
+
+Over a piece with middle m the smooth part of the torque lies in tau(m) + (d tau / dt over the piece) (t -
+m): the mean value form, whose excess shrinks with the square of the piece. Coulomb friction of either sign
+counts where the velocity may vanish, none where the joint rests through the segment.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ir_kernels.arguments import Array
+from ir_kernels.dynamics_data import DynamicsData
+from ir_kernels.reference import dynamics
+from ir_kernels.reference.interval import Dual, Interval, intersect, interval, power, sine_cosine
+from ir_kernels.reference.limits import derivative, evaluate
+
+FIRST_PIECE = 0.05  # s, longest piece to begin with
+FEWEST_PIECES = 8  # of a segment to begin with
+SHORTEST = 1e-7  # of a segment: pieces below this are not halved any more
+REST = 1e-9  # rad/s: below, a sample lets Coulomb friction have either sign
+ROUNDING_MARGIN = 1e-9  # of the limit
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Times begin..end (K,) within the segments (K,)."""
+
+    segment: Any
+    begin: Array
+    end: Array
+
+
+def _horner(a: list[Interval], x: Interval) -> Interval:
+    value = a[-1]
+    for coefficient in reversed(a[:-1]):
+        value = value * x + coefficient
+    return value
+
+
+def _smooth_torque(data: DynamicsData, sin: Any, cos: Any, qd: Any, qdd: Any) -> list[Any]:
+    tau = dynamics.rigid_body_torque(data, sin, cos, qd, qdd)
+    for j in range(data.n):
+        tau[j] = tau[j] + qdd[j] * float(data.rotor_inertia[j]) + qd[j] * float(data.viscous[j])
+    if data.counterbalance is not None:
+        j = data.counterbalance.joint
+        tau[j] = tau[j] - dynamics.counterbalance_torque(
+            data.counterbalance, sin[j], cos[j], lambda x: power(x, 0.5), power
+        )
+    return tau
+
+
+def least_limit(data: DynamicsData, joint: int, slowest: Array, fastest: Array) -> Array:
+    """Smallest torque available (K,) over the speeds slowest..fastest (K,)."""
+    speeds, torques = data.envelope_speed[joint], data.envelope_torque[joint]
+
+    def limit(speed: Array) -> Any:
+        return np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
+
+    least = np.minimum(limit(slowest), limit(fastest))
+    for speed, torque in zip(speeds, torques[1:], strict=True):
+        least = np.where((slowest <= speed) & (speed <= fastest), np.minimum(least, torque), least)
+    return np.asarray(least)
+
+
+def upper_ratios(data: DynamicsData, coefficients: Array, rests: Array, pieces: Pieces) -> Array:
+    """(K,n): |tau| / limit is nowhere in a piece above this."""
+    middle = 0.5 * (pieces.begin + pieces.end)
+    step = Interval((interval(pieces.begin) - middle).lo, (interval(pieces.end) - middle).hi)
+    points: list[list[Interval]] = [[], [], []]
+    ranges: list[list[Interval]] = [[], [], [], []]
+    for j in range(data.n):
+        a = [interval(c) for c in coefficients[pieces.segment, j].T]
+        for i in range(len(a) - 1):  # Taylor shift to the middle
+            for k in reversed(range(i, len(a) - 1)):
+                a[k] = a[k] + a[k + 1] * middle
+        for order in range(4):
+            ranges[order].append(_horner(a, step) if a else interval(0.0 * middle))
+            if order < 3:
+                points[order].append(a[0] if a else interval(0.0 * middle))
+            a = [c * float(k) for k, c in enumerate(a) if k > 0]
+    sin0, cos0 = zip(*(sine_cosine(q) for q in points[0]), strict=True)
+    at_middle = _smooth_torque(data, sin0, cos0, points[1], points[2])
+    both = [sine_cosine(q) for q in ranges[0]]
+    over = _smooth_torque(
+        data,
+        [Dual(s, c * v) for (s, c), v in zip(both, ranges[1], strict=True)],
+        [Dual(c, -(s * v)) for (s, c), v in zip(both, ranges[1], strict=True)],
+        [Dual(v, a) for v, a in zip(ranges[1], ranges[2], strict=True)],
+        [Dual(a, jerk) for a, jerk in zip(ranges[2], ranges[3], strict=True)],
+    )
+    ratio = np.empty((len(middle), data.n))
+    for j in range(data.n):
+        tau = intersect(over[j].v, at_middle[j] + over[j].d * step)
+        speed, coulomb, still = ranges[1][j], float(data.coulomb[j]), rests[pieces.segment, j]
+        least = np.where(still, 0.0, np.where(speed.lo > 0.0, coulomb, -coulomb))
+        most = np.where(still, 0.0, np.where(speed.hi < 0.0, -coulomb, coulomb))
+        size = np.maximum(np.abs(tau.lo + least), np.abs(tau.hi + most))
+        ends = np.abs(speed.lo), np.abs(speed.hi)
+        slowest = np.where(still | ((speed.lo <= 0.0) & (speed.hi >= 0.0)), 0.0, np.minimum(*ends))
+        fastest = np.where(still, 0.0, np.maximum(*ends))
+        ratio[:, j] = size / least_limit(data, j, slowest, fastest) + ROUNDING_MARGIN
+    return ratio
+
+
+def sampled_ratios(data: DynamicsData, coefficients: Array, rests: Array, segment: Any, t: Array) -> Array:
+    """(K,n): |tau| / limit at local times t (K,) of the segments (K,)."""
+    c = coefficients[segment]
+    motion = []
+    for _ in range(3):
+        motion.append(evaluate(c, t[:, None, None])[..., 0])
+        c = derivative(c) if c.shape[2] > 1 else 0.0 * c
+    q, qd, qdd = motion
+    smooth = dynamics.inverse_dynamics(data, q, qd, qdd) - data.coulomb * np.sign(qd)
+    moving = np.abs(smooth + data.coulomb * np.sign(qd))
+    slow = np.where(np.abs(qd) < REST, np.abs(smooth) + data.coulomb, moving)
+    size = np.where(rests[segment], np.abs(smooth), slow)
+    return np.asarray(size / dynamics.torque_limit(data, qd))
+
+
+def torque_bounds(
+    data: DynamicsData, coefficients: Array, durations: Array, tolerance: float, most: int
+) -> tuple[Array, Array, Array, int]:
+    """Upper bound, largest sample, its time (n,), and how many intervals were examined."""
+    n = data.n
+    upper, sampled, time = np.zeros(n), np.full(n, -1.0), np.zeros(n)
+    rests = (coefficients[:, :, 1:] == 0.0).all(axis=2)
+    start = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
+    counts = np.maximum(FEWEST_PIECES, np.ceil(durations / FIRST_PIECE)).astype(int)
+    segment = np.repeat(np.arange(len(durations)), counts)
+    k = np.concatenate([np.arange(count) for count in counts])
+    width = durations / counts
+    pieces = Pieces(segment, k * width[segment], np.minimum((k + 1) * width[segment], durations[segment]))
+    spent = 0
+    while len(pieces.segment):
+        bound = upper_ratios(data, coefficients, rests, pieces)
+        for t in (pieces.begin, 0.5 * (pieces.begin + pieces.end), pieces.end):
+            ratio = sampled_ratios(data, coefficients, rests, pieces.segment, t)
+            worst = ratio.argmax(axis=0)
+            largest = ratio[worst, np.arange(n)]
+            when = (start[pieces.segment] + t)[worst]
+            time, sampled = np.where(largest > sampled, when, time), np.maximum(sampled, largest)
+        spent += len(pieces.segment)
+        sharp = (
+            (bound <= sampled + tolerance * np.maximum(sampled, 1.0)) & ~((sampled <= 1.0) & (bound > 1.0))
+        ).all(axis=1)
+        short = pieces.end - pieces.begin <= SHORTEST * durations[pieces.segment]
+        halve = ~sharp & ~short
+        halve &= spent + 2 * np.cumsum(halve) <= most
+        upper = np.maximum(upper, bound[~halve].max(axis=0, initial=0.0))
+        middle = 0.5 * (pieces.begin + pieces.end)
+        pieces = Pieces(
+            np.repeat(pieces.segment[halve], 2),
+            np.stack([pieces.begin[halve], middle[halve]], axis=1).ravel(),
+            np.stack([middle[halve], pieces.end[halve]], axis=1).ravel(),
+        )
+    return upper, sampled, time, spent
