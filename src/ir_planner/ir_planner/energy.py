@@ -44,7 +44,7 @@ def movement_energy(
     span = trajectory.duration - begin
     count = max(int(np.ceil(span / step - 1e-9)), 1)
     dt = span / count
-    times = begin + (np.arange(count) + 0.5) * dt
+    times: FloatArray = begin + (np.arange(count, dtype=np.float64) + 0.5) * dt
     motion = trajectory.sample(times)
     torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
     axes = scene.dynamics.axis_power(motion.qd, torque)

@@ -20,13 +20,14 @@ from ir_planner.asynchronous import own_laws
 from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, stretched
 from ir_planner.budget import Budget
 from ir_planner.errors import RequestError
+from ir_planner.limit_checks import Violation
 from ir_planner.objective import best_stretch
 from ir_planner.polynomials import extremes
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene
 from ir_planner.time_law import GRID_S, StepLaws
-from ir_planner.timing import STILL, MotionLimits, fastest_law
-from ir_planner.verification import Violation, clearance_violation, torque_bounds
+from ir_planner.timing import STILL, MotionLimits, fastest_law, torque_per_segment
+from ir_planner.verification import clearance_violation
 
 FloatArray = NDArray[np.float64]
 _TORQUE_SHARES = (0.98, 0.95, 0.9, 0.8)
@@ -163,12 +164,12 @@ def _guilty_corners(
             largest.velocity / limits.velocity,
             largest.acceleration / limits.acceleration,
             largest.jerk / limits.jerk,
-            torque_bounds(scene, coefficients, durations),
+            torque_per_segment(trajectory, scene.dynamics) / limits.torque_share,
         ]
     ).max(axis=1)
     middle = 0.5 * (trajectory.times[:-1] + trajectory.times[1:])
     guilty: set[int] = set()
-    for k in np.flatnonzero(share > 1.0 + 1e-9):
+    for k in np.flatnonzero(share > 1.0 + 1e-6):
         for corner in range(len(path.overlaps)):
             begin, end = path.corner_window(corner)
             if begin <= middle[k] / GRID_S <= end:

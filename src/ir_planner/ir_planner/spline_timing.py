@@ -6,6 +6,8 @@ lengthened or shortened by how much of the limits it uses, and at last all of th
 largest use is 1. Durations are whole grid steps (even, the virtual knots halve the first and the last).
 """
 
+from typing import Any
+
 import numpy as np
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
@@ -14,13 +16,12 @@ from ir_planner.errors import TimingError
 from ir_planner.polynomials import extremes
 from ir_planner.splines import natural_durations, spline_through, virtual_knots
 from ir_planner.time_law import GRID_NS, GRID_S
-from ir_planner.timing import Dynamics, MotionLimits, torque_use
+from ir_planner.timing import Dynamics, MotionLimits, torque_per_segment
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 _ROUNDS = 14
 _STRETCHES = 12
-_TORQUE_SAMPLES = 9  # per segment
 _SHORTEST = 20  # grid steps of an interval
 
 
@@ -50,11 +51,11 @@ def time_spline(
         if worst <= 1.0:
             return trajectory
         steps = _even(steps * GRID_S * max(worst, 1.002))
-    joint = int(np.argmax(_torque(trajectory, dynamics).max(axis=(0, 1))))
+    joint = int(np.argmax(torque_per_segment(trajectory, dynamics).max(axis=0)))
     raise TimingError(f"joint {joint + 1}: its torque does not carry the load along these points", joint)
 
 
-def _even(seconds: FloatArray) -> IntArray:
+def _even(seconds: NDArray[np.floating[Any]]) -> IntArray:
     half = np.ceil(np.asarray(seconds) / (2 * GRID_S) - 1e-9).astype(np.int64)
     return np.maximum(2 * half, _SHORTEST)
 
@@ -62,18 +63,10 @@ def _even(seconds: FloatArray) -> IntArray:
 def _spline(points: FloatArray, steps: IntArray, joint_names: tuple[str, ...]) -> JointTrajectory:
     at = np.concatenate([[0], np.cumsum(steps)])
     knots = np.rint(virtual_knots(at)).astype(np.int64)
-    spline = spline_through(points, at * GRID_S, knots * GRID_S)
+    spline = spline_through(points, np.asarray(at * GRID_S), np.asarray(knots * GRID_S))
     return JointTrajectory(
         joint_names, knots * GRID_NS, spline.positions, spline.velocities, spline.accelerations
     )
-
-
-def _torque(trajectory: JointTrajectory, dynamics: Dynamics) -> FloatArray:
-    """Use of torque (S, P, n) at P instants of every segment."""
-    _, durations = trajectory.coefficients()
-    t = (trajectory.times[:-1, None] + durations[:, None] * np.linspace(0.0, 1.0, _TORQUE_SAMPLES)).ravel()
-    motion = trajectory.sample(t)
-    return torque_use(dynamics, motion.q, motion.qd, motion.qdd).reshape(len(durations), _TORQUE_SAMPLES, -1)
 
 
 def _interval_use(
@@ -86,7 +79,7 @@ def _interval_use(
             (largest.velocity / limits.velocity).max(axis=1),
             np.sqrt((largest.acceleration / limits.acceleration).max(axis=1)),
             np.cbrt((largest.jerk / limits.jerk).max(axis=1)),
-            np.sqrt(_torque(trajectory, dynamics).max(axis=(1, 2)) / limits.torque_share),
+            np.sqrt(torque_per_segment(trajectory, dynamics).max(axis=1) / limits.torque_share),
         ]
     )
     # segments to intervals: the first and the last interval have two segments each

@@ -8,6 +8,7 @@ t_n^2 / 2 do the end conditions hold.)
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,9 +96,8 @@ def spline_through(
     rest = (np.zeros(points.shape[1]), np.zeros(points.shape[1]))
     (v0, a0), (vf, af) = start or rest, end or rest
     full = np.concatenate([np.repeat(knots[0], 4), knots[1:-1], np.repeat(knots[-1], 4)])
-    spline = make_interp_spline(
-        point_times, points, k=3, t=full, bc_type=([(1, v0), (2, a0)], [(1, vf), (2, af)])
-    )
+    ends: Any = ([(1, v0), (2, a0)], [(1, vf), (2, af)])
+    spline = make_interp_spline(point_times, points, k=3, t=full, bc_type=ends)
     q, qd, qdd = spline(knots), spline(knots, 1), spline(knots, 2)
     q[0], q[-1], qd[0], qd[-1], qdd[0], qdd[-1] = points[0], points[-1], v0, vf, a0, af
     return JointSpline(np.asarray(knots, dtype=float), q, qd, qdd)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
 from ir_planner.errors import TimingError
@@ -64,6 +65,15 @@ def torque_use(dynamics: Dynamics, q: FloatArray, qd: FloatArray, qdd: FloatArra
     return np.abs(dynamics.inverse_dynamics(q, qd, qdd)) / dynamics.torque_limit(qd)
 
 
+def torque_per_segment(trajectory: JointTrajectory, dynamics: Dynamics, samples: int = 9) -> FloatArray:
+    """Largest sampled use of the torque envelope in each segment, (S, n); no proof."""
+    _, durations = trajectory.coefficients()
+    t = (trajectory.times[:-1, None] + durations[:, None] * np.linspace(0.0, 1.0, samples)).ravel()
+    motion = trajectory.sample(t)
+    use = torque_use(dynamics, motion.q, motion.qd, motion.qdd)
+    return np.asarray(use.reshape(len(durations), samples, -1).max(axis=1))
+
+
 def _law_samples(steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """s, sd, sdd (K, 7, P) at P instants of every phase, ends included."""
     states = law_states(steps)
@@ -102,15 +112,15 @@ def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynam
     if use.max() <= limits.torque_share:
         return TimeLaw(tuple(int(k) for k in free[0]))
     top = float(law_states(free).sd[0, 3])
+    slower: FloatArray = top * 0.5 ** np.arange(3.0, 9.0)
     best = _best_law(start, delta, top * _SPEEDS, (a, j), limits.torque_share, dynamics)
     if best is None:
-        best = _best_law(start, delta, top * 0.5 ** np.arange(3, 9), (a, j), limits.torque_share, dynamics)
+        best = _best_law(start, delta, slower, (a, j), limits.torque_share, dynamics)
     if best is None:
         joint = int(np.argmax(use[0].max(axis=0)))
         raise TimingError(
             f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full speed and "
-            "too much at "
-            "1/256 of it as well: the load is too heavy for this movement",
+            "too much at 1/256 of it as well: the load is too heavy for this movement",
             joint,
         )
     return _refined(best, start, delta, (a, j), limits.torque_share, dynamics)
