@@ -117,6 +117,8 @@ def test_a_signal_that_was_never_set_is_zero():
 
 def test_the_rest_of_a_program_is_what_is_planned():
     progress = Progress("id", [move(duration=2.0), PlannedMovement(kind="pause", duration=10.0)], started=0.0)
-    progress.begin(0, now=5.0)
+    progress.begin(0)
+    assert progress.remaining(6.0) == 12.0
+    progress.step_started = 5.0
     assert progress.remaining(6.0) == 11.0
     assert progress.remaining(60.0) == 10.0

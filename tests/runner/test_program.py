@@ -163,8 +163,8 @@ def test_steps_run_in_order_with_their_events():
     assert world.log == [
         "ab=0",
         "hib=0",
-        "0 started",
         "load gripper",
+        "0 started",
         "drive",
         "0 ended",
         "1 started",

@@ -251,9 +251,10 @@ def test_a_step_waits_for_the_signal_of_a_machine_and_sets_its_own(cell, wait_fo
             waiting.append(at.movement)
             cell.machines.publish(SignalMsg(name="door_open", value=True))
 
-    result = cell.run([move(wait_for=("door_open",), set_signals=("start=1",))], feedback=open_the_door)
+    steps = [move(), move(wait_for=("door_open",), set_signals=("start=1",))]
+    result = cell.run(steps, feedback=open_the_door)
     assert result.status.code == StatusCode.SUCCESS
-    assert waiting == [0]
+    assert waiting == [1]
     message = wait_for(lambda: cell.set_by_program)[0]
     assert (message.name, message.value) == ("start", True)
     assert message.stamp.sec > 0
@@ -318,9 +319,10 @@ def test_a_driver_that_hibernates_during_a_movement_ends_the_program(cell):
     assert "ir_sim_driver went into hibernation during the movement" in result.status.message
 
 
-def test_a_program_does_not_start_while_the_robot_sleeps(ros_context, ros_executor):
+def test_a_program_does_not_start_while_the_robot_sleeps(ros_context, ros_executor, wait_for):
     cell = Cell(ros_context, ros_executor, ready_timeout=0.1)
     cell.driver.mode = Mode.BUS_POWER_OFF
+    wait_for(lambda: cell.runner._driver.mode is Mode.BUS_POWER_OFF)
     result = cell.run([move()])
     assert result.status.code == StatusCode.INVALID_ROBOT_STATE
     assert result.status.message.startswith("the power mode is BUS_POWER_OFF: a program starts in")
@@ -372,6 +374,14 @@ def test_a_bad_request_is_answered_by_a_sentence_and_the_node_lives(cell, reques
     assert sentence in result.status.message
     assert "drive" not in cell.driver.log
     assert cell.run([move()]).status.code == StatusCode.SUCCESS
+
+
+def test_a_planner_that_is_gone_is_named(ros_context, ros_executor):
+    cell = Cell(ros_context, ros_executor, planner="ir_planner_2", response_timeout=0.1)
+    result = cell.run(program_id="known")
+    assert result.status.code == StatusCode.TIMED_OUT
+    assert result.status.message == "nobody offers /ir_planner_2/get_program within 0.1 s"
+    cell.client.close()
 
 
 def test_a_bad_kind_of_movement_is_answered_by_a_sentence(cell):

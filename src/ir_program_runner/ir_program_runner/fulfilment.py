@@ -58,6 +58,7 @@ class Ports:
     now: Callable[[], float]
     fault: Callable[[], str]
     canceled: Callable[[], bool]
+    begin: Callable[[int], None]
     tell: Callable[[ask.Tell], None]
     tell_phase: Callable[[str], None]
     set_signal: Callable[[Signal], None]
@@ -104,6 +105,8 @@ class Fulfilment:
     async def _fulfil(self, request: ask.Request) -> Status:
         ports = self._ports
         match request:
+            case ask.Begin(index):
+                ports.begin(index)
             case ask.Tell():
                 ports.tell(request)
             case ask.Phase(text):

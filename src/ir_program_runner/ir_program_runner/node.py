@@ -100,6 +100,8 @@ class ProgramRunnerNode(Node):
             cancel_callback=lambda goal: CancelResponse.ACCEPT,
         )
 
+        self.get_logger().info("ready to run programs")
+
     def destroy_node(self) -> None:
         """Let go of the action server before the node."""
         self._server.destroy()
@@ -166,6 +168,7 @@ class ProgramRunnerNode(Node):
             now=self._now,
             fault=lambda: self._jump,
             canceled=lambda: bool(goal.is_cancel_requested),
+            begin=self._begin,
             tell=self._tell,
             tell_phase=lambda text: self._tell_phase(goal, text),
             set_signal=self._set_signal,
@@ -208,11 +211,15 @@ class ProgramRunnerNode(Node):
     def _stamped(self, signal: Signal) -> Signal:
         return Signal(signal.name, signal.value, self.get_clock().now().nanoseconds)
 
+    def _begin(self, index: int) -> None:
+        assert self._progress is not None
+        self._progress.begin(index)
+
     def _tell(self, tell: Tell) -> None:
         progress = self._progress
         assert progress is not None
         if tell.event is Event.STARTED:
-            progress.begin(tell.index, self._now())
+            progress.step_started = self._now()
         state = ProgramState(
             stamp_ns=self.get_clock().now().nanoseconds,
             program_id=progress.program_id,
@@ -269,6 +276,9 @@ def main(arguments: list[str] | None = None) -> int:
     except (ParameterError, DescriptionError, ValueError) as error:
         sys.stderr.write(f"{names.PROGRAM_RUNNER}: {error}\n")
         return 1
+    except Exception:  # a signal while the node is being made leaves it half made: that is no fault
+        if rclpy.ok():
+            raise
     finally:
         if node is not None:
             node.destroy_node()

@@ -19,6 +19,7 @@ from ir_program_runner.checks import load_after, step_name
 from ir_program_runner.errors import CanceledError, StepFailedError
 from ir_program_runner.pause import Pause
 from ir_program_runner.requests import (
+    Begin,
     Drive,
     Outcome,
     Phase,
@@ -70,8 +71,7 @@ class Program:
         for index, movement in enumerate(self._movements):
             where = step_name(index, total, movement)
             try:
-                yield Tell(index, Event.STARTED)
-                note = yield from self._step(movement)
+                note = yield from self._step(index, movement)
             except StepFailedError as failure:
                 yield Tell(index, Event.FAILED, failure.status.message)
                 return ProgramResult(Status(failure.status.code, f"{where}: {failure.status.message}"), index)
@@ -94,11 +94,14 @@ class Program:
         for bit in ("ab", "hib"):
             need((yield SetPlcInput(bit, False)))
 
-    def _step(self, movement: PlannedMovement) -> Generator[Request, Outcome, str]:
+    def _step(self, index: int, movement: PlannedMovement) -> Generator[Request, Outcome, str]:
+        """Do one step; it counts as started when its signals are there: waiting is no part of its energy."""
         note = ""
+        yield Begin(index)
         if movement.wait_for:
             yield from self._wait_for_signals(movement.wait_for)
         if movement.is_pause:
+            yield Tell(index, Event.STARTED)
             pause = Pause(movement, self._settings)
             note = yield from pause.run()
             if pause.restarted:
@@ -106,6 +109,7 @@ class Program:
         else:
             assert movement.trajectory is not None  # checked with the program
             yield from self._carry(movement.load)
+            yield Tell(index, Event.STARTED)
             yield Phase("moving")
             need((yield Drive(movement.trajectory)))
         yield from self._carry(load_after(movement))

@@ -17,6 +17,13 @@ from ir_program_runner.errors import StepFailedError
 
 
 @dataclass(frozen=True)
+class Begin:
+    """Step `index` is the next one; it has not started yet."""
+
+    index: int
+
+
+@dataclass(frozen=True)
 class Tell:
     """Tell everybody that step `index` started, ended, failed or was canceled."""
 
@@ -95,7 +102,8 @@ class SendWakePacket:
 
 
 Request = (
-    Tell
+    Begin
+    | Tell
     | Phase
     | WaitForSignals
     | SetSignal

@@ -123,7 +123,8 @@ class Driver:
     async def ask(self, client: Any, request: Any) -> Any:
         """Call a service: its response, or a Status that says why there is none."""
         if self.off_the_network:
-            return Status(StatusCode.TIMED_OUT, f"{self.name} hibernates: {client.srv_name} is not available")
+            sentence = f"{self.name} hibernates: {client.service_name} is not available"
+            return Status(StatusCode.TIMED_OUT, sentence)
         return await self._waiting.ask(client, request, self._response_timeout)
 
     async def _give_up(self, handle: Any, result: Future, stopped: bool) -> Status:
