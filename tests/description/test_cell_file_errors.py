@@ -7,8 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from ir_description import CellFileError, Signal, UnknownNameError, cell_from_yaml, load_cell
+from ir_description import CellFileError, Signal, UnknownNameError, cell_from_yaml, cell_to_yaml, load_cell
 
 GOOD = """\
 format: ir_cell/1
@@ -332,3 +334,30 @@ def test_an_unknown_name_lists_the_known(name: str) -> None:
         load_cell(name)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 500
+
+
+@given(
+    st.integers(0, len(GOOD) - 1),
+    st.integers(0, 12),
+    st.one_of(
+        st.text(max_size=4),
+        st.sampled_from(
+            ["{", "}", "[", "]", ":", "\n", "- ", "&a ", "*a", "!x ", "null", "1e400", ".nan", "\ud800", "\0"]
+        ),
+    ),
+)
+@settings(max_examples=300, deadline=None)
+def test_whatever_is_typed_into_a_file_is_read_or_answered_by_a_sentence(
+    at: int, removed: int, typed: str
+) -> None:
+    text = GOOD[:at] + typed + GOOD[at + removed :]
+    answer = ""
+    try:
+        cell = cell_from_yaml(text, "cell.yaml")
+    except CellFileError as error:
+        answer = str(error)
+    if answer:
+        assert re.match(r"cell.yaml:(\d+:)? ", answer)
+        assert answer.isprintable()
+    else:
+        assert cell_to_yaml(cell_from_yaml(cell_to_yaml(cell))) == cell_to_yaml(cell)

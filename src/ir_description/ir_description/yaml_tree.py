@@ -65,6 +65,9 @@ def parse_yaml(
         mark = broken.problem_mark or broken.context_mark
         line = mark.line + 1 if mark is not None else 0
         raise error(source, line, f"this is not YAML: {broken.problem or broken.context}") from broken
+    except UnicodeEncodeError as broken:
+        line = text.count("\n", 0, broken.start) + 1
+        raise error(source, line, f"character {shown(text[broken.start])} is not allowed in YAML") from broken
     except yaml.reader.ReaderError as broken:
         line = text.count("\n", 0, broken.position) + 1 if isinstance(broken.position, int) else 0
         raise error(source, line, f"character {shown(broken.character)} is not allowed in YAML") from broken
