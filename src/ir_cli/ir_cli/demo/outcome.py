@@ -1,4 +1,4 @@
-"""What the recording says of the demonstration: a table of movements, the checks, the report and the picture."""
+"""What the recording says of the demonstration: movements, checks, the report and the picture."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _sentence(check: Finding) -> str:
 
 
 def examine(recording: Path, report: Path, picture: Path, loads: int) -> Outcome:
-    """Analyse the recording, write report and picture; loads: how many the tour of the power modes carried."""
+    """Analyse the recording, write report and picture; loads: how many the tour carried."""
     analysis = analyse(read_recording(recording))
     checks = findings(analysis, Tolerances(table_2_rows=TABLE_2_ROWS * loads))
     write_report(analysis, checks, report)
