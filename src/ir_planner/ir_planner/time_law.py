@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 GRID_S = 1e-3
 GRID_NS = 1_000_000
-_HALVINGS = 60
+_NEWTON_STEPS = 40
 
 
 @dataclass(frozen=True)
@@ -40,25 +40,31 @@ def _ramp(speed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> tupl
     return phase, np.maximum(constant, 0.0)
 
 
-def _ramp_time(speed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
-    phase, constant = _ramp(speed, acceleration, jerk)
-    return np.asarray(2.0 * phase + constant)
-
-
 def reached_speed(limits: LawLimits) -> FloatArray:
-    """Largest speed (K,) 1/s that the distance 1 leaves room for, at most the limit."""
-    low, high = np.zeros_like(limits.speed), limits.speed.copy()
+    """Largest speed (K,) 1/s that the distance 1 leaves room for, at most the limit.
 
-    def distance(speed: FloatArray) -> FloatArray:
-        up = _ramp_time(speed, limits.acceleration, limits.jerk)
-        return np.asarray(0.5 * speed * (up + _ramp_time(speed, limits.braking, limits.jerk)))
+    The distance of both ramps grows with the speed and is convex, so Newton's steps from above stay above.
+    """
+    speed = limits.speed.copy()
+    for _ in range(_NEWTON_STEPS):
+        up, up_slope = _ramp_distance(speed, limits.acceleration, limits.jerk)
+        down, down_slope = _ramp_distance(speed, limits.braking, limits.jerk)
+        excess = up + down - 1.0
+        if np.all(excess <= 1e-14):
+            break
+        speed = speed - np.maximum(excess, 0.0) / (up_slope + down_slope)
+    return speed
 
-    room = distance(high) <= 1.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        fits = distance(middle) <= 1.0
-        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    return np.where(room, limits.speed, low)
+
+def _ramp_distance(
+    speed: FloatArray, acceleration: FloatArray, jerk: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Distance (K,) of a ramp between rest and `speed`, and its derivative by the speed."""
+    full = speed * jerk >= acceleration**2
+    root = np.sqrt(speed / jerk)
+    distance = np.where(full, 0.5 * speed * (speed / acceleration + acceleration / jerk), speed * root)
+    slope = np.where(full, speed / acceleration + 0.5 * acceleration / jerk, 1.5 * root)
+    return distance, slope
 
 
 def phase_steps(limits: LawLimits) -> IntArray:
