@@ -128,11 +128,6 @@ class Executor:
         path = run.route.path.motion(run.s)
         return Motion(self.command, path.qd * v, path.qdd * v**2)
 
-    def unscaled(self) -> Motion:
-        """The motion at the present place of the path at full path speed."""
-        run = self._run
-        return Motion(self.command, self._still, self._still) if run is None else run.route.path.motion(run.s)
-
     def following(self, q: Array, qd: Array) -> Following:
         """How the robot at q, qd (n,) follows."""
         return Following(self.motion(), q, qd, self.label, self.path_time, self.path_speed, self.deviation)

@@ -24,6 +24,7 @@ from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.executor import Executor
 from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.loads import Carried
+from ir_sim_driver.manual_speed import manual_scaling
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.pause import Pauses
 from ir_sim_driver.plc import Plc
@@ -36,7 +37,6 @@ from ir_sim_driver.trajectory_checks import check_goal, check_trajectory, checke
 METER_STEPS = 10
 _STANDING = 1e-3  # rad/s
 _HOME = 0.01  # rad
-_T1_SPEED = 0.25 * 0.98  # m/s at the tool; a margin because the path speed follows with bounded deceleration
 _MANUAL = (OperatingMode.T1, OperatingMode.T2)
 
 
@@ -273,9 +273,10 @@ class Simulation:
 
     def _scaling(self) -> float:
         scaling = self.speed_scaling if self.plc.levels.move_enable else 0.0
-        if self.plc.operating_mode is OperatingMode.T1 and self.executor.active:
-            speed = self.tool.speed(*self.executor.unscaled()[:2])
-            scaling = min(scaling, _T1_SPEED / speed if speed > _T1_SPEED else 1.0)
+        path = self.executor.path
+        if self.plc.operating_mode is OperatingMode.T1 and path is not None:
+            s, stop_time = self.executor.path_parameter, self.settings.execution.stop_time
+            scaling = min(scaling, manual_scaling(self.tool, path, s, stop_time))
         return scaling
 
     def _wish(self) -> Wish:

@@ -44,6 +44,8 @@ class ToolPoint:
         both = self.positions(np.array((commanded, q)))
         return float(np.linalg.norm(both[0] - both[1]))
 
-    def speed(self, q: Array, qd: Array) -> float:
-        """Speed [m/s] of the tcp."""
-        return float(np.linalg.norm(self.chain.jacobian(q[None])[0, :3] @ qd))
+    def speeds(self, q: Array, qd: Array) -> Array:
+        """Speeds (N,) [m/s] of the tcp at q, qd (N, n)."""
+        linear = self.chain.jacobian(q)[:, :3]
+        speeds: Array = np.linalg.norm(np.einsum("kij,kj->ki", linear, qd), axis=1)
+        return speeds

@@ -1,0 +1,250 @@
+"""Execution as a table of sample times; scaling, hold, stop and replacement stay on the path and within the limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.goal import ErrorCode, JointTolerance
+
+EXACT = 1e-9  # rad; the ideal robot is where it was commanded
+DT = 0.001
+
+
+@pytest.fixture
+def home(cell):
+    return np.array(cell.machine_home)
+
+
+@pytest.fixture
+def there(home):
+    return home + np.array([0.8, 0.3, -0.3, 0.5, -0.4, 0.6])
+
+
+def positions(simulation, seconds):
+    """Positions (K, 6) after each step."""
+    rows = []
+    for _ in range(round(seconds / DT)):
+        simulation.step()
+        rows.append(simulation.backend.q.copy())
+    return np.array(rows)
+
+
+def distance_from_path(q, path):
+    """Largest distance [rad] of rows q (K, 6) from a densely sampled path (M, 6)."""
+    return max(np.abs(path - row).max(axis=1).min() for row in q)
+
+
+@pytest.mark.parametrize("at", [0.001, 0.25, 0.5, 0.999, 1.0, 1.3, 1.999, 2.0])
+def test_the_robot_is_where_the_interpolant_is(make, plan, start, home, there, at):
+    trajectory = plan([0.0, 1.0, 2.0], home, home + 0.4 * (there - home), there)
+    simulation = make()
+    start(simulation, trajectory)
+    simulation.run(at)
+    assert np.abs(simulation.backend.q - trajectory.sample([at]).q[0]).max() < EXACT
+
+
+def test_a_goal_ends_when_its_trajectory_does(make, plan, start, run_out, home, there):
+    simulation = make()
+    goal_id = start(simulation, plan(2.0, home, there))
+    outcome = run_out(simulation)
+    assert (outcome.goal_id, outcome.code, outcome.canceled) == (goal_id, ErrorCode.SUCCESSFUL, False)
+    assert simulation.steps == pytest.approx(2000, abs=2)
+    assert outcome.energy > 0.0
+
+
+def test_a_first_time_above_zero_leads_in_from_where_the_robot_is(make, plan, start, run_out, home, there):
+    simulation = make()
+    trajectory = plan([2.0, 4.0], there, home)
+    start(simulation, trajectory)
+    q = positions(simulation, 2.0)
+    assert np.abs(q[-1] - there).max() < EXACT
+    speeds = np.diff(q, axis=0) / DT
+    assert np.abs(speeds[0]).max() < 0.01
+    assert np.abs(speeds[-1]).max() < 0.01
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+
+
+def test_one_point_is_a_movement_and_one_at_zero_is_where_the_robot_is(
+    make, plan, start, run_out, home, there
+):
+    simulation = make()
+    start(simulation, plan([2.0], there))
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+    assert np.abs(simulation.backend.q - there).max() < EXACT
+    start(simulation, plan([0.0], there))
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+
+
+def test_a_small_difference_at_the_start_is_closed_before_path_time_runs(
+    make, plan, start, run_out, home, there
+):
+    simulation = make()
+    start(simulation, plan(2.0, home + 0.009, there))
+    assert simulation.executor.path_time < 0.0
+    q = positions(simulation, 0.5)
+    assert np.abs(np.diff(q, 2, axis=0)).max() / DT**2 < 4.5  # no jump: within the acceleration limits
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.25])
+def test_speed_scaling_stretches_time_and_keeps_the_path(make, plan, start, run_out, home, there, factor):
+    simulation = make()
+    trajectory = plan(2.0, home, there)
+    simulation.set_speed_scaling(factor)
+    start(simulation, trajectory)
+    q = positions(simulation, 2.0)
+    assert distance_from_path(q[::50], trajectory.sample(np.linspace(0, 2, 4001)).q) < 1e-3
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+    assert simulation.time == pytest.approx(2.0 / factor, abs=0.01)
+
+
+def test_scaling_zero_holds_on_the_path_and_one_goes_on(make, plan, start, run_out, home, there):
+    simulation = make()
+    trajectory = plan(2.0, home, there)
+    start(simulation, trajectory)
+    simulation.run(1.0)
+    simulation.set_speed_scaling(0.0)
+    simulation.run(1.0)
+    held = simulation.backend.q.copy()
+    simulation.run(1.0)
+    assert np.abs(simulation.backend.q - held).max() == 0.0
+    assert distance_from_path([held], trajectory.sample(np.linspace(0, 2, 8001)).q) < 1e-3
+    simulation.set_speed_scaling(7.0)
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+    assert np.abs(simulation.backend.q - there).max() < EXACT
+
+
+def test_move_enable_0_holds_too(make, plan, start, home, there):
+    simulation = make()
+    start(simulation, plan(2.0, home, there))
+    simulation.run(1.0)
+    simulation.plc.set_bit("move_enable", False)
+    simulation.run(1.0)
+    assert simulation.executor.path_speed == 0.0
+    assert simulation.executor.active
+
+
+@pytest.mark.parametrize("factor", [float("nan"), -1.0])
+def test_a_speed_scaling_that_means_nothing_is_ignored_with_a_warning(make, factor):
+    simulation = make()
+    assert simulation.set_speed_scaling(factor) == 1.0
+    assert "speed scaling" in simulation.notices.last.sentence
+
+
+@settings(max_examples=25, deadline=None)
+@given(at=st.floats(0.0, 2.0), backend=st.sampled_from(["ideal", "pybullet"]))
+def test_a_cancel_at_any_instant_stops_on_the_path_within_the_limits(make, plan, start, cell, at, backend):
+    home = np.array(cell.machine_home)
+    there = home + np.array([0.8, 0.3, -0.3, 0.5, -0.4, 0.6])
+    simulation = make(backend)
+    trajectory = plan(2.0, home, there)
+    goal_id = start(simulation, trajectory)
+    simulation.run(at)
+    running = simulation.executor.active
+    assert simulation.cancel(goal_id) == running
+    q = positions(simulation, 1.0)
+    outcomes = simulation.take_outcomes()
+    assert len(outcomes) == 1
+    assert outcomes[0].canceled == running
+    assert outcomes[0].max_tool_deviation < 0.001
+    assert distance_from_path(q[::100], trajectory.sample(np.linspace(0, 2, 4001)).q) < 1e-3
+    acceleration = np.diff(q, 2, axis=0) / DT**2
+    assert (np.abs(acceleration) < 1.05 * cell.robot.acceleration_max + 0.05).all()
+    assert np.abs(q[-1] - q[-2]).max() < EXACT
+    assert not simulation.cancel(goal_id)
+
+
+def test_stopping_twice_and_after_the_end_is_harmless(make, plan, start, run_out, home, there):
+    simulation = make()
+    goal_id = start(simulation, plan(2.0, home, there))
+    simulation.run(1.0)
+    assert simulation.cancel(goal_id)
+    assert simulation.cancel(goal_id)
+    assert run_out(simulation).canceled
+    assert not simulation.cancel(goal_id)
+    assert not simulation.cancel(12345)
+
+
+@settings(max_examples=20, deadline=None)
+@given(at=st.floats(0.05, 1.9), lead=st.floats(1.5, 3.0))
+def test_a_replacement_never_jumps(make, plan, start, cell, at, lead):
+    home = np.array(cell.machine_home)
+    there = home + np.array([0.5, 0.2, -0.2, 0.3, -0.2, 0.4])
+    simulation = make()
+    start(simulation, plan(2.0, home, there))
+    before = positions(simulation, at)
+    start(simulation, plan([lead, lead + 1.0], home, home))
+    after = positions(simulation, lead + 1.1)
+    q = np.vstack((before, after))
+    acceleration = np.abs(np.diff(q, 2, axis=0)) / DT**2
+    assert (acceleration < 1.05 * cell.robot.acceleration_max + 0.05).all()
+    first, second = simulation.take_outcomes()
+    assert (first.code, "preempted" in first.sentence) == (ErrorCode.INVALID_GOAL, True)
+    assert second.code == ErrorCode.SUCCESSFUL
+
+
+def test_a_hundred_replacements_a_second_end_each_goal_once(make, plan, start, home):
+    simulation = make()
+    ids = []
+    for k in range(100):
+        ids.append(start(simulation, plan([1.5], home + 0.02 * (k % 3))))
+        simulation.run(0.01)
+    simulation.run(1.6)
+    outcomes = simulation.take_outcomes()
+    assert [outcome.goal_id for outcome in outcomes] == ids
+    assert [outcome.code for outcome in outcomes] == [ErrorCode.INVALID_GOAL] * 99 + [ErrorCode.SUCCESSFUL]
+
+
+def test_the_tube_stops_a_disturbed_robot_on_its_path(make, plan, start, run_out, home, there, cell):
+    simulation = make("pybullet")
+    start(simulation, plan(2.0, home, there))
+    simulation.run(0.9)
+    simulation.disturb(np.array([2e4, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.PATH_TOLERANCE_VIOLATED
+    assert "mm" in outcome.sentence
+    assert "joint_a1" in outcome.sentence
+    assert not simulation.executor.active
+
+
+def test_a_path_tolerance_names_the_joint_and_the_amount(make, plan, start, run_out, home, there):
+    simulation = make("pybullet", execution=ExecutionSettings(tube=0.1))
+    tight = (JointTolerance("joint_a3", position=1e-5),)
+    start(simulation, plan(2.0, home, there), path_tolerance=tight)
+    simulation.run(0.5)
+    simulation.disturb(np.array([0.0, 0.0, 900.0, 0.0, 0.0, 0.0]))
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.PATH_TOLERANCE_VIOLATED
+    assert "joint_a3 position error" in outcome.sentence
+
+
+def test_an_unreached_goal_tolerance_ends_after_the_goal_time(make, plan, start, run_out, home, there):
+    simulation = make("pybullet")
+    tight = (JointTolerance("joint_a1", position=1e-7),)
+    start(simulation, plan(2.0, home, there), goal_tolerance=tight, goal_time=0.3)
+    simulation.run(1.9)
+    simulation.disturb(np.array([300.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert simulation.time == pytest.approx(2.3, abs=0.01)
+
+
+def test_a_stamp_in_the_near_future_waits(make, plan, start, home, there):
+    simulation = make()
+    start(simulation, plan(2.0, home, there), now_ns=5_000_000_000, stamp_ns=5_500_000_000)
+    simulation.run(0.49)
+    assert np.abs(simulation.backend.q - home).max() == 0.0
+    simulation.run(2.02)
+    assert simulation.take_outcomes()[0].code == ErrorCode.SUCCESSFUL
+
+
+def test_a_goal_opens_the_brakes_and_waits_for_them(make, plan, start, run_out, home, there):
+    from ir_sim_driver.simulation_settings import ControllerSettings
+
+    simulation = make(controller=ControllerSettings(start_mode="STAND_ON_BRAKES"))
+    start(simulation, plan(2.0, home, there))
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+    assert simulation.time == pytest.approx(1.0 + 0.7 + 2.0, abs=0.01)

@@ -1,0 +1,99 @@
+"""PROFIenergy on the simulated controller, and when a rest pays."""
+
+from __future__ import annotations
+
+import pytest
+from ir_msgs_py.plc import OperatingMode
+from ir_msgs_py.power import Mode
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.pause import best_mode, energy_of
+from ir_sim_driver.power_modes import TransitionSettings
+from ir_sim_driver.simulation_settings import ControllerSettings
+
+
+def by_mode(simulation):
+    return {mode.mode: mode for mode in simulation.pauses.query_modes()}
+
+
+def test_times_and_numbers_are_those_of_the_controller(make):
+    modes = by_mode(make())
+    bus = modes[Mode.BUS_POWER_OFF]
+    assert (bus.time_to_pause, bus.regular_time_to_operate, bus.time_min_length_of_stay) == (3.0, 20.0, 2.0)
+    assert bus.time_min_pause == 25.0
+    assert modes[Mode.HIBERNATION].time_min_pause == 300.0
+    assert [mode.pe_mode_id for mode in modes.values()] == [0xFF, 0x01, 0x02, 0xFE]
+
+
+@pytest.mark.parametrize(
+    ("start_mode", "bus_power_off", "hibernation"),
+    [("STAND_ON_MOTORS", 98.0, 1012.0), ("STAND_ON_BRAKES", 88.0, 778.0)],
+)
+def test_break_even_of_the_tool_of_table_2(make, start_mode, bus_power_off, hibernation):
+    simulation = make(controller=ControllerSettings(start_mode=start_mode))
+    modes = by_mode(simulation)
+    assert modes[Mode.BUS_POWER_OFF].break_even == pytest.approx(bus_power_off, abs=1.0)
+    assert modes[Mode.HIBERNATION].break_even == pytest.approx(hibernation, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("pause", "mode"),
+    [(1.0, 0), (1.9, 0), (5.0, 2), (97.0, 2), (99.0, 3), (1011.0, 3), (1013.0, 4)],
+)
+def test_the_chosen_mode_takes_least_energy(make, pause, mode):
+    table = make().pauses.query_modes()
+    chosen = best_mode(table, pause)
+    assert chosen.mode == mode
+    fitting = [each for each in table if pause >= each.time_min_pause]
+    assert energy_of(chosen, pause) == min(energy_of(each, pause) for each in fitting)
+
+
+def test_a_pause_costs_what_query_modes_said(make):
+    simulation = make()
+    simulation.run(0.01)
+    bus = by_mode(simulation)[Mode.BUS_POWER_OFF]
+    before = simulation.meter.reading()
+    simulation.pauses.start(100.0, executing=False)
+    simulation.run(80.0)
+    assert simulation.modes.mode is Mode.BUS_POWER_OFF
+    assert simulation.pauses.end() == pytest.approx(20.0)
+    simulation.run(20.01)
+    after = simulation.meter.reading()
+    assert simulation.modes.mode is Mode.STAND_ON_MOTORS
+    assert after.energy - before.energy == pytest.approx(energy_of(bus, after.time - before.time), rel=1e-3)
+
+
+def test_ending_a_pause_early_finishes_the_shortest_stay(make):
+    simulation = make()
+    simulation.pauses.start(200.0, executing=False)
+    simulation.run(3.1)
+    told = simulation.pauses.end()
+    assert told == pytest.approx(1.9 + 20.0, abs=0.01)
+    simulation.run(told + 0.01)
+    assert simulation.modes.mode is Mode.STAND_ON_MOTORS
+
+
+@pytest.mark.parametrize("pause", [float("nan"), float("inf"), 0.0, -1.0])
+def test_a_pause_of_no_length_is_refused(make, pause):
+    with pytest.raises(RequestRefusedError, match="pause is"):
+        make().pauses.start(pause, executing=False)
+
+
+def test_a_pause_is_refused_outside_ext_beside_power_bits_and_in_motion(make):
+    simulation = make()
+    with pytest.raises(RequestRefusedError, match="executing"):
+        simulation.pauses.start(10.0, executing=True)
+    simulation.plc.set_operating_mode(OperatingMode.AUT)
+    with pytest.raises(RequestRefusedError, match="AUT"):
+        simulation.pauses.start(10.0, executing=False)
+    simulation.plc.set_operating_mode(OperatingMode.EXT)
+    simulation.plc.set_bit("ab", True)
+    simulation.run(0.05)
+    with pytest.raises(RequestRefusedError, match="power bit"):
+        simulation.pauses.start(10.0, executing=False)
+
+
+def test_the_brake_timer_runs_again_after_a_pause_that_was_ended_on_motors(make):
+    simulation = make(transitions=TransitionSettings(motors_to_brakes_in_program=0.5))
+    simulation.pauses.end()
+    simulation.run(0.9)
+    assert simulation.modes.mode is Mode.STAND_ON_BRAKES

@@ -1,0 +1,63 @@
+"""Magic packets: what wakes, what doesn't, and a listener on a real socket."""
+
+from __future__ import annotations
+
+import socket
+import threading
+
+import pytest
+from ir_sim_driver.errors import SettingsError
+from ir_sim_driver.wake_on_lan import WakeListener, magic_packet, wakes
+
+MAC = "02:00:00:c4:02:10"
+PACKET = magic_packet(MAC)
+
+
+def test_the_packet_has_102_bytes():
+    assert len(PACKET) == 102
+    assert PACKET[:6] == b"\xff" * 6
+
+
+@pytest.mark.parametrize("password", [b"", b"1234", b"123456"])
+def test_own_mac_wakes_with_and_without_a_password(password):
+    assert wakes(PACKET + password, MAC)
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [
+        b"",
+        PACKET[:-1],
+        PACKET[1:],
+        b"\x00" + PACKET,
+        PACKET + b"12345",
+        PACKET * 10,
+        magic_packet("02:00:00:c4:02:11"),
+        b"\xff" * 102,
+    ],
+)
+def test_wrong_truncated_and_oversized_packets_are_ignored(packet):
+    assert not wakes(packet, MAC)
+
+
+@pytest.mark.parametrize(
+    "mac", ["", "02:00:00:c4:02", "02:00:00:c4:02:zz", "020000c40210", "02:00:00:c4:02:10:11"]
+)
+def test_what_is_no_mac_is_refused(mac):
+    with pytest.raises(SettingsError, match="mac is"):
+        magic_packet(mac)
+
+
+def test_the_listener_hears_its_own_packet_among_others():
+    woken = threading.Semaphore(0)
+    listener = WakeListener("127.0.0.1", 0, MAC, woken.release)
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for packet in (b"", b"x" * 2000, magic_packet("02:00:00:c4:02:11"), PACKET):
+                sender.sendto(packet, ("127.0.0.1", listener.port))
+        assert woken.acquire(timeout=5.0)
+        assert not woken.acquire(blocking=False)
+        with pytest.raises(OSError, match="in use"):
+            WakeListener("127.0.0.1", listener.port, MAC, woken.release)
+    finally:
+        listener.close()
