@@ -97,38 +97,8 @@ template <class V> IR_INLINE Vec<V> splat3(const Scalar<V> v[3]) {
 }
 
 // Signed distance of capsule axes from a body, both in the body's frame (surface of the body, axis of the capsule).
-template <class V>
-IR_INLINE V axis_distance(const Model& model, int body, int capsule_index, const Vec<V>& a, const Vec<V>& b) {
-  using S = Scalar<V>;
-  const Body<S>& f = model.bodies<S>()[body];
-  switch (model.kind[body]) {
-    case box:
-      return distance_box(a, b, splat3<V>(f.half));
-    case cylinder:
-      return segment_cylinder(a, b, splat<V>(f.radius), splat<V>(f.half_length)).distance;
-    case plane:
-      return min(a.z, b.z);
-    case sphere:
-    case capsule: {
-      const V zero{};
-      const Vec<V> from{zero, zero, splat<V>(-f.half_length)}, along{zero, zero, splat<V>(2 * f.half_length)};
-      const S inverse = f.half_length > 0 ? 1 / (4 * f.half_length * f.half_length) : 0;
-      const V own = splat<V>(static_cast<S>(model.capsules[capsule_index].inverse_square));
-      const auto p = segment_segment(a, b - a, own, from, along, splat<V>(inverse));
-      return sqrt(dot(p.gap, p.gap)) - f.radius;
-    }
-    default: {
-      V r;
-      for (int k = 0; k < Lanes<V>::width; ++k) {
-        const double from[3] = {double(a.x[k]), double(a.y[k]), double(a.z[k])};
-        const double to[3] = {double(b.x[k]), double(b.y[k]), double(b.z[k])};
-        double t = 0.0, n[3];
-        r[k] = static_cast<S>(segment_hull(model.hulls[body], from, to, t, n));
-      }
-      return r;
-    }
-  }
-}
+// Not inlined: one instance for all queries keeps the build short.
+template <class V> V axis_distance(const Model& model, int body, int capsule_index, const Vec<V>& a, const Vec<V>& b);
 
 template <class V> IR_INLINE V self_distance(const Model& model, const State<V>& s, const SelfPair& pair) {
   using S = Scalar<V>;
