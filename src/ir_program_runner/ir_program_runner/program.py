@@ -100,16 +100,15 @@ class Program:
         yield Begin(index)
         if movement.wait_for:
             yield from self._wait_for_signals(movement.wait_for)
+        yield from self._carry(movement.load)
+        yield Tell(index, Event.STARTED)
         if movement.is_pause:
-            yield Tell(index, Event.STARTED)
             pause = Pause(movement, self._settings)
             note = yield from pause.run()
             if pause.restarted:
                 self._carried = ""  # the controller has started anew
         else:
             assert movement.trajectory is not None  # checked with the program
-            yield from self._carry(movement.load)
-            yield Tell(index, Event.STARTED)
             yield Phase("moving")
             need((yield Drive(movement.trajectory)))
         yield from self._carry(load_after(movement))

@@ -111,7 +111,7 @@ class Client:
         self,
         action: str,
         goal: Any,
-        feedback: Callable[[Any], None] | None = None,
+        feedback: Callable[[Any], object] | None = None,
         timeout: float = float("inf"),
     ) -> Any:
         """Send a goal (a `RunProgram.Goal(...)`) and return its result; Ctrl-C cancels the goal.
@@ -120,7 +120,7 @@ class Client:
         """
         return self._goals.send(action, goal, feedback, self.timeout, timeout, _CANCEL_GRACE)
 
-    def subscribe(self, topic: str, message_type: Any, callback: Callable[[Any], None]) -> None:
+    def subscribe(self, topic: str, message_type: Any, callback: Callable[[Any], object]) -> None:
         """Call back on the spinning thread for each message; the quality of service fits the publishers."""
         qos = self.graph.qos_of_publishers(topic)
         self._executor.run(lambda: self.node.create_subscription(message_type, topic, callback, qos))
@@ -153,7 +153,7 @@ class Client:
         stations: Sequence[str] = (),
         cycle_time: float = 0.0,
         options: PlanOptions | None = None,
-        progress: Callable[[Plan.Feedback], None] | None = None,
+        progress: Callable[[Plan.Feedback], object] | None = None,
         timeout: float = 600.0,
     ) -> ProgramPlan:
         """Plan a program over stations (none: the cell's own); progress gets the action's feedback."""
@@ -171,7 +171,7 @@ class Client:
     def run_program(
         self,
         program_id: str,
-        progress: Callable[[RunProgram.Feedback], None] | None = None,
+        progress: Callable[[RunProgram.Feedback], object] | None = None,
         timeout: float = float("inf"),
     ) -> ProgramRun:
         """Run a planned program; progress gets the action's feedback."""
@@ -182,7 +182,7 @@ class Client:
     def execute(
         self,
         trajectory: JointTrajectory,
-        feedback: Callable[[ExecuteTrajectory.Feedback], None] | None = None,
+        feedback: Callable[[ExecuteTrajectory.Feedback], object] | None = None,
         timeout: float = float("inf"),
     ) -> Execution:
         """Drive a trajectory; RequestRefusedError with the driver's code and sentence when it was aborted."""

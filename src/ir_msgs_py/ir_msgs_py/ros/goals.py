@@ -27,7 +27,7 @@ class GoalSender:
         self,
         action: str,
         goal: Any,
-        feedback: Callable[[Any], None] | None,
+        feedback: Callable[[Any], object] | None,
         response_timeout: float,
         result_timeout: float,
         cancel_grace: float,
