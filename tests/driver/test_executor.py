@@ -1,4 +1,4 @@
-"""Execution as a table of sample times; scaling, hold, stop and replacement stay on the path and within the limits."""
+"""Execution as a table of sample times; scaling, hold, stop and replacement keep path and limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state machine of the power modes: every transition takes its time, and none happens that isn't in the table."""
+"""The power modes: every transition takes its time, and none happens that isn't in the table."""
 
 from __future__ import annotations
 

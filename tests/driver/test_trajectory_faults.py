@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -237,7 +239,7 @@ def test_no_trajectory_brings_the_driver_down(make, start, cell, data, fuzzed):
     times = np.cumsum([data.draw(st.sampled_from([0.0, 1e-9, 0.3, 3.0])) for _ in range(count)])
     shape = data.draw(st.sampled_from(["linear", "cubic", "quintic"]))
     rest = np.zeros((count, 6))
-    try:
+    with contextlib.suppress(TrajectoryError, TrajectoryRefusedError):
         trajectory = JointTrajectory.from_seconds(
             cell.robot.joint_names,
             times,
@@ -246,8 +248,6 @@ def test_no_trajectory_brings_the_driver_down(make, start, cell, data, fuzzed):
             rest if shape == "quintic" else None,
         )
         start(simulation, trajectory)
-    except (TrajectoryError, TrajectoryRefusedError) as error:
-        assert str(error)
     before = simulation.backend.q
     simulation.run(data.draw(st.sampled_from([0.01, 0.5])))
     assert np.isfinite(simulation.backend.q).all()

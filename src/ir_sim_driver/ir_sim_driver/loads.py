@@ -90,19 +90,6 @@ def custom_load(
     return Carried(CUSTOM, (load,))
 
 
-def combined(loads: tuple[Load, ...]) -> Load | None:
-    """One load with mass, centre of mass and inertia of all."""
-    if len(loads) < 2:
-        return loads[0] if loads else None
-    mass = sum(load.mass for load in loads)
-    com = np.sum([load.mass * np.array(load.com) for load in loads], axis=0) / mass
-    inertia = np.zeros((3, 3))
-    for load in loads:
-        arm = np.array(load.com) - com
-        inertia += load.inertia + load.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return Load(LOAD_SEPARATOR.join(load.name for load in loads), "tool", float(mass), com, inertia)
-
-
 def _within_payload(what: Carried, robot: Any) -> Carried:
     if what.mass > robot.rated_payload:
         raise RequestRefusedError(

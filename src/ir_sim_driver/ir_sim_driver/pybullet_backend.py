@@ -46,7 +46,7 @@ class PyBulletBackend:
         # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no base pose
         self._base: Array = np.eye(4) if base_pose is None else np.array(base_pose)
         self._gravity = (self._base[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
-        self._bullet, self._client = _connect(dt, self._gravity)
+        self._bullet, self._client = _pybullet(), -1
         self._robot, self._dt, self._urdf = robot, dt, urdf
         self._n = len(robot.joint_names)
         self._drives = Drivetrain(robot)
@@ -63,7 +63,6 @@ class PyBulletBackend:
         self._torques: list[Array] = []
         self._loads: tuple[Any, ...] = ()
         self._stale = False  # whether Bullet's state is older than ours
-        self._body = -1
         self.set_load(())
         self.reset(self.q)
 
@@ -74,8 +73,6 @@ class PyBulletBackend:
     def reset(self, q: Array) -> None:
         """Stand still at q; starts the physics server again when it is gone."""
         if not self._bullet.isConnected(self._client):
-            self._bullet, self._client = _connect(self._dt, self._gravity)
-            self._body = -1
             self.set_load(self._loads)
         self.q, self.qd, self._speed = np.array(q, dtype=np.float64), self._still, self._still
         self._follower.reset(self.q)
@@ -85,9 +82,11 @@ class PyBulletBackend:
         """Rebuild the robot with these loads, in the same motion."""
         self._loads = tuple(loads)
         text = self._urdf(self._robot, self._loads)
-        bullet, client = self._bullet, self._client
-        if self._body >= 0:
-            bullet.removeBody(self._body, physicsClientId=client)
+        bullet = self._bullet
+        # a new server: the inverse dynamics of a removed body live on in the old one
+        if bullet.isConnected(self._client):
+            bullet.disconnect(physicsClientId=self._client)
+        self._client = client = _connect(bullet, self._dt, self._gravity)
         with tempfile.TemporaryDirectory(prefix="ir_sim_driver_") as folder:
             path = Path(folder) / "robot.urdf"
             path.write_text(text, encoding="utf-8")
@@ -159,7 +158,7 @@ class PyBulletBackend:
 
     def mass_matrix(self) -> Array:
         """H (n, n) at the present state, without rotor inertia."""
-        H = self._bullet.calculateMassMatrix(self._body, self.q.tolist(), physicsClientId=self._client)
+        H = self._call(self._bullet.calculateMassMatrix, self._body, self.q.tolist())
         return np.array(H, dtype=np.float64)
 
     def bias(self) -> Array:
@@ -187,23 +186,32 @@ class PyBulletBackend:
         return H @ qdd + h, qdd
 
     def _inverse_dynamics(self, qdd: Array) -> Array:
-        result = self._bullet.calculateInverseDynamics(
-            self._body, self.q.tolist(), self._speed.tolist(), qdd.tolist(), physicsClientId=self._client
+        result = self._call(
+            self._bullet.calculateInverseDynamics,
+            self._body,
+            self.q.tolist(),
+            self._speed.tolist(),
+            qdd.tolist(),
         )
-        if len(result) != self._n:
-            raise BackendError("PyBullet gives no inverse dynamics: the physics server is gone")
         return np.array(result)
 
-    def _advance(self, links: Array) -> None:
-        bullet, client = self._bullet, self._client
+    def _call(self, function: Any, *arguments: Any, **more: Any) -> Any:
         try:
-            bullet.setJointMotorControlArray(
-                self._body, self._joints, bullet.TORQUE_CONTROL, forces=links.tolist(), physicsClientId=client
-            )
-            bullet.stepSimulation(physicsClientId=client)
-            states = bullet.getJointStates(self._body, self._joints, physicsClientId=client)
-        except bullet.error as error:
+            return function(*arguments, physicsClientId=self._client, **more)
+        except self._bullet.error as error:
             raise BackendError(f"PyBullet failed: {error}") from error
+
+    def _advance(self, links: Array) -> None:
+        bullet, call = self._bullet, self._call
+        call(
+            bullet.setJointMotorControlArray,
+            self._body,
+            self._joints,
+            bullet.TORQUE_CONTROL,
+            forces=links.tolist(),
+        )
+        call(bullet.stepSimulation)
+        states = call(bullet.getJointStates, self._body, self._joints)
         before = self._speed
         q = np.array([state[0] for state in states])
         speed = np.array([state[1] for state in states])
@@ -219,7 +227,7 @@ class PyBulletBackend:
     def _write_state(self) -> None:
         self._stale = False
         for joint, q, speed in zip(self._joints, self.q.tolist(), self._speed.tolist(), strict=True):
-            self._bullet.resetJointState(self._body, joint, q, speed, physicsClientId=self._client)
+            self._call(self._bullet.resetJointState, self._body, joint, q, speed)
 
     def _movable_joints(self) -> list[int]:
         by_name = {}
@@ -229,14 +237,18 @@ class PyBulletBackend:
         return [by_name[name] for name in self._robot.joint_names]
 
 
-def _connect(dt: float, gravity: list[float]) -> tuple[Any, int]:
+def _pybullet() -> Any:
     try:
         import pybullet  # a missing PyBullet is reported when it is wanted
     except ImportError as error:
         raise BackendError(f"PyBullet is not installed ({error}): use backend ideal") from error
-    client = pybullet.connect(pybullet.DIRECT)
+    return pybullet
+
+
+def _connect(bullet: Any, dt: float, gravity: list[float]) -> int:
+    client = int(bullet.connect(bullet.DIRECT))
     if client < 0:
         raise BackendError("PyBullet offers no physics server")
-    pybullet.setGravity(*gravity, physicsClientId=client)
-    pybullet.setTimeStep(dt, physicsClientId=client)
-    return pybullet, client
+    bullet.setGravity(*gravity, physicsClientId=client)
+    bullet.setTimeStep(dt, physicsClientId=client)
+    return client

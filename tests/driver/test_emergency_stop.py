@@ -1,0 +1,155 @@
+"""Emergency stop: stops at once, says how far off the path, and nothing resumes or jumps afterwards."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ir_msgs_py.power import Mode
+from ir_sim_driver.diagnostics import report
+from ir_sim_driver.errors import BackendError, RequestRefusedError
+from ir_sim_driver.goal import ErrorCode
+
+
+@pytest.fixture
+def home(cell):
+    return np.array(cell.machine_home)
+
+
+@pytest.fixture
+def stopped(make, plan, start, home):
+    """A simulation that was stopped in the middle of a fast movement, the button still pressed."""
+    simulation = make("pybullet")
+    there = home + np.array([1.2, 0.4, -0.4, 0.8, -0.5, 1.0])
+    start(simulation, plan(2.5, home, there))
+    simulation.run(1.25)
+    simulation.plc.set_bit("emergency_stop", True)
+    return simulation
+
+
+def test_the_robot_stops_faster_than_along_the_path_and_the_goal_ends(stopped):
+    assert np.abs(stopped.backend.qd).max() > 0.5
+    stopped.run(0.002)
+    (outcome,) = stopped.take_outcomes()
+    assert (outcome.code, outcome.sentence) == (ErrorCode.INVALID_GOAL, "emergency stop")
+    stopped.run(0.5)
+    assert np.abs(stopped.backend.qd).max() == 0.0
+    assert stopped.modes.mode is Mode.EMERGENCY_STOP
+
+
+def test_the_distance_from_the_path_is_published(stopped):
+    stopped.run(0.5)
+    assert 1e-5 < stopped.emergency.excursion < 0.05
+    controller = {entry.name: entry for entry in report(stopped, 0.0)}["ir_sim_driver: controller"]
+    assert controller.level == 2
+    told = float(controller.values["emergency stop left the path by [mm]"])
+    assert told == pytest.approx(stopped.emergency.excursion * 1e3, abs=0.01)
+
+
+def test_brakes_take_no_motor_power_and_hold_against_gravity(stopped):
+    stopped.run(0.5)
+    q = stopped.backend.q.copy()
+    before = stopped.meter.reading()
+    stopped.run(1.0)
+    after = stopped.meter.reading()
+    assert np.array_equal(stopped.backend.q, q)
+    assert after.energy - before.energy == pytest.approx(325.0, rel=1e-3)  # Table II, on brakes with 155 kg
+
+
+def test_release_alone_does_nothing_and_recover_needs_it(stopped):
+    stopped.run(0.5)
+    with pytest.raises(RequestRefusedError, match="still pressed"):
+        stopped.recover()
+    stopped.plc.set_bit("emergency_stop", False)
+    stopped.run(5.0)
+    assert stopped.modes.mode is Mode.EMERGENCY_STOP
+    q = stopped.backend.q.copy()
+    assert "nothing resumes" in stopped.recover()
+    stopped.run(2.0)
+    assert stopped.modes.mode is Mode.STAND_ON_MOTORS
+    assert np.abs(stopped.backend.q - q).max() < 1e-9
+    assert not stopped.executor.active
+
+
+def test_a_plc_recovers_by_confirming_and_switching_the_drives_on(stopped):
+    stopped.run(0.5)
+    plc = stopped.plc
+    plc.set_bit("emergency_stop", False)
+    stopped.run(0.1)
+    plc.set_bit("drives_on", True)
+    stopped.run(0.1)
+    plc.set_bit("drives_on", False)
+    stopped.run(0.1)
+    assert stopped.modes.mode is Mode.EMERGENCY_STOP  # not confirmed yet
+    plc.set_bit("conf_mess", True)
+    stopped.run(0.1)
+    plc.set_bit("drives_on", True)
+    stopped.run(1.0)
+    assert stopped.modes.mode is Mode.STAND_ON_MOTORS
+
+
+def test_goals_are_refused_until_recovered_and_run_from_where_the_robot_stands(
+    stopped, plan, start, run_out, home
+):
+    stopped.run(0.5)
+    stopped.plc.set_bit("emergency_stop", False)
+    stopped.run(0.1)
+    back = plan([4.0], home)
+    with pytest.raises(Exception, match="recover first"):
+        start(stopped, back)
+    stopped.recover()
+    stopped.run(1.0)
+    stopped.take_outcomes()
+    start(stopped, back)
+    assert run_out(stopped).code == ErrorCode.SUCCESSFUL
+
+
+def test_pressing_it_at_rest_only_closes_the_brakes(make):
+    simulation = make("pybullet")
+    simulation.run(0.1)
+    q = simulation.backend.q.copy()
+    simulation.plc.set_bit("emergency_stop", True)
+    simulation.run(0.2)
+    assert simulation.modes.mode is Mode.EMERGENCY_STOP
+    assert np.abs(simulation.backend.q - q).max() < 1e-9
+    assert not simulation.outputs().alarm_stop
+
+
+def test_physics_that_fail_stop_the_robot_and_recover_starts_them_again(make, plan, start, home, monkeypatch):
+    simulation = make("pybullet")
+    start(simulation, plan(2.0, home, home + 0.2))
+    simulation.run(0.5)
+
+    def explode(q_next):
+        raise BackendError("the physics has diverged")
+
+    monkeypatch.setattr(simulation.backend, "track", explode)
+    simulation.run(0.1)
+    (outcome,) = simulation.take_outcomes()
+    assert "diverged" in outcome.sentence
+    plant = report(simulation, 0.0)[0]
+    assert (plant.level, plant.sentence) == (2, "the physics has diverged")
+    monkeypatch.undo()
+    q = simulation.backend.q.copy()
+    simulation.recover()
+    simulation.run(2.0)
+    assert simulation.modes.mode is Mode.STAND_ON_MOTORS
+    assert np.abs(simulation.backend.q - q).max() < 1e-9
+
+
+def test_a_lost_physics_server_comes_back_with_recover(make, plan, start, run_out, home):
+    simulation = make("pybullet")
+    simulation.run(0.1)
+    simulation.backend.close()
+    simulation.run(0.1)
+    assert simulation.fault
+    simulation.recover()
+    simulation.run(1.0)
+    start(simulation, plan(2.0, home, home + 0.1))
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+
+
+def test_recovering_from_nothing_is_harmless(make):
+    simulation = make()
+    assert "nothing to recover from" in simulation.recover()
+    simulation.run(0.1)
+    assert simulation.modes.mode is Mode.STAND_ON_MOTORS

@@ -1,0 +1,100 @@
+"""The mains meter: energy is the integral of the power, and adds up from its parts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ir_kernels.power import DcBusParameters, dc_bus
+from ir_msgs_py.power import Mode
+from ir_sim_driver.backend import Work
+from ir_sim_driver.power_meter import BasePower, PowerMeter
+
+from ir_description import load_power_data
+
+DT = 0.001
+
+
+@pytest.fixture
+def meter(cell):
+    return PowerMeter(cell.robot, load_power_data(), DT)
+
+
+def test_the_parts_add_up_to_the_mains(make, plan, start, run_out, cell):
+    simulation = make("pybullet")
+    home = np.array(cell.machine_home)
+    for target in (home + np.array([1.0, 0.4, -0.4, 0.5, 0.3, 0.2]), home):
+        start(simulation, plan(2.5, simulation.executor.command, target))
+        run_out(simulation)
+    simulation.settle_meter()
+    r = simulation.meter.reading()
+    total = r.base_energy + r.axis_energy.sum() + r.burnt_energy + r.capacitor_energy
+    assert r.energy == pytest.approx(total, rel=1e-12)
+    assert r.time == pytest.approx(simulation.time)
+    assert r.burnt_energy >= 0.0
+
+
+def test_batches_of_any_length_read_the_same(meter, cell):
+    generator = np.random.default_rng(1)
+    speed, torque = generator.normal(0.0, 1.0, (200, 6)), generator.normal(0.0, 500.0, (200, 6))
+    other = PowerMeter(cell.robot, load_power_data(), DT)
+    for k in range(200):
+        meter.add(300.0)
+        meter.settle(Work(speed[k : k + 1], torque[k : k + 1]))
+        other.add(300.0)
+    other.settle(Work(speed, torque))
+    assert meter.reading().energy == pytest.approx(other.reading().energy, rel=1e-12)
+    power = torque * speed + cell.robot.copper_loss * (torque / cell.robot.gear_ratio) ** 2
+    bus = dc_bus(power, DT, DcBusParameters(load_power_data().dc_link_capacity_energy))
+    assert other.reading().energy == pytest.approx(DT * (300.0 * 200 + bus.mains.sum()), rel=1e-12)
+
+
+def test_braking_lifts_the_bus_voltage_up_to_the_chopper(meter):
+    data = load_power_data()
+    speed, torque = np.full((500, 6), 1.0), np.full((500, 6), -500.0)
+    assert meter.reading().bus_voltage == pytest.approx(data.dc_link.voltage)
+    for _ in range(500):
+        meter.add(0.0)
+    meter.settle(Work(speed, torque))
+    reading = meter.reading()
+    assert reading.bus_voltage == pytest.approx(data.dc_link.chopper_on, rel=1e-6)
+    assert reading.energy == 0.0
+    assert reading.burnt_energy > 100.0
+
+
+def test_watts_of_the_tool_don_t_grow_with_a_part(make):
+    simulation = make()
+    assert simulation.base.of(Mode.HIBERNATION) == pytest.approx(105.0)
+    assert simulation.base.of(Mode.STAND_ON_BRAKES) == pytest.approx(325.0)
+
+
+def test_base_power_follows_the_level():
+    base = BasePower(load_power_data())
+    base.set_tool(90.0, 100.0)
+    watts = [
+        base.of(Mode[mode]) for mode in ("HIBERNATION", "BUS_POWER_OFF", "STAND_ON_BRAKES", "STAND_ON_MOTORS")
+    ]
+    assert watts == pytest.approx([105.0, 205.0, 325.0, 602.16])
+
+
+def test_ways_in_cost_the_mode_that_is_left_and_ways_out_stand_on_motors(make):
+    simulation = make(load="none")
+    simulation.run(0.01)
+
+    def mean_power(seconds):
+        simulation.settle_meter()
+        before = simulation.meter.reading()
+        simulation.run(seconds)
+        simulation.settle_meter()
+        after = simulation.meter.reading()
+        return (after.energy - before.energy) / (after.time - before.time)
+
+    simulation.plc.set_bit("ab", True)
+    simulation.run(0.1)
+    assert simulation.modes.mode is Mode.TO_BUS_POWER_OFF
+    assert mean_power(2.0) == pytest.approx(420.0, rel=1e-3)
+    simulation.run(3.0)
+    assert mean_power(1.0) == pytest.approx(115.0, rel=1e-3)
+    simulation.plc.set_bit("ab", False)
+    simulation.run(1.0)
+    assert simulation.modes.mode is Mode.FROM_BUS_POWER_OFF
+    assert mean_power(2.0) == pytest.approx(420.0, rel=1e-3)
