@@ -1,0 +1,71 @@
+"""Cells, scenes and budgets that the planner's tests share; scenes are immutable, so one per session will do."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from ir_description import Cell, PowerData, load_cell, load_power_data
+from ir_msgs_py.options import PlanOptions
+from ir_planner.budget import Budget
+from ir_planner.goals import Goal
+from ir_planner.planner import Planner
+from ir_planner.scene import PlanningScene, load_text, scene_with
+
+
+@pytest.fixture(scope="session")
+def power() -> PowerData:
+    return load_power_data()
+
+
+@pytest.fixture(scope="session")
+def demo_cell() -> Cell:
+    return load_cell("demo")
+
+
+@pytest.fixture(scope="session")
+def demo_scene(demo_cell: Cell, power: PowerData) -> PlanningScene:
+    """The demonstration cell with the gripper (155 kg)."""
+    return scene_with(demo_cell, load_text(demo_cell), power)
+
+
+@pytest.fixture(scope="session")
+def scene_of(power: PowerData) -> Callable[[str], PlanningScene]:
+    """Scene of a bundled cell with its tool."""
+
+    def build(name: str) -> PlanningScene:
+        cell = load_cell(name)
+        return scene_with(cell, load_text(cell), power)
+
+    return build
+
+
+@pytest.fixture
+def budget() -> Budget:
+    return Budget(60_000, time.monotonic() + 60.0, time.monotonic)
+
+
+@pytest.fixture
+def planner(demo_cell: Cell, power: PowerData) -> Planner:
+    planner = Planner(time.monotonic, power=power)
+    planner.set_cell("", "demo")
+    return planner
+
+
+@pytest.fixture(scope="session")
+def options() -> PlanOptions:
+    return PlanOptions(planning_time=60.0)
+
+
+@pytest.fixture(scope="session")
+def degrees() -> Callable[..., Any]:
+    """Joint values in rad from degrees."""
+    return lambda *angles: np.radians(np.array(angles, dtype=float))
+
+
+@pytest.fixture(scope="session")
+def to_configuration() -> Callable[..., Goal]:
+    return lambda q: Goal(configuration=np.asarray(q))

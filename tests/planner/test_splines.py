@@ -1,0 +1,84 @@
+"""Eq. (10): conditions at the ends, continuity at the joints, and the same curve from either way of solving."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ir_planner.splines import (
+    end_state,
+    first_segment,
+    last_segment,
+    middle_segment,
+    spline_through,
+    to_ppoly,
+    virtual_knots,
+)
+
+number = st.floats(-3.0, 3.0)
+duration = st.floats(0.05, 4.0)
+
+
+@given(number, number, number, number, duration)
+def test_the_last_segment_meets_its_end_conditions(
+    q0: float, qf: float, vf: float, af: float, t: float
+) -> None:
+    """With a_f t_n / 2 as printed the conditions fail; with a_f t_n^2 / 2 they hold."""
+    c = last_segment(q0, qf, vf, af, t)
+    assert c[0] == q0
+    assert end_state(c, t) == pytest.approx((qf, vf, af), abs=1e-7 / t**2)
+    printed = c.copy()
+    printed[1] += af * t / 2 - af * t**2 / 2
+    if abs(af * t * (1.0 - t)) > 1e-3:
+        assert end_state(printed, t)[0] != pytest.approx(qf, abs=1e-6)
+
+
+@given(number, number, number, number, duration)
+def test_the_first_segment_meets_its_start_conditions(
+    q0: float, q1: float, v0: float, a0: float, t: float
+) -> None:
+    c = first_segment(q0, q1, v0, a0, t)
+    assert (c[0], c[1] / t, 2 * c[2] / t**2) == pytest.approx((q0, v0, a0), abs=1e-9)
+    assert end_state(c, t)[0] == pytest.approx(q1, abs=1e-9)
+
+
+def test_five_cubics_of_the_equation_are_the_spline() -> None:
+    """First, three middle and last segment in normalised time give the curve that the solver gives."""
+    points = np.array([[0.2], [0.5], [-0.4], [1.1]])
+    times = np.array([0.0, 0.8, 1.5, 2.6])
+    start, end = (np.array([0.3]), np.array([-0.5])), (np.array([0.1]), np.array([0.7]))
+    knots = virtual_knots(times)
+    spline = spline_through(points, times, knots, start, end)
+    q = spline.positions[:, 0]
+    t = np.diff(knots)
+    state = (0.3, -0.5)
+    for k in range(4):
+        build = first_segment if k == 0 else middle_segment
+        segment = build(q[k], q[k + 1], *state, t[k])
+        _, *state_after = end_state(segment, t[k])
+        state = (state_after[0], state_after[1])
+        assert state == pytest.approx((spline.velocities[k + 1, 0], spline.accelerations[k + 1, 0]), abs=1e-9)
+    last = last_segment(q[4], q[5], 0.1, 0.7, t[4])
+    assert last[1] / t[4] == pytest.approx(state[0], abs=1e-9)
+    assert 2 * last[2] / t[4] ** 2 == pytest.approx(state[1], abs=1e-8)
+
+
+@given(st.integers(3, 12), st.integers(0, 10_000))
+def test_many_points_are_passed_at_rest_at_both_ends_and_c2(count: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1.0, 1.0, (count, 3))
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.5, count - 1))])
+    spline = spline_through(points, times, virtual_knots(times))
+    curve = to_ppoly(spline)
+    assert curve(times) == pytest.approx(points, abs=1e-8)
+    for order in (1, 2):
+        assert curve(times[[0, -1]], order) == pytest.approx(np.zeros((2, 3)), abs=1e-7)
+    inner = spline.times[1:-1]
+    for order in (0, 1, 2):
+        assert curve(inner - 1e-12, order) == pytest.approx(curve(inner + 1e-12, order), abs=1e-7)
+
+
+def test_times_that_do_not_increase_are_refused() -> None:
+    with pytest.raises(ValueError, match="increase"):
+        spline_through(np.zeros((3, 1)), np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.5, 1.0, 1.0, 1.0]))
