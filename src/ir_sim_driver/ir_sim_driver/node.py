@@ -71,16 +71,15 @@ class SimDriver(Node):
 
     def __init__(self, simulation: Simulation | None = None, **node_options: Any) -> None:
         super().__init__(names.SIM_DRIVER, **node_options)
-        self._parameters = DriverParameters(self, self._change_refusal, self._execution_changed)
-        options = self._parameters.node
+        self._configuration = DriverParameters(self, self._change_refusal, self._execution_changed)
+        options = self._configuration.node
         self._simulation = simulation or make_simulation(
-            options.cell, options.load, options.backend, self._parameters.simulation
+            options.cell, options.load, options.backend, self._configuration.simulation
         )
         self._joint_names = list(self._simulation.robot.joint_names)
         steps = round(1.0 / (options.joint_state_rate * self._simulation.settings.dt))
         self._driver = Driver(self._simulation, steps)
         self._goals: dict[bytes, int] = {}
-        self._rates = (0, 0)
         self._frame: Frame | None = None
         self._open_topics()
         self._open_requests()
@@ -141,7 +140,7 @@ class SimDriver(Node):
             cancel_callback=self._cancel,
         )
         answers = Services(
-            self._driver, self.get_name(), self._parameters.node.mac, self._publish_description
+            self._driver, self.get_name(), self._configuration.node.mac, self._publish_description
         )
         self.create_service(SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input)
         self.create_service(StartPause, names.START_PAUSE, answers.start_pause)

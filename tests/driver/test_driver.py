@@ -1,0 +1,133 @@
+"""The running simulation without ROS: frames, goals checked beside it, outcomes to their senders."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+from ir_msgs_py.power import Mode
+from ir_sim_driver.driver import NO_GOAL, QUEUE_MAX, Driver
+from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.goal import ErrorCode, TrajectoryGoal
+from ir_sim_driver.power_modes import TransitionSettings
+from ir_sim_driver.simulation_settings import ControllerSettings
+
+PERIOD = 2_000_000
+
+
+@pytest.fixture
+def driver(make):
+    driver = Driver(make())
+    yield driver
+    driver.close()
+
+
+def frames(driver, count, first=1):
+    return [driver.tick((first + k) * PERIOD) for k in range(count)]
+
+
+def test_frames_carry_what_is_due(driver):
+    got = frames(driver, 500)
+    assert all(frame.q is not None for frame in got)
+    assert sum(frame.power is not None for frame in got) == 100
+    assert sum(frame.following is not None for frame in got) == 50
+    assert sum(frame.outputs is not None for frame in got) == 1  # outputs only when they change
+
+
+def test_power_is_the_mean_since_the_last_frame(driver, plan, cell):
+    home = np.array(cell.machine_home)
+    started = threading.Event()
+    goal = TrajectoryGoal(plan(1.5, home, home + 0.1))
+    driver.submit(lambda: goal, lambda goal_id: started.set(), lambda outcome: None)
+    assert started.wait(10.0)
+    powers = [frame.power for frame in frames(driver, 500) if frame.power is not None]
+    energy = np.array([power.energy for power in powers])
+    mean = np.array([power.power for power in powers])
+    assert np.allclose(np.diff(energy), mean[1:] * 0.01, rtol=1e-9)
+    assert len(set(np.round(mean, 3))) > 5
+
+
+def test_a_sleeping_controller_leaves_only_the_meter(make):
+    driver = Driver(make(controller=ControllerSettings(start_mode="HIBERNATION")))
+    got = frames(driver, 50)
+    assert all(frame.q is None and frame.following is None for frame in got)
+    powers = [frame.power for frame in got if frame.power is not None]
+    assert len(powers) == 10
+    assert powers[-1].mode is Mode.HIBERNATION
+    assert not got[-1].outputs or not got[-1].outputs.bbs
+    driver.close()
+
+
+def test_outcomes_reach_the_sender_of_their_goal(driver, plan, cell):
+    home = np.array(cell.machine_home)
+    ids, outcomes = [], []
+    for target in (home + 0.05, home - 0.05):
+        goal = TrajectoryGoal(plan([1.5], target))
+        started = threading.Event()
+        driver.submit(lambda goal=goal: goal, lambda i, s=started: (ids.append(i), s.set()), outcomes.append)
+        assert started.wait(10.0)
+        frames(driver, 100)
+    frames(driver, 800)
+    assert [outcome.goal_id for outcome in outcomes] == ids
+    assert [outcome.code for outcome in outcomes] == [ErrorCode.INVALID_GOAL, ErrorCode.SUCCESSFUL]
+
+
+def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
+    heard = []
+    done = threading.Event()
+
+    def refuse():
+        raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, "no such joint")
+
+    def ended(outcome):
+        heard.append(outcome)
+        done.set()
+
+    driver.submit(refuse, lambda goal_id: None, ended)
+    assert done.wait(10.0)
+    assert (heard[0].goal_id, heard[0].code, heard[0].sentence) == (
+        NO_GOAL,
+        ErrorCode.INVALID_JOINTS,
+        "no such joint",
+    )
+
+
+def test_a_flood_of_goals_is_bounded(driver):
+    release, answers = threading.Event(), []
+
+    def slow():
+        release.wait(10.0)
+        raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
+
+    for _ in range(QUEUE_MAX + 20):
+        driver.submit(slow, lambda goal_id: None, answers.append)
+    assert len(answers) == 20
+    assert all("send fewer" in answer.sentence for answer in answers)
+    release.set()
+
+
+def test_a_check_does_not_hold_up_the_plant(driver):
+    blocking, release = threading.Event(), threading.Event()
+
+    def slow():
+        blocking.set()
+        release.wait(10.0)
+        raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
+
+    driver.submit(slow, lambda goal_id: None, lambda outcome: None)
+    assert blocking.wait(10.0)
+    assert len(frames(driver, 100)) == 100
+    release.set()
+
+
+def test_energy_is_the_integral_of_the_published_power(make):
+    driver = Driver(make(transitions=TransitionSettings(motors_to_brakes_in_program=5.0)), steps=20)
+    total = 0.0
+    for k in range(1, 1500):
+        frame = driver.tick(k * 10 * PERIOD)
+        if frame.power is not None:
+            total += frame.power.power * 0.02
+            last = frame.power.energy
+    assert total == pytest.approx(last, rel=1e-9)
+    driver.close()
