@@ -46,7 +46,7 @@ parts:
     com: [0.0, 0.0, 0.0]
     inertia_box: [0.1, 0.3, 0.1]
     capsules: [{name: p_body, p0: [0, -0.1, 0], p1: [0, 0.1, 0], radius: 0.06}]
-    bodies: [{name: part_box, kind: box, size: [0.1, 0.3, 0.1]}]
+    bodies: [{name: part_box, kind: box, size: [0.1, 0.22, 0.1]}]
     station: table
 equipment:
   - name: table

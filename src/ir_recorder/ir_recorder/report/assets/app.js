@@ -1,0 +1,89 @@
+"use strict";
+/* Puts the page together: one timeline, two charts, one picture. */
+(() => {
+  const find = (id) => document.getElementById(id);
+  const data = JSON.parse(find("data").textContent);
+  const timeline = new Timeline(data.end);
+  const power = new PowerChart(find("power"), timeline, find("tip"), data);
+  const clearance = new ClearanceChart(find("clearance"), timeline, find("tip"), data);
+  let motion = null;
+  if (data.scene) {
+    motion = new Motion(find("view"), timeline, data.scene);
+    find("trail-max").textContent = `${motion.mostPower} W`;
+  } else {
+    find("no-motion").hidden = false;
+    find("trail-legend").hidden = true;
+  }
+
+  /* playing */
+  let playing = false, last = 0;
+  const play = (on) => {
+    playing = on;
+    find("play").textContent = on ? "❚❚" : "▶";
+    find("play").setAttribute("aria-label", on ? "pause" : "play");
+    if (on) {
+      if (timeline.now >= timeline.end - 1e-6) timeline.seek(0);
+      last = performance.now();
+      requestAnimationFrame(step);
+    }
+  };
+  const step = (now) => {
+    if (!playing) return;
+    timeline.seek(timeline.now + (now - last) / 1000 * Number(find("speed").value));
+    last = now;
+    if (timeline.now >= timeline.end - 1e-6) play(false); else requestAnimationFrame(step);
+  };
+  find("play").addEventListener("click", () => play(!playing));
+  find("seek").max = timeline.end;
+  find("seek").addEventListener("input", () => { play(false); timeline.seek(Number(find("seek").value)); });
+  document.addEventListener("keydown", (e) => {
+    if (e.code === "Space" && !/BUTTON|INPUT|SELECT|SUMMARY/.test(e.target.tagName)) { e.preventDefault(); play(!playing); }
+  });
+  for (const button of document.querySelectorAll("button.go")) {
+    button.addEventListener("click", () => {
+      timeline.seek(Number(button.dataset.time));
+      find("motion").scrollIntoView({ behavior: "smooth" });
+      play(true);
+    });
+  }
+
+  /* what is written over the picture */
+  const rows = () => {
+    const now = timeline.now, said = motion ? motion.describe() : { load: "", nearest: "" };
+    return [["time", `${now.toFixed(2)} s`], ["power", Number.isFinite(power.at(now)) ? `${Math.round(power.at(now))} W` : ""],
+      ["mode", power.inLane("mode", now)], ["step", power.inLane("program", now)], ["load", said.load], ["nearest", said.nearest]];
+  };
+  timeline.onChange(() => {
+    find("seek").value = timeline.now;
+    find("clock").textContent = `${timeline.now.toFixed(2)} s`;
+    const hud = find("hud");
+    hud.textContent = "";
+    for (const [name, value] of rows()) {
+      if (!value) continue;
+      const label = document.createElement("span"), content = document.createElement("b");
+      label.textContent = name;
+      content.textContent = value;
+      hud.append(label, content);
+    }
+  });
+
+  if (motion) {
+    for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => motion.look(button.dataset.view));
+    for (const name of ["zones", "trail", "nearest"]) {
+      find(`show-${name}`).addEventListener("change", (e) => { motion.show[name] = e.target.checked; motion.schedule(); });
+    }
+  }
+
+  /* light and dark */
+  const repaint = () => { power.schedule(); clearance.schedule(); if (motion) motion.recolour(); };
+  find("theme").addEventListener("click", () => {
+    const root = document.documentElement;
+    const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+    root.dataset.theme = dark ? "light" : "dark";
+    repaint();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+
+  const wanted = /[#&]t=([\d.]+)/.exec(location.hash);
+  timeline.seek(wanted ? Number(wanted[1]) : 0);
+})();

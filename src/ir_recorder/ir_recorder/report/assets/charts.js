@@ -1,0 +1,311 @@
+"use strict";
+/* Numbers out of base64, and time charts that share one zoom and one cursor. */
+
+function bytes(text) {
+  const raw = atob(text), out = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) out[i] = raw.charCodeAt(i);
+  return out.buffer;
+}
+const floats = (text) => new Float32Array(bytes(text));
+const shorts = (text) => new Int16Array(bytes(text));
+const words = (text) => new Uint16Array(bytes(text));
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+/* Index of the last element that is not beyond `value`, 0 at least. */
+function floorIndex(times, value) {
+  let low = 0, high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= value) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+/* Time shown by everything, and the part of it that the charts show. */
+class Timeline {
+  constructor(end) {
+    this.end = Math.max(end, 1e-3);
+    this.now = 0;
+    this.from = 0;
+    this.to = this.end;
+    this.listeners = [];
+  }
+  onChange(listener) { this.listeners.push(listener); }
+  seek(time) { this.now = Math.min(Math.max(time, 0), this.end); this.tell(); }
+  zoom(from, to) {
+    const least = Math.min(0.05, this.end);
+    this.from = Math.max(0, Math.min(from, to - least));
+    this.to = Math.min(this.end, Math.max(to, this.from + least));
+    this.tell();
+  }
+  tell() { for (const listener of this.listeners) listener(); }
+}
+
+const MODE_STYLE = /^m-/;
+function spanColour(style) {
+  if (MODE_STYLE.test(style)) return css(`--${style}`) || css("--m-transition");
+  const colours = { pause: "--m-transition", regional: "--a1", service_entry: "--a2", service_exit: "--a5", load: "--part",
+    none: "--line", bit: "--accent" };
+  return css(colours[style] || "--a1");
+}
+
+class TimeChart {
+  constructor(canvas, timeline, tip) {
+    this.canvas = canvas;
+    this.timeline = timeline;
+    this.tip = tip;
+    this.left = 96;
+    this.right = 14;
+    this.bottom = 24;
+    this.drag = null;
+    timeline.onChange(() => this.schedule());
+    new ResizeObserver(() => this.schedule()).observe(canvas);
+    canvas.addEventListener("pointerdown", (e) => this.down(e));
+    canvas.addEventListener("pointermove", (e) => this.move(e));
+    canvas.addEventListener("pointerup", (e) => this.up(e));
+    canvas.addEventListener("pointerleave", () => { this.tip.hidden = true; });
+    canvas.addEventListener("dblclick", () => timeline.zoom(0, timeline.end));
+    canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+  }
+  schedule() {
+    if (this.pending) return;
+    this.pending = requestAnimationFrame(() => { this.pending = 0; this.draw(); });
+  }
+  x(time) { return this.left + (time - this.timeline.from) / (this.timeline.to - this.timeline.from) * (this.width - this.left - this.right); }
+  time(x) { return this.timeline.from + (x - this.left) / (this.width - this.left - this.right) * (this.timeline.to - this.timeline.from); }
+  position(event) { return event.clientX - this.canvas.getBoundingClientRect().left; }
+  down(event) {
+    this.drag = { start: this.position(event), now: this.position(event) };
+    this.canvas.setPointerCapture(event.pointerId);
+  }
+  move(event) {
+    const x = this.position(event);
+    if (this.drag) { this.drag.now = x; this.schedule(); }
+    const words = x >= this.left && x <= this.width - this.right ? this.describe(this.time(x)) : "";
+    this.tip.hidden = !words;
+    this.tip.textContent = words;
+    this.tip.style.left = `${Math.min(event.clientX + 14, innerWidth - this.tip.offsetWidth - 8)}px`;
+    this.tip.style.top = `${event.clientY + 16}px`;
+  }
+  up() {
+    const drag = this.drag;
+    this.drag = null;
+    if (!drag) return;
+    if (Math.abs(drag.now - drag.start) < 5) this.timeline.seek(this.time(drag.start));
+    else this.timeline.zoom(this.time(Math.min(drag.start, drag.now)), this.time(Math.max(drag.start, drag.now)));
+    this.schedule();
+  }
+  wheel(event) {
+    if (!event.ctrlKey && !event.metaKey) return;
+    event.preventDefault();
+    const centre = this.time(this.position(event)), factor = Math.exp(event.deltaY * 0.002);
+    this.timeline.zoom(centre - (centre - this.timeline.from) * factor, centre + (this.timeline.to - centre) * factor);
+  }
+  begin() {
+    const scale = window.devicePixelRatio || 1, box = this.canvas.getBoundingClientRect();
+    this.width = box.width;
+    this.height = box.height;
+    if (this.canvas.width !== Math.round(box.width * scale)) this.canvas.width = Math.round(box.width * scale);
+    if (this.canvas.height !== Math.round(box.height * scale)) this.canvas.height = Math.round(box.height * scale);
+    const g = this.canvas.getContext("2d");
+    g.setTransform(scale, 0, 0, scale, 0, 0);
+    g.clearRect(0, 0, this.width, this.height);
+    g.font = `12px ${getComputedStyle(document.body).fontFamily}`;
+    g.textBaseline = "middle";
+    return g;
+  }
+  timeAxis(g) {
+    const step = tickStep((this.timeline.to - this.timeline.from) / 8);
+    g.strokeStyle = css("--line");
+    g.fillStyle = css("--soft");
+    g.textAlign = "center";
+    for (let t = Math.ceil(this.timeline.from / step) * step; t <= this.timeline.to + 1e-9; t += step) {
+      line(g, this.x(t), this.top, this.x(t), this.height - this.bottom);
+      g.fillText(`${+t.toFixed(3)} s`, this.x(t), this.height - this.bottom / 2 + 2);
+    }
+  }
+  valueAxis(g, low, high, unit, y) {
+    const step = tickStep((high - low) / 5);
+    g.textAlign = "right";
+    for (let v = Math.ceil(low / step) * step; v <= high + 1e-9; v += step) {
+      g.strokeStyle = css("--line");
+      line(g, this.left, y(v), this.width - this.right, y(v));
+      g.fillStyle = css("--soft");
+      g.fillText(`${+v.toFixed(6)} ${unit}`, this.left - 8, y(v));
+    }
+  }
+  cursor(g) {
+    const x = this.x(this.timeline.now);
+    if (x >= this.left - 1 && x <= this.width - this.right + 1) {
+      g.strokeStyle = css("--accent");
+      g.lineWidth = 1.5;
+      line(g, x, 0, x, this.height - this.bottom);
+      g.lineWidth = 1;
+    }
+    if (this.drag && Math.abs(this.drag.now - this.drag.start) >= 5) {
+      g.globalAlpha = 0.18;
+      g.fillStyle = css("--accent");
+      g.fillRect(Math.min(this.drag.start, this.drag.now), 0, Math.abs(this.drag.now - this.drag.start), this.height - this.bottom);
+      g.globalAlpha = 1;
+    }
+  }
+  /* Clips what follows to the plot. */
+  plot(g) {
+    g.save();
+    g.beginPath();
+    g.rect(this.left, 0, this.width - this.left - this.right, this.height - this.bottom);
+    g.clip();
+  }
+}
+
+function line(g, x0, y0, x1, y1) { g.beginPath(); g.moveTo(x0, y0); g.lineTo(x1, y1); g.stroke(); }
+function tickStep(raw) {
+  const power = 10 ** Math.floor(Math.log10(raw));
+  return [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw * 0.999);
+}
+
+/* Program, modes, loads and PLC bits as lanes above the power curve. */
+class PowerChart extends TimeChart {
+  constructor(canvas, timeline, tip, data) {
+    super(canvas, timeline, tip);
+    this.lanes = data.lanes;
+    this.power = data.power && { time: floats(data.power.time), low: floats(data.power.low), high: floats(data.power.high) };
+    this.most = this.power ? this.power.high.reduce((a, b) => Math.max(a, b), 100) : 100;
+    const tall = this.lanes.reduce((sum, lane) => sum + (lane.thin ? 15 : 26), 0);
+    this.top = tall + 16;
+    canvas.style.height = `${tall + 320}px`;
+  }
+  draw() {
+    const g = this.begin();
+    this.timeAxis(g);
+    this.drawLanes(g);
+    if (this.power) this.drawPower(g);
+    this.cursor(g);
+  }
+  drawLanes(g) {
+    let y = 2;
+    for (const lane of this.lanes) {
+      const height = lane.thin ? 11 : 21;
+      g.fillStyle = css("--soft");
+      g.textAlign = "right";
+      g.fillText(lane.label, this.left - 8, y + height / 2 + 1);
+      this.plot(g);
+      for (const [from, to, label, style] of lane.spans) {
+        if (to < this.timeline.from || from > this.timeline.to) continue;
+        const x = Math.max(this.x(from), this.left - 2), wide = Math.max(Math.min(this.x(to), this.width) - x, 1);
+        g.fillStyle = spanColour(style);
+        g.globalAlpha = style === "pause" ? 0.45 : lane.thin ? 0.9 : 1;
+        g.fillRect(x, y, Math.max(wide - 1, 1), height);
+        g.globalAlpha = 1;
+        if (!lane.thin) this.label(g, label, x, y + height / 2 + 1, wide, style);
+      }
+      g.restore();
+      y += lane.thin ? 15 : 26;
+    }
+  }
+  label(g, label, x, y, wide, style) {
+    let shown = label;
+    while (shown.length > 1 && g.measureText(shown).width > wide - 8) shown = shown.slice(0, -1);
+    if (shown !== label) shown = shown.length > 3 ? `${shown.slice(0, -1)}…` : "";
+    g.fillStyle = style === "none" || style === "pause" ? css("--ink") : "#fff";
+    g.textAlign = "left";
+    g.fillText(shown, x + 4, y);
+  }
+  drawPower(g) {
+    const { time, low, high } = this.power, last = time.length - 1;
+    const first = Math.max(floorIndex(time, this.timeline.from) - 1, 0);
+    const until = Math.min(floorIndex(time, this.timeline.to) + 1, last);
+    let most = 0;
+    for (let i = first; i <= until; i++) most = Math.max(most, high[i]);
+    most = Math.max(most * 1.08, 50);
+    const y = (watts) => this.height - this.bottom - watts / most * (this.height - this.bottom - this.top);
+    this.valueAxis(g, 0, most, "W", y);
+    this.plot(g);
+    /* one column of pixels shows the span of all readings in it */
+    const columns = [];
+    for (let i = first; i <= until; i++) {
+      const x = Math.round(this.x(time[i]) * 2) / 2, end = columns[columns.length - 1];
+      if (end && end.x === x) { end.low = Math.min(end.low, low[i]); end.high = Math.max(end.high, high[i]); }
+      else columns.push({ x, low: low[i], high: high[i] });
+    }
+    g.beginPath();
+    g.moveTo(columns[0].x, y(0));
+    for (const c of columns) g.lineTo(c.x, y(c.high));
+    g.lineTo(columns[columns.length - 1].x, y(0));
+    g.fillStyle = css("--accent");
+    g.globalAlpha = 0.13;
+    g.fill();
+    g.globalAlpha = 1;
+    g.strokeStyle = css("--accent");
+    g.lineWidth = 1.3;
+    g.beginPath();
+    columns.forEach((c, k) => {
+      if (k === 0) g.moveTo(c.x, y(c.high)); else g.lineTo(c.x, y(c.high));
+      if (c.high > c.low) g.lineTo(c.x, y(c.low));
+    });
+    g.stroke();
+    g.lineWidth = 1;
+    g.restore();
+  }
+  at(time) {
+    if (!this.power) return NaN;
+    return this.power.high[floorIndex(this.power.time, time)];
+  }
+  inLane(label, time) {
+    const lane = this.lanes.find((l) => l.label === label);
+    const span = lane && lane.spans.find(([from, to]) => time >= from && time <= to);
+    return span ? span[2] : "";
+  }
+  describe(time) {
+    const rows = [`${time.toFixed(2)} s`];
+    if (this.power) rows.push(`${Math.round(this.at(time))} W`);
+    for (const label of ["mode", "program", "load"]) {
+      const words = this.inLane(label, time);
+      if (words) rows.push(`${label}: ${words}`);
+    }
+    return rows.join("\n");
+  }
+}
+
+class ClearanceChart extends TimeChart {
+  constructor(canvas, timeline, tip, data) {
+    super(canvas, timeline, tip);
+    this.bound = data.safetyDistance;
+    this.parts = data.clearance.map((c) => ({ time: floats(c.time), low: floats(c.low), label: c.label }));
+    this.most = 0.3;
+    for (const part of this.parts) for (const d of part.low) this.most = Math.max(this.most, d);
+    this.most = Math.min(this.most, 0.8);
+    this.top = 8;
+  }
+  draw() {
+    const g = this.begin();
+    this.timeAxis(g);
+    let least = 0;
+    for (const part of this.parts) for (const d of part.low) least = Math.min(least, d);
+    const y = (d) => this.height - this.bottom - (d - least) / (this.most * 1.05 - least) * (this.height - this.bottom - this.top);
+    this.valueAxis(g, least * 1000, this.most * 1000, "mm", (v) => y(v / 1000));
+    this.plot(g);
+    g.setLineDash([5, 4]);
+    g.strokeStyle = css("--bad");
+    line(g, this.left, y(this.bound), this.width, y(this.bound));
+    g.setLineDash([]);
+    for (const part of this.parts) {
+      if (part.time[part.time.length - 1] < this.timeline.from || part.time[0] > this.timeline.to) continue;
+      g.beginPath();
+      part.time.forEach((t, i) => { const v = y(part.low[i]); if (i) g.lineTo(this.x(t), v); else g.moveTo(this.x(t), v); });
+      g.strokeStyle = css("--a3");
+      g.lineWidth = 1.6;
+      g.stroke();
+      g.lineWidth = 1;
+    }
+    g.restore();
+    g.fillStyle = css("--bad");
+    g.textAlign = "left";
+    g.fillText(`safety distance ${+(this.bound * 1000).toFixed(1)} mm`, this.left + 6, y(this.bound) - 8);
+    this.cursor(g);
+  }
+  describe(time) {
+    const part = this.parts.find((p) => time >= p.time[0] && time <= p.time[p.time.length - 1]);
+    return part ? `${time.toFixed(2)} s\n${(part.low[floorIndex(part.time, time)] * 1000).toFixed(1)} mm\n${part.label}` : "";
+  }
+}

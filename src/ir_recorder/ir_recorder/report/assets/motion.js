@@ -1,0 +1,233 @@
+"use strict";
+/* The cell in 3D: forward kinematics from joint values, orbiting eye, tool path coloured by power. */
+
+const RAMP = ["#2c6fd1", "#12b5cb", "#58c45b", "#f5c211", "#e8590c", "#c92a2a"];
+
+class Motion {
+  constructor(canvas, timeline, scene) {
+    this.canvas = canvas;
+    this.timeline = timeline;
+    this.scene = scene;
+    this.renderer = GlRenderer.create(canvas) || new PlainRenderer(canvas);
+    this.q = shorts(scene.angles);
+    this.power = shorts(scene.power);
+    this.n = scene.jointOrigins.length;
+    this.frames = scene.frames;
+    this.show = { zones: false, trail: true, nearest: true };
+    this.shapes = scene.shapes.map((s) => ({ ...s, mesh: this.upload(s) }));
+    this.bodies = scene.bodies.map((b) => ({ ...b, mesh: this.upload(b) }));
+    this.parts = scene.parts.map((p) => ({ ...p, meshes: p.meshes.map((m) => ({ pose: m.pose, mesh: this.upload(m) })) }));
+    this.nearest = scene.nearest.map((c) => ({ time: floats(c.time), distance: floats(c.distance), a: shorts(c.a), b: shorts(c.b),
+      names: c.pairs, pair: words(c.pair) }));
+    this.mostPower = Math.max(this.power.reduce((a, b) => Math.max(a, b), 0), 1);
+    this.path = this.toolPath();
+    this.home = this.overview();
+    this.eye = { ...this.home };
+    this.recolour();
+    this.listen();
+    timeline.onChange(() => this.schedule());
+    new ResizeObserver(() => this.schedule()).observe(canvas);
+  }
+  upload(shape) {
+    const scaled = (text, step) => Float32Array.from(shorts(text), (v) => v * step);
+    return this.renderer.mesh(scaled(shape.points, 5e-4), scaled(shape.normals, 1 / 32767), words(shape.triangles));
+  }
+  recolour() {
+    this.tints = Object.fromEntries(["robot", "robot-base", "tool", "part", "machine", "zone", "sky", "ground", "grid", "a3", "bad", "soft"]
+      .map((name) => [name, colour(css(`--${name}`))]));
+    this.ramp = RAMP.map(colour);
+    this.pathTints = new Float32Array(this.path.length);
+    for (let i = 0; i < this.frames; i++) this.pathTints.set(this.powerTint(this.power[i]), 3 * i);
+    this.schedule();
+  }
+  powerTint(watts) {
+    const x = Math.min(Math.max(watts / this.mostPower, 0), 1) * (this.ramp.length - 1), k = Math.min(Math.floor(x), this.ramp.length - 2);
+    return this.ramp[k].map((v, i) => v + (this.ramp[k + 1][i] - v) * (x - k));
+  }
+  frame(time) { return Math.min(Math.max((time - this.scene.start) / this.scene.step, 0), this.frames - 1); }
+  /* Poses of all links, the base first; joint values are interpolated between frames. */
+  linkPoses(frame) {
+    const k = Math.min(Math.floor(frame), this.frames - 2), x = frame - k, poses = [new Float32Array(this.scene.base)];
+    for (let i = 0; i < this.n; i++) {
+      const a = this.q[k * this.n + i], b = this.q[(k + 1) * this.n + i];
+      const joint = M4.times(this.scene.jointOrigins[i], M4.turn(this.scene.jointAxes[i], (a + (b - a) * x) * this.scene.angleStep));
+      poses.push(M4.times(poses[i], joint));
+    }
+    return poses;
+  }
+  toolPath() {
+    const path = new Float32Array(3 * this.frames);
+    for (let i = 0; i < this.frames; i++) {
+      const tcp = M4.times(this.linkPoses(i)[this.n], this.scene.tcp);
+      path.set([tcp[12], tcp[13], tcp[14]], 3 * i);
+    }
+    return path;
+  }
+  /* An eye that sees robot and machines. */
+  overview() {
+    let reach = 1.5;
+    for (const body of this.bodies) reach = Math.max(reach, Math.min(Math.hypot(body.pose[12], body.pose[13]), 4));
+    return { turn: -0.85, tilt: 0.5, distance: 2.35 * reach + 1.6, target: [0.1, 0, 0.85] };
+  }
+  look(name) {
+    const views = { iso: this.home, top: { ...this.home, turn: -Math.PI / 2, tilt: 1.5533 }, side: { ...this.home, turn: -Math.PI / 2, tilt: 0.06 } };
+    this.eye = { ...views[name], target: [...this.home.target] };
+    this.schedule();
+  }
+  listen() {
+    const fingers = new Map();
+    const canvas = this.canvas;
+    canvas.addEventListener("pointerdown", (e) => { fingers.set(e.pointerId, [e.clientX, e.clientY]); canvas.setPointerCapture(e.pointerId); });
+    const gone = (e) => fingers.delete(e.pointerId);
+    canvas.addEventListener("pointerup", gone);
+    canvas.addEventListener("pointercancel", gone);
+    canvas.addEventListener("pointermove", (e) => {
+      const last = fingers.get(e.pointerId);
+      if (!last) return;
+      const dx = e.clientX - last[0], dy = e.clientY - last[1];
+      if (fingers.size > 1) {
+        const other = [...fingers].find(([id]) => id !== e.pointerId)[1];
+        const before = Math.hypot(last[0] - other[0], last[1] - other[1]), now = Math.hypot(e.clientX - other[0], e.clientY - other[1]);
+        this.zoom(before / Math.max(now, 1));
+      } else if (e.buttons & 2 || e.shiftKey) this.pan(dx, dy);
+      else this.orbit(dx, dy);
+      fingers.set(e.pointerId, [e.clientX, e.clientY]);
+    });
+    canvas.addEventListener("contextmenu", (e) => e.preventDefault());
+    canvas.addEventListener("wheel", (e) => {
+      if (document.activeElement !== canvas && !e.ctrlKey) return; /* the page scrolls until the picture was clicked */
+      e.preventDefault();
+      this.zoom(Math.exp(e.deltaY * 0.001));
+    }, { passive: false });
+    canvas.addEventListener("keydown", (e) => {
+      const steps = { ArrowLeft: [-30, 0], ArrowRight: [30, 0], ArrowUp: [0, -30], ArrowDown: [0, 30] };
+      if (steps[e.key]) { e.preventDefault(); this.orbit(...steps[e.key]); }
+    });
+  }
+  orbit(dx, dy) {
+    this.eye.turn -= dx * 0.006;
+    this.eye.tilt = Math.min(Math.max(this.eye.tilt + dy * 0.006, -0.1), 1.5533);
+    this.schedule();
+  }
+  pan(dx, dy) {
+    const { turn, tilt, distance, target } = this.eye, size = distance * 0.0012;
+    const right = [-Math.sin(turn), Math.cos(turn), 0], up = [-Math.cos(turn) * Math.sin(tilt), -Math.sin(turn) * Math.sin(tilt), Math.cos(tilt)];
+    for (let i = 0; i < 3; i++) target[i] += (-dx * right[i] + dy * up[i]) * size;
+    this.schedule();
+  }
+  zoom(factor) {
+    this.eye.distance = Math.min(Math.max(this.eye.distance * factor, 0.6), 40);
+    this.schedule();
+  }
+  schedule() {
+    if (this.pending) return;
+    this.pending = requestAnimationFrame(() => { this.pending = 0; this.draw(); });
+  }
+  load(time) {
+    let load = "none";
+    for (const [from, name] of this.scene.loads) if (from <= time + 1e-3) load = name;
+    return load;
+  }
+  /* Where the part lies at that time, null while it is held. */
+  place(part, time) {
+    let pose = null;
+    for (const [from, where] of part.lies) if (from <= time + 1e-3) pose = where;
+    return pose;
+  }
+  draw() {
+    const scale = Math.min(window.devicePixelRatio || 1, 2), box = this.canvas.getBoundingClientRect();
+    const width = Math.max(Math.round(box.width * scale), 1), height = Math.max(Math.round(box.height * scale), 1);
+    if (this.canvas.width !== width || this.canvas.height !== height) { this.canvas.width = width; this.canvas.height = height; }
+    const { turn, tilt, distance, target } = this.eye;
+    const eye = [target[0] + distance * Math.cos(tilt) * Math.cos(turn), target[1] + distance * Math.cos(tilt) * Math.sin(turn),
+      target[2] + distance * Math.sin(tilt)];
+    const view = M4.times(M4.perspective(0.62, width / height, 0.1, 80), M4.look(eye, target, [0, 0, 1]));
+    const r = this.renderer, time = this.timeline.now, frame = this.frame(time);
+    r.begin(view, eye, this.tints.sky);
+    if (this.scene.floor) this.drawFloor();
+    const items = this.items(time, frame);
+    r.drawShadows(items.map(({ mesh, model }) => [mesh, model]), [0, 0, 0], 0.16);
+    for (const { mesh, model, tint } of items) r.drawMesh(mesh, model, tint);
+    if (this.show.trail) this.drawTrail(frame);
+    if (this.show.nearest) this.drawNearest(time);
+    if (this.show.zones) this.drawZones();
+    r.end();
+  }
+  items(time, frame) {
+    const poses = this.linkPoses(frame), load = this.load(time).split("+"), items = [];
+    for (const { mesh, pose } of this.bodies) items.push({ mesh, model: pose, tint: this.tints.machine });
+    for (const { mesh, link, kind, owner } of this.shapes) {
+      if (owner && !load.includes(owner)) continue;
+      const tint = this.tints[{ link: "robot", base: "robot-base", tool: "tool", part: "part" }[kind]];
+      items.push({ mesh, model: poses[link], tint });
+    }
+    for (const part of this.parts) {
+      const pose = load.includes(part.name) ? null : this.place(part, time);
+      if (pose) for (const { mesh, pose: own } of part.meshes) items.push({ mesh, model: M4.times(pose, own), tint: this.tints.part });
+    }
+    return items;
+  }
+  drawFloor() {
+    if (!this.floorMesh) {
+      const s = 6;
+      this.floorMesh = this.renderer.mesh(new Float32Array([-s, -s, -0.002, s, -s, -0.002, s, s, -0.002, -s, s, -0.002]),
+        new Float32Array([0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1]), new Uint16Array([0, 1, 2, 0, 2, 3]));
+      const points = [];
+      for (let i = -s; i <= s; i += 0.5) points.push(-s, i, 0, s, i, 0, i, -s, 0, i, s, 0);
+      this.gridPoints = new Float32Array(points);
+    }
+    if (this.renderer instanceof GlRenderer) this.renderer.drawMesh(this.floorMesh, IDENTITY, this.tints.ground, 1, 1);
+    const tints = new Float32Array(this.gridPoints.length);
+    for (let i = 0; i < tints.length; i += 3) tints.set(this.tints.grid, i);
+    this.renderer.drawLines(this.gridPoints, tints, false, 0.6);
+  }
+  drawTrail(frame) {
+    const now = 3 * (Math.floor(frame) + 1);
+    this.renderer.drawLines(this.path.subarray(0, now), this.pathTints.subarray(0, now), true, 1);
+    this.renderer.drawLines(this.path, this.pathTints, true, 0.22);
+  }
+  pairAt(time) {
+    for (const c of this.nearest) {
+      if (time < c.time[0] || time > c.time[c.time.length - 1]) continue;
+      const k = floorIndex(c.time, time);
+      if (Number.isFinite(c.distance[k])) return { c, k };
+    }
+    return null;
+  }
+  drawNearest(time) {
+    const hit = this.pairAt(time);
+    if (!hit) return;
+    const ends = (s) => [...s.subarray(3 * hit.k, 3 * hit.k + 3)].map((v) => v * 5e-4);
+    const tint = hit.c.distance[hit.k] < 0.02 ? this.tints.bad : this.tints.a3;
+    this.renderer.drawLines(new Float32Array([...ends(hit.c.a), ...ends(hit.c.b)]), new Float32Array([...tint, ...tint]), false, 1, true);
+  }
+  drawZones() {
+    for (const zone of this.scene.zones) {
+      if (!zone.mesh) zone.mesh = this.renderer.mesh(...unitBox(zone.size));
+      const tint = zone.kind === "OPEN" ? this.tints.a3 : zone.kind === "CLOSED" ? this.tints.bad : this.tints.zone;
+      this.renderer.drawMesh(zone.mesh, zone.pose, tint, 0.16, 1);
+    }
+  }
+  describe() {
+    const time = this.timeline.now, hit = this.pairAt(time);
+    return {
+      load: this.load(time),
+      nearest: hit ? `${(hit.c.distance[hit.k] * 1000).toFixed(0)} mm  ${hit.c.names[hit.c.pair[hit.k]]}` : "",
+    };
+  }
+}
+
+function unitBox(size) {
+  const points = [], normals = [], triangles = [];
+  for (let axis = 0; axis < 3; axis++) for (const sign of [-1, 1]) {
+    const start = points.length / 3;
+    for (const [a, b] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      const p = [0, 0, 0], n = [0, 0, 0];
+      p[axis] = sign; p[(axis + 1) % 3] = a; p[(axis + 2) % 3] = b; n[axis] = sign;
+      points.push(...p.map((v, i) => v * size[i] / 2));
+      normals.push(...n);
+    }
+    triangles.push(...[0, 1, 2, 0, 2, 3].map((k) => start + k));
+  }
+  return [new Float32Array(points), new Float32Array(normals), new Uint16Array(triangles)];
+}

@@ -1,0 +1,110 @@
+"""What the page's scripts need, as one JSON text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ir_recorder.analysis import Analysis
+from ir_recorder.analysis.shares import mode_name
+from ir_recorder.recording import BitSeries
+from ir_recorder.report.scene import scene
+from ir_recorder.report.series import envelope, floats
+from ir_recorder.report.words import mode_words
+
+MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
+MOST_CLEARANCES = 6_000
+
+
+def page_data(analysis: Analysis, safety_distance: float) -> str:
+    """Safe inside a script element."""
+    content: dict[str, Any] = {
+        "end": analysis.recording.duration,
+        "power": _power(analysis),
+        "lanes": list(_lanes(analysis)),
+        "clearance": [_clearance(result) for result in analysis.steps if result.clearance is not None],
+        "safetyDistance": safety_distance,
+        "scene": scene(analysis),
+    }
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _power(analysis: Analysis) -> dict[str, str] | None:
+    power = analysis.recording.power
+    if power is None or len(power.time) < 2:
+        return None
+    shape = envelope(power.time, power.power, MOST_POINTS)
+    return {"time": floats(shape.time), "low": floats(shape.low), "high": floats(shape.high)}
+
+
+def _clearance(result: Any) -> dict[str, Any]:
+    near = result.clearance
+    kept = np.isfinite(near.distance)
+    shape = envelope(near.time[kept], near.distance[kept], MOST_CLEARANCES)
+    return {"time": floats(shape.time), "low": floats(shape.low), "label": result.step.label}
+
+
+def _lanes(analysis: Analysis) -> Iterator[dict[str, Any]]:
+    """Rows of spans [from, to, text, style] above the power curve."""
+    recording = analysis.recording
+    steps = [
+        [
+            r.step.start,
+            r.step.end,
+            r.step.label,
+            "pause" if r.step.movement.is_pause else r.step.movement.kind,
+        ]
+        for r in analysis.steps
+    ]
+    if steps:
+        yield {"label": "program", "spans": steps}
+    if recording.power is not None and len(recording.power.time) > 1:
+        yield {"label": "mode", "spans": list(_mode_spans(analysis))}
+    if analysis.loads.observations:
+        yield {"label": "load", "spans": list(_load_spans(analysis))}
+    for series, side, names in (
+        (recording.plc_inputs, "in", ("ab", "hib", "emergency_stop")),
+        (recording.plc_outputs, "out", ("bbs", "ab", "drives_ready")),
+    ):
+        if series is not None and len(series.time):
+            for name in names:
+                spans = list(_bit_spans(series, name, recording.duration))
+                if spans:
+                    yield {"label": f"{name.upper().replace('_', ' ')} {side}", "spans": spans, "thin": True}
+
+
+def _mode_spans(analysis: Analysis) -> Iterator[list[Any]]:
+    power = analysis.recording.power
+    if power is None:
+        return
+    change = np.flatnonzero(np.diff(power.mode)) + 1
+    for first, last in zip([0, *change], [*change, len(power.mode)], strict=True):
+        name = mode_name(int(power.mode[first]))
+        start = power.time[first - 1] if first else power.time[0]
+        yield [float(start), float(power.time[last - 1]), mode_words(name), f"m-{name}"]
+
+
+def _load_spans(analysis: Analysis) -> Iterator[list[Any]]:
+    observations = analysis.loads.observations
+    start, current = observations[0]
+    for time, load in [*observations[1:], (analysis.recording.duration, "")]:
+        if load != current:
+            yield [max(start, 0.0), time, current, "load" if current != "none" else "none"]
+            start, current = time, load
+
+
+def _bit_spans(series: BitSeries, name: str, end: float) -> Iterator[list[Any]]:
+    levels = series.levels[:, series.names.index(name)]
+    times = np.append(series.time, end)
+    since = None
+    for k, level in enumerate(levels):
+        if level and since is None:
+            since = float(times[k])
+        if not level and since is not None:
+            yield [since, float(times[k]), "1", "bit"]
+            since = None
+    if since is not None:
+        yield [since, float(end), "1", "bit"]

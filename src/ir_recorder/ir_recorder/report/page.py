@@ -1,0 +1,132 @@
+"""The report: one HTML file with everything in it, that opens offline in any browser."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+
+from ir_recorder.analysis import Analysis, Finding, Tolerances
+from ir_recorder.analysis import findings as all_findings
+from ir_recorder.errors import PathError
+from ir_recorder.report.bars import joule_bars
+from ir_recorder.report.data import page_data
+from ir_recorder.report.tables import (
+    check_table,
+    fact_table,
+    mode_table,
+    problem_list,
+    station_table,
+    step_table,
+    table_2,
+)
+from ir_recorder.report.words import joules, millimetres, number, percent, seconds, text, watts
+
+_ASSETS = files("ir_recorder") / "report" / "assets"
+SCRIPTS = ("charts.js", "renderer.js", "motion.js", "app.js")
+NOTE = "note."  # facts whose key starts like this are shown at the top
+
+
+def write_report(
+    analysis: Analysis,
+    path: str | Path,
+    findings: Sequence[Finding] | None = None,
+    tolerances: Tolerances | None = None,
+) -> Path:
+    """Writes the page and returns its absolute path; PathError when it can't be written."""
+    target = Path(path).absolute()
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(report_html(analysis, findings, tolerances), encoding="utf-8")
+    except OSError as error:
+        raise PathError(f"{target} can't be written: {error.strerror}") from error
+    return target
+
+
+def report_html(
+    analysis: Analysis, findings: Sequence[Finding] | None = None, tolerances: Tolerances | None = None
+) -> str:
+    """The page as text. findings: the checks to show; None: those that the recording allows."""
+    bounds = tolerances or Tolerances()
+    checks = all_findings(analysis, bounds) if findings is None else tuple(findings)
+    name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
+    parts = {
+        "title": text(f"{name} – report of a recording"),
+        "name": text(name),
+        "subtitle": _subtitle(analysis),
+        "verdict": _verdict(checks),
+        "notes": _notes(analysis),
+        "problems": problem_list(analysis.problems),
+        "tiles": _tiles(analysis, checks),
+        "bars": joule_bars(analysis.movements),
+        "steps": step_table(analysis.steps),
+        "stations": station_table(analysis),
+        "modes": mode_table(analysis),
+        "table2": table_2(analysis),
+        "checks": check_table(checks),
+        "facts": fact_table(analysis),
+        "style": _asset("page.css"),
+        "data": page_data(analysis, bounds.safety_distance),
+        "script": "\n".join(_asset(script) for script in SCRIPTS),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _asset("page.html"))
+
+
+def _subtitle(analysis: Analysis) -> str:
+    recording = analysis.recording
+    start = datetime.fromtimestamp(recording.start_ns * 1e-9, UTC)
+    version = recording.fact("version")
+    return text(
+        f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, {seconds(recording.duration)}"
+        + (f", recorder {version}" if version else "")
+    )
+
+
+def _verdict(checks: Sequence[Finding]) -> str:
+    failed = sum(not check.ok for check in checks)
+    if not checks:
+        return '<p class="verdict">Nothing could be checked.</p>'
+    if failed:
+        words = f"{failed} of {len(checks)} checks fail"
+        return f'<p class="verdict bad"><a href="#checks">{words}</a></p>'
+    return f'<p class="verdict good"><a href="#checks">All {len(checks)} checks hold</a></p>'
+
+
+def _notes(analysis: Analysis) -> str:
+    notes = [(k.removeprefix(NOTE), v) for k, v in analysis.recording.facts if k.startswith(NOTE)]
+    if not notes:
+        return ""
+    items = "".join(f"<li><b>{text(key)}</b> {text(value)}</li>" for key, value in notes)
+    return f'<ul class="notes">{items}</ul>'
+
+
+def _tiles(analysis: Analysis, checks: Sequence[Finding]) -> str:
+    moved = analysis.movements
+    least = min((r.clearance.least for r in moved if r.clearance is not None), default=math.nan)
+    deviation = max(
+        (abs(r.energy / r.step.movement.report.energy - 1.0) for r in moved if r.step.movement.report.energy),
+        default=math.nan,
+    )
+    tiles = (
+        ("energy at the mains", joules(analysis.energy), number(analysis.energy / 3600.0, "Wh")),
+        ("recorded", seconds(analysis.seconds), f"mean {watts(analysis.mean_power)}"),
+        ("peak power", watts(analysis.peak_power), "of a 10 ms reading"),
+        (
+            "movements",
+            str(len(moved)),
+            f"{joules(sum(r.energy for r in moved))} in {seconds(sum(r.seconds for r in moved))}",
+        ),
+        ("plan against measured", percent(deviation).lstrip("+"), "largest deviation of energy"),
+        ("least clearance", millimetres(least), "executed, allowed contacts aside"),
+    )
+    return "".join(
+        f'<div class="tile"><span>{text(name)}</span><b>{text(value)}</b><small>{text(note)}</small></div>'
+        for name, value, note in tiles
+    )
+
+
+def _asset(name: str) -> str:
+    return (_ASSETS / name).read_text(encoding="utf-8")

@@ -1,0 +1,52 @@
+"""Series small enough for a page: envelopes of long ones, and numbers packed into base64."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ir_recorder.cdr import Numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """Lowest and highest value per stretch: time (M,) of its middle, low (M,), high (M,)."""
+
+    time: Numbers
+    low: Numbers
+    high: Numbers
+
+
+def envelope(time: Numbers, value: Numbers, most: int) -> Envelope:
+    """The series as at most `most` stretches of equal count; no peak gets lost. A short series stays as it
+    is.
+    """
+    if len(time) <= most:
+        return Envelope(time, value, value)
+    edges = np.linspace(0, len(time), most + 1).astype(int)[:-1]
+    low, high = np.minimum.reduceat(value, edges), np.maximum.reduceat(value, edges)
+    first, last = time[edges], time[np.append(edges[1:], len(time)) - 1]
+    return Envelope((first + last) / 2.0, low, high)
+
+
+def floats(values: ArrayLike) -> str:
+    """float32, little endian, in base64."""
+    return _base64(np.asarray(values, dtype="<f4"))
+
+
+def quantised(values: ArrayLike, step: float) -> str:
+    """int16 multiples of `step`, little endian, in base64; values beyond the range are clipped."""
+    counts = np.clip(np.rint(np.nan_to_num(np.asarray(values, dtype=float)) / step), -32768, 32767)
+    return _base64(counts.astype("<i2"))
+
+
+def indices(values: ArrayLike) -> str:
+    """uint16, little endian, in base64."""
+    return _base64(np.asarray(values, dtype="<u2"))
+
+
+def _base64(array: NDArray[np.generic]) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()

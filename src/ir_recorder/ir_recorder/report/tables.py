@@ -1,0 +1,180 @@
+"""Tables of the page: movements, stations, modes, Table II, checks, facts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from ir_recorder.analysis import Analysis, Finding
+from ir_recorder.analysis.results import Share, StepResult
+from ir_recorder.report.words import (
+    DASH,
+    joules,
+    millimetres,
+    mode_words,
+    number,
+    percent,
+    seconds,
+    text,
+    watts,
+)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
+    """A table; cells are HTML. A head that starts with ">" is a column of numbers."""
+    columns = "".join(f"<th{_number(head)}>{text(head.lstrip('>'))}</th>" for head in heads)
+    body = "".join(
+        "<tr>" + "".join(f"<td{_number(h)}>{cell}</td>" for h, cell in zip(heads, row, strict=True)) + "</tr>"
+        for row in rows
+    )
+    if not body:
+        return '<p class="empty">Nothing was recorded.</p>'
+    return (
+        f'<div class="scroll"><table class="{kind}"><thead><tr>{columns}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
+    )
+
+
+def step_table(results: Sequence[StepResult]) -> str:
+    """Every step: planned against measured."""
+    heads = (
+        "#",
+        "step",
+        "load",
+        ">s",
+        ">planned",
+        ">measured",
+        ">deviation",
+        ">from torque",
+        ">mean",
+        ">peak",
+    )
+    return table(
+        (*heads, ">clearance", "nearest pair", ">tool off by"), (_step(result) for result in results)
+    )
+
+
+def _step(result: StepResult) -> tuple[str, ...]:
+    movement, near = result.step.movement, result.clearance
+    plan = movement.report.energy
+    unfinished = "" if result.step.outcome == "ended" else f' <b class="bad">{text(result.step.outcome)}</b>'
+    return (
+        str(result.step.index + 1),
+        f'<button class="go" data-time="{result.step.start:.3f}">{text(result.step.label)}</button>{unfinished}',
+        text(movement.load or DASH),
+        f"{result.seconds:.2f}",
+        joules(plan) if plan else DASH,
+        joules(result.energy),
+        percent(result.energy / plan - 1.0) if plan and not movement.is_pause else DASH,
+        joules(result.indirect_energy),
+        watts(result.mean_power),
+        watts(result.peak_power),
+        millimetres(near.least) if near else DASH,
+        text(near.least_pair) if near else DASH,
+        millimetres(result.tool_deviation),
+    )
+
+
+def station_table(analysis: Analysis) -> str:
+    """Time and energy of every station."""
+    most = max((use.energy for use in analysis.stations), default=0.0)
+    rows = [
+        (
+            text(use.station),
+            *(_share(share) for share in (use.travel, use.service, use.rest)),
+            f"{use.seconds:.1f} s",
+            f"<b>{joules(use.energy)}</b>",
+            _bar(use.energy, most, "station"),
+        )
+        for use in analysis.stations
+    ]
+    other = analysis.elsewhere
+    if math.isfinite(other.energy):
+        rows.append((text(other.name), DASH, DASH, DASH, f"{other.seconds:.1f} s", joules(other.energy), ""))
+    return table(("station", ">the way there", ">in and out", ">resting", ">time", ">energy", ""), rows)
+
+
+def mode_table(analysis: Analysis) -> str:
+    """Time and energy of every mode."""
+    most = max((share.energy for share in analysis.modes), default=0.0)
+    rows = [
+        (
+            f'<i class="key m-{text(share.name)}"></i>{text(mode_words(share.name))}',
+            f"{share.seconds:.1f} s",
+            joules(share.energy),
+            watts(share.energy / share.seconds) if share.seconds else DASH,
+            _bar(share.energy, most, f"m-{share.name}"),
+        )
+        for share in sorted(analysis.modes, key=lambda share: -share.energy)
+    ]
+    return table(("mode", ">time", ">energy", ">mean", ""), rows)
+
+
+def table_2(analysis: Analysis) -> str:
+    """Table II of the paper beside what the recording shows."""
+    rows = [
+        (
+            text(mode_words(row.mode)),
+            f"{row.payload:g} kg",
+            watts(row.expected),
+            f"{row.power:.2f} W",
+            percent(row.error),
+            f"{row.seconds:.1f} s",
+        )
+        for row in analysis.plateaus
+    ]
+    return table(("mode at machine home", ">payload", ">Table II", ">measured", ">deviation", ">over"), rows)
+
+
+def check_table(findings: Sequence[Finding]) -> str:
+    """All checks, what fails first."""
+    rows = [
+        (
+            f'<b class="{"good" if f.ok else "bad"}">{"holds" if f.ok else "fails"}</b>',
+            text(f.name),
+            text(number(f.measured, f.unit)),
+            text(number(f.expected, f.unit)) + (f" ± {text(number(f.bound, f.unit))}" if f.bound else ""),
+            text(f.note),
+        )
+        for f in sorted(findings, key=lambda finding: finding.ok)
+    ]
+    return table(("", "check", ">measured", ">expected", "note"), rows, "checks")
+
+
+def fact_table(analysis: Analysis) -> str:
+    """Facts and topics of the file."""
+    facts = table(("fact", "value"), ((text(k), text(v)) for k, v in analysis.recording.facts))
+    topics = table(
+        ("topic", "type", ">messages", ">per second"),
+        (
+            (
+                text(t.name),
+                text(t.type),
+                str(t.count),
+                f"{t.count / max(analysis.recording.duration, 1e-9):.1f}",
+            )
+            for t in sorted(analysis.recording.topics, key=lambda topic: topic.name)
+        ),
+    )
+    return facts + topics
+
+
+def problem_list(problems: Sequence[str]) -> str:
+    """What couldn't be read or computed."""
+    if not problems:
+        return ""
+    items = "".join(f"<li>{text(problem)}</li>" for problem in problems)
+    return f'<div class="problems"><b>Not everything could be read</b><ul>{items}</ul></div>'
+
+
+def _share(share: Share) -> str:
+    return f"{joules(share.energy)}<small>{seconds(share.seconds)}</small>" if share.seconds else DASH
+
+
+def _bar(value: float, most: float, kind: str) -> str:
+    width = 100.0 * max(value, 0.0) / most if most > 0.0 else 0.0
+    return f'<span class="bar {text(kind)}" style="width:{width:.1f}%"></span>'
+
+
+def _number(head: str) -> str:
+    return ' class="n"' if head.startswith(">") else ""

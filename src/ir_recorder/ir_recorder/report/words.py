@@ -1,0 +1,60 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+
+DASH = "–"
+
+
+def joules(value: float) -> str:
+    """1234.5 -> "1 235 J", from 10 kJ on "12.3 kJ"."""
+    if not math.isfinite(value):
+        return DASH
+    if abs(value) >= 10_000.0:
+        return f"{value / 1000.0:,.1f} kJ".replace(",", " ")
+    return f"{value:,.0f} J".replace(",", " ")
+
+
+def watts(value: float) -> str:
+    """Watts without decimals, below 10 W with one."""
+    if not math.isfinite(value):
+        return DASH
+    return f"{value:,.0f} W".replace(",", " ") if abs(value) >= 10.0 else f"{value:.1f} W"
+
+
+def seconds(value: float) -> str:
+    """Seconds with two decimals, from ten minutes on as minutes."""
+    if not math.isfinite(value):
+        return DASH
+    return f"{value:.2f} s" if value < 600.0 else f"{value / 60.0:.1f} min"
+
+
+def millimetres(value: float) -> str:
+    """Metres as millimetres."""
+    return f"{value * 1000.0:,.1f} mm".replace(",", " ") if math.isfinite(value) else DASH
+
+
+def percent(value: float) -> str:
+    """A ratio as a signed percentage."""
+    return f"{value * 100.0:+.2f} %" if math.isfinite(value) else DASH
+
+
+def number(value: float, unit: str) -> str:
+    """A number with its unit: lengths in mm, the rest with four significant digits."""
+    if not math.isfinite(value):
+        return DASH
+    if unit == "m":
+        return millimetres(value)
+    return f"{value:.4g} {unit}".strip() if abs(value) < 1e4 else f"{value:,.0f} {unit}".replace(",", " ")
+
+
+def mode_words(name: str) -> str:
+    """ "BUS_POWER_OFF" -> "bus power off"."""
+    return name.lower().replace("_", " ")
+
+
+def text(value: object) -> str:
+    """Anything as HTML text."""
+    return escape(str(value), quote=True)
