@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -21,6 +22,8 @@ COMMAND_MODULES = {
 }
 """Only the module that is needed is imported: `ir cell check` does not wait for rclpy."""
 
+INTERRUPTED = 130
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code, 1 with one sentence on stderr when it failed."""
@@ -29,10 +32,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = next((word for word in words if not word.startswith("-")), "")
     parser = _parser(chosen)
     parsed = parser.parse_args(words)
+    # a background job of a shell ignores SIGINT, and SIGTERM would leave child processes behind
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code: int = parsed.run(parsed)
     except KeyboardInterrupt:
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:
         return 0
     except _expected_errors() as error:
