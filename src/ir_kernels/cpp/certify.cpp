@@ -101,6 +101,7 @@ template <class V> struct Proof {
     const SelfPair& pair = model.self_pairs[i];
     return allowed(moved[pair.outer * (model.chain.n + 1) + model.capsules[pair.inner].link]);
   }
+  IR_INLINE S farthest(int c) const { return highest<V>(outside(c)); }
   IR_INLINE V allowed(V m) const { return m + margin + (tight ? max(proved, V{}) : V{}); }
   IR_INLINE bool done() const { return false; }
 
@@ -133,7 +134,7 @@ template <class V> struct Proof {
       V m{};
       to[link] = m;
       for (int j = link - 1; j >= 0; --j) {
-        const Vec<V> a = cross(s.a[c] - s.origin[j], s.axis[j]), b = cross(s.b[c] - s.origin[j], s.axis[j]);
+        const Vec<V> a = cross(s.a[c] - s.frames[j + 1].origin, s.frames[j + 1].z), b = cross(s.b[c] - s.frames[j + 1].origin, s.frames[j + 1].z);
         const V reach = sqrt(max(dot(a, a), dot(b, b)));
         m = m + spread[j] * (reach + m + margin);
         to[j] = m;
@@ -173,7 +174,7 @@ template <class V> class Examiner {
     }
     for (int k = count; k < width; ++k)
       for (int j = 0; j < n_; ++j) spread_[j][k] = spread_[j][count - 1];
-    placement_.place(rows, count, true);
+    placement_.place(rows, count);
     proof_.movements(placement_.state, spread_.data());
     proof_.start();
     visit(model_, placement_.state, proof_);

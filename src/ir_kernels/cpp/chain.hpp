@@ -42,8 +42,8 @@ struct Chain {
   void forward(const Double8* q, Frame<Double8>* frames) const;
 };
 
-IR_INLINE Vec<Double8> place(const Frame<Double8>& f, const double p[3]) {
-  Vec<Double8> r = f.origin;
+template <class V> IR_INLINE Vec<V> place(const Frame<V>& f, const double p[3]) {
+  Vec<V> r = f.origin;
   add_scaled(r, p[0], f.x);
   add_scaled(r, p[1], f.y);
   add_scaled(r, p[2], f.z);

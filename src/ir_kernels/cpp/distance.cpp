@@ -3,6 +3,15 @@
 
 namespace ir {
 
+const Circle circle = [] {
+  Circle table;
+  for (int k = 0; k < 64; ++k) {
+    table.c[k] = std::cos(k * (3.14159265358979323846 / 32));
+    table.s[k] = std::sin(k * (3.14159265358979323846 / 32));
+  }
+  return table;
+}();
+
 template <class V>
 V axis_distance(const Model& model, int body, int capsule_index, const Vec<V>& a, const Vec<V>& b) {
   using S = Scalar<V>;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "segments.hpp"
-
 namespace ir {
 namespace {
 
@@ -181,61 +179,6 @@ double segment_hull(const Hull& hull, const double from[3], const double to[3], 
   }
   normal[0] = n.x, normal[1] = n.y, normal[2] = n.z;
   return distance;
-}
-
-void depth_in_cylinder(const double from[3], const double to[3], double radius, double half, double& depth,
-                       double normal[3]) {
-  const P a{from[0], from[1], from[2]}, b{to[0], to[1], to[2]}, d = b - a;
-  P best{0, 0, 1};
-  depth = half - std::min(a.z, b.z);
-  const auto overlap = [&](P n) {
-    return radius * std::sqrt(n.x * n.x + n.y * n.y) + half * std::fabs(n.z) - std::min(dot(n, a), dot(n, b));
-  };
-  const auto consider = [&](P n) {
-    const double now = overlap(n);
-    if (now < depth) depth = now, best = n;
-  };
-  consider({0, 0, -1});
-  const double flat = d.x * d.x + d.y * d.y;
-  const double t = flat > 0.0 ? std::min(1.0, std::max(0.0, -(a.x * d.x + a.y * d.y) / flat)) : 0.0;
-  P radial{a.x + t * d.x, a.y + t * d.y, 0};
-  if (dot(radial, radial) < 1e-24) radial = flat > 1e-24 ? P{-d.y, d.x, 0} : P{1, 0, 0};
-  radial = (1.0 / std::sqrt(dot(radial, radial))) * radial;
-  consider(radial);
-  consider(-1.0 * radial);
-  const double length = std::sqrt(dot(d, d));
-  if (length > 1e-9) {
-    // directions perpendicular to the segment lie on a circle: sample it, then golden section about the best
-    const P axis = (1.0 / length) * d;
-    P u = std::fabs(axis.x) < 0.6 ? cross(axis, {1, 0, 0}) : cross(axis, {0, 1, 0});
-    u = (1.0 / std::sqrt(dot(u, u))) * u;
-    const P v = cross(axis, u);
-    const auto circle = [&](double angle) { return std::cos(angle) * u + std::sin(angle) * v; };
-    constexpr int samples = 64;
-    const double width = 2.0 * 3.14159265358979323846 / samples, golden = 0.61803398874989484820;
-    int nearest = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < samples; ++k) {
-      const double now = overlap(circle(k * width));
-      if (now < least) least = now, nearest = k;
-    }
-    double low = (nearest - 1) * width, high = (nearest + 1) * width;
-    double left = high - golden * (high - low), right = low + golden * (high - low);
-    double at_left = overlap(circle(left)), at_right = overlap(circle(right));
-    for (int k = 0; k < 48; ++k) {
-      if (at_left < at_right) {
-        high = right, right = left, at_right = at_left;
-        left = high - golden * (high - low);
-        at_left = overlap(circle(left));
-      } else {
-        low = left, left = right, at_left = at_right;
-        right = low + golden * (high - low);
-        at_right = overlap(circle(right));
-      }
-    }
-    consider(circle((low + high) / 2.0));
-  }
-  normal[0] = best.x, normal[1] = best.y, normal[2] = best.z;
 }
 
 }  // namespace ir

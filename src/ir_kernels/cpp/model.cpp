@@ -107,61 +107,57 @@ void Model::finish() {
   }
 }
 
-template <class V>
-Placement<V>::Placement(const Model& model)
-    : model_(model), q_(model.chain.n), frames_(model.chain.n + 1) {
-  const auto size = [&](auto& s) {
-    s.a.resize(model.capsules.size());
-    s.b.resize(model.capsules.size());
-    s.middle.resize(model.capsules.size());
-    s.axis.resize(model.chain.n);
-    s.origin.resize(model.chain.n);
-  };
-  size(state);
-  size(half[0]);
-  size(half[1]);
+template <class V> Placement<V>::Placement(const Model& model) : model_(model), q_(model.chain.n) {
+  state.frames.resize(model.chain.n + 1);
+  for (auto* points : {&state.a, &state.b, &state.middle}) points->resize(model.capsules.size());
+  for (auto& frames : exact) frames.resize(model.chain.n + 1);
 }
 
 namespace {
 
 typedef float Float8 __attribute__((vector_size(32)));
 
-IR_INLINE void narrow(const Double8& from, Float16& to, int part) {
-  const Float8 converted = __builtin_convertvector(from, Float8);
-  std::memcpy(reinterpret_cast<char*>(&to) + 32 * part, &converted, 32);
+IR_INLINE void narrow(const Double8& low, const Double8& high, Float16& to) {
+  const Float8 first = __builtin_convertvector(low, Float8), second = __builtin_convertvector(high, Float8);
+#if defined(__AVX512DQ__)
+  to = (Float16)_mm512_insertf32x8(_mm512_castps256_ps512((__m256)first), (__m256)second, 1);
+#else
+  std::memcpy(&to, &first, 32);
+  std::memcpy(reinterpret_cast<char*>(&to) + 32, &second, 32);
+#endif
 }
-IR_INLINE void narrow(const Vec<Double8>& from, Vec<Float16>& to, int part) {
-  narrow(from.x, to.x, part);
-  narrow(from.y, to.y, part);
-  narrow(from.z, to.z, part);
+IR_INLINE void narrow(const Double8& low, const Double8&, Double8& to) { to = low; }
+template <class V> IR_INLINE void narrow(const Vec<Double8>& low, const Vec<Double8>& high, Vec<V>& to) {
+  narrow(low.x, high.x, to.x);
+  narrow(low.y, high.y, to.y);
+  narrow(low.z, high.z, to.z);
 }
-IR_INLINE void narrow(const Vec<Double8>& from, Vec<Double8>& to, int) { to = from; }
 
 }  // namespace
 
-template <class V> void Placement<V>::place(const double* const* rows, int count, bool with_axes) {
+template <class V> void Placement<V>::place(const double* const* rows, int count) {
   const int n = model_.chain.n;
   for (int part = 0; part < Lanes<V>::width / 8; ++part) {
     for (int j = 0; j < n; ++j)
       for (int k = 0; k < 8; ++k) q_[j][k] = rows[std::min(8 * part + k, count - 1)][j];
-    model_.chain.forward(q_.data(), frames_.data());
-    State<Double8>& exact = half[part];
-    for (std::size_t c = 0; c < model_.capsules.size(); ++c) {
-      const Capsule& capsule = model_.capsules[c];
-      const Frame<Double8>& f = frames_[capsule.link];
-      const Vec<Double8> a = ir::place(f, capsule.p0), b = ir::place(f, capsule.p1);
-      exact.a[c] = a;
-      exact.b[c] = b;
-      narrow(a, state.a[c], part);
-      narrow(b, state.b[c], part);
-      const Double8 one_half = splat<Double8>(0.5);
-      narrow(one_half * (a + b), state.middle[c], part);
-    }
-    if (!with_axes) continue;
-    for (int j = 0; j < n; ++j) {
-      narrow(frames_[j + 1].z, state.axis[j], part);
-      narrow(frames_[j + 1].origin, state.origin[j], part);
-    }
+    model_.chain.forward(q_.data(), exact[part].data());
+  }
+  const auto& high = exact[Lanes<V>::width / 8 - 1];
+  for (int link = 0; link <= n; ++link) {
+    Frame<V>& f = state.frames[link];
+    narrow(exact[0][link].x, high[link].x, f.x);
+    narrow(exact[0][link].y, high[link].y, f.y);
+    narrow(exact[0][link].z, high[link].z, f.z);
+    narrow(exact[0][link].origin, high[link].origin, f.origin);
+  }
+  const V one_half = splat<V>(Scalar<V>(0.5));
+  for (std::size_t c = 0; c < model_.capsules.size(); ++c) {
+    const Capsule& capsule = model_.capsules[c];
+    const Frame<V>& f = state.frames[capsule.link];
+    const Vec<V> a = ir::place(f, capsule.p0), b = ir::place(f, capsule.p1);
+    state.a[c] = a;
+    state.b[c] = b;
+    state.middle[c] = one_half * (a + b);
   }
 }
 

@@ -65,25 +65,25 @@ class Model {
   void finish();
 };
 
-// Ends and middles of all capsules, and the joints' axes, in lanes.
+// Frames of the links (0..n), ends and middles of all capsules, in lanes.
 template <class V> struct State {
-  std::vector<Vec<V>> a, b, middle;  // per capsule
-  std::vector<Vec<V>> axis, origin;  // per joint
+  std::vector<Frame<V>> frames;
+  std::vector<Vec<V>> a, b, middle;
 };
 
-// Evaluates configurations, Lanes<V>::width at a time, without allocating again.
+// Evaluates configurations, Lanes<V>::width at a time, without allocating again. The kinematics is always computed in
+// double.
 template <class V> class Placement {
  public:
   explicit Placement(const Model& model);
   // rows: q of each lane (n values); fills the state. Lanes beyond `count` repeat the last one.
-  void place(const double* const* rows, int count, bool with_axes);
+  void place(const double* const* rows, int count);
   State<V> state;
-  State<Double8> half[2];  // the same in double, for lanes 0..7 and 8..15 (only the first with eight lanes)
+  std::vector<Frame<Double8>> exact[2];  // the frames in double, of lanes 0..7 and 8..15
 
  private:
   const Model& model_;
   std::vector<Double8> q_;
-  std::vector<Frame<Double8>> frames_;
 };
 
 template <class V> IR_INLINE Vec<V> to_local(const Body<Scalar<V>>& f, const Vec<V>& p) {

@@ -24,9 +24,11 @@ template <class V> struct Nearest {
   S highest_shift;
   V best;  // least distance - offset so far
   Mask<V> pair;
+  S limit;  // the highest lane of best
 
   IR_INLINE V outside(int) const { return best + slack_of(V{}); }
   IR_INLINE V own(std::size_t) const { return best + slack_of(V{}); }
+  IR_INLINE S farthest(int) const { return limit + slack_of(V{}); }
   IR_INLINE bool done() const { return false; }
   IR_INLINE void take(int z, int, V distance) {
     const V excess = distance - shift[z];
@@ -35,6 +37,7 @@ template <class V> struct Nearest {
     const Mask<V> better = (excess < best) | ((excess == best) & (index < pair));
     best = better ? excess : best;
     pair = better ? index : pair;
+    limit = highest<V>(best);
   }
 };
 
@@ -48,6 +51,7 @@ template <class V> struct Above {
     return free ? V{} + slack_of(V{}) : V{} - std::numeric_limits<S>::infinity();
   }
   IR_INLINE V own(std::size_t) const { return outside(0); }
+  IR_INLINE S farthest(int) const { return slack_of(V{}); }
   IR_INLINE bool done() const { return !any(free); }
   IR_INLINE void take(int z, int, V distance) { free = free & (distance > shift[z]); }
 };
@@ -67,11 +71,23 @@ struct Gathered {
   Vec<Double8> a, b;
   Double8 inverse_square, radius;
 };
-IR_INLINE void gather(const Model& model, const State<Double8>& s, int lane, int capsule, Gathered& to) {
-  to.a.x[lane] = s.a[capsule].x[lane], to.a.y[lane] = s.a[capsule].y[lane], to.a.z[lane] = s.a[capsule].z[lane];
-  to.b.x[lane] = s.b[capsule].x[lane], to.b.y[lane] = s.b[capsule].y[lane], to.b.z[lane] = s.b[capsule].z[lane];
-  to.inverse_square[lane] = model.capsules[capsule].inverse_square;
-  to.radius[lane] = model.capsules[capsule].radius;
+// Lanes with the same capsule are placed together.
+Gathered gather(const Model& model, const std::vector<Frame<Double8>>& frames, const int capsule[8]) {
+  Gathered to{};
+  Int8 index;
+  for (int k = 0; k < 8; ++k) index[k] = capsule[k];
+  for (int k = 0; k < 8; ++k) {
+    bool seen = false;
+    for (int j = 0; j < k; ++j) seen |= capsule[j] == capsule[k];
+    if (seen) continue;
+    const Capsule& c = model.capsules[capsule[k]];
+    const Int8 same = index == index[k];
+    to.a = select(same, place(frames[c.link], c.p0), to.a);
+    to.b = select(same, place(frames[c.link], c.p1), to.b);
+    to.inverse_square = same ? splat<Double8>(c.inverse_square) : to.inverse_square;
+    to.radius = same ? splat<Double8>(c.radius) : to.radius;
+  }
+  return to;
 }
 
 struct GatheredBody {
@@ -105,23 +121,22 @@ IR_INLINE Vec<Double8> normal_of(const Vec<Double8>& gap, Double8 distance, cons
 }
 
 // Exact witness of one pair per lane, in double; lanes of the same kind of body are computed together.
-WitnessLanes witness(const Model& model, const State<Double8>& s, const int* pair, int count) {
+WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& frames, const int* pair, int count) {
   const int outside = static_cast<int>(model.environment.size());
-  Gathered a{}, b{};
   GatheredBody f{};
-  int kind[8];
+  int kind[8], first[8], second[8];
   std::uint32_t kinds = 0;
   constexpr int own = 6;  // after the kinds of bodies
   for (int k = 0; k < 8; ++k) {
     const int z = pair[std::min(k, count - 1)];
     if (z >= outside) {
       const SelfPair& p = model.self_pairs[z - outside];
-      gather(model, s, k, p.a, a);
-      gather(model, s, k, p.b, b);
+      first[k] = p.a;
+      second[k] = p.b;
       kind[k] = own;
     } else {
       const auto& e = model.environment[z];
-      gather(model, s, k, e[0], a);
+      first[k] = second[k] = e[0];
       kind[k] = model.kind[e[1]];
       const Body<double>& body = model.bodies_double[e[1]];
       for (int i = 0; i < 3; ++i) {
@@ -134,6 +149,7 @@ WitnessLanes witness(const Model& model, const State<Double8>& s, const int* pai
     }
     kinds |= 1u << kind[k];
   }
+  const Gathered a = gather(model, frames, first);
   const Vec<Double8> la{dot(f.axis[0], a.a) - f.offset[0], dot(f.axis[1], a.a) - f.offset[1],
                         dot(f.axis[2], a.a) - f.offset[2]};
   const Vec<Double8> lb{dot(f.axis[0], a.b) - f.offset[0], dot(f.axis[1], a.b) - f.offset[1],
@@ -181,6 +197,7 @@ WitnessLanes witness(const Model& model, const State<Double8>& s, const int* pai
   const Vec<Double8> n = touch.normal;
   touch.normal = n.x * f.axis[0] + n.y * f.axis[1] + n.z * f.axis[2];
   if (kinds >> own & 1) {
+    const Gathered b = gather(model, frames, second);
     const auto p = segment_segment(a.a, a.b - a.a, a.inverse_square, b.a, b.b - b.a, b.inverse_square);
     const Double8 distance = sqrt(dot(p.gap, p.gap));
     keep(own, {distance, p.s, normal_of(p.gap, distance, a.b - a.a, b.b - b.a)});
@@ -218,12 +235,13 @@ void min_distance_in(const Model& model, const double* q, std::size_t count, con
   constexpr int width = Lanes<V>::width;
   const std::vector<S> shift = converted<S>(offset, model.pairs());
   Placement<V> placement(model);
-  Nearest<V> policy{shift.data(), highest_of(shift), {}, {}};
+  Nearest<V> policy{shift.data(), highest_of(shift), {}, {}, {}};
   int hint = -1;
   for (std::size_t first = 0; first < count; first += width) {
     const Rows<width> rows(q, first, count, model.chain.n);
-    placement.place(rows.row, rows.count, false);
-    policy.best = V{} + std::numeric_limits<S>::infinity();
+    placement.place(rows.row, rows.count);
+    policy.limit = std::numeric_limits<S>::infinity();
+    policy.best = V{} + policy.limit;
     policy.pair = Mask<V>{} + std::numeric_limits<std::int32_t>::max();
     if (hint >= 0) policy.take(hint, 0, pair_distance(model, placement.state, hint));
     visit(model, placement.state, policy);
@@ -244,7 +262,7 @@ void min_distance_in(const Model& model, const double* q, std::size_t count, con
     hint = nearest[rows.count - 1];
     for (int part = 0; 8 * part < rows.count; ++part) {
       const int lanes = std::min(8, rows.count - 8 * part);
-      write(model, witness(model, placement.half[part], nearest + 8 * part, lanes), lanes, first + 8 * part, result);
+      write(model, witness(model, placement.exact[part], nearest + 8 * part, lanes), lanes, first + 8 * part, result);
     }
   }
 }
@@ -258,7 +276,7 @@ void is_free_in(const Model& model, const double* q, std::size_t count, const do
   Above<V> policy{shift.data(), highest_of(shift), {}};
   for (std::size_t first = 0; first < count; first += width) {
     const Rows<width> rows(q, first, count, model.chain.n);
-    placement.place(rows.row, rows.count, false);
+    placement.place(rows.row, rows.count);
     policy.free = Mask<V>{} - 1;
     visit(model, placement.state, policy);
     const std::uint32_t free = bits(policy.free);
@@ -273,7 +291,7 @@ void distances(const Model& model, const double* q, std::size_t count, double* r
   const std::size_t pairs = model.pairs();
   for (std::size_t first = 0; first < count; first += 8) {
     const Rows<8> rows(q, first, count, model.chain.n);
-    placement.place(rows.row, rows.count, false);
+    placement.place(rows.row, rows.count);
     for (std::size_t z = 0; z < pairs; ++z) {
       const Double8 d = pair_distance(model, placement.state, static_cast<int>(z));
       for (int k = 0; k < rows.count; ++k) result[(first + k) * pairs + z] = d[k];
@@ -298,15 +316,15 @@ void witnesses(const Model& model, const double* q, std::size_t count, const std
   const int n = model.chain.n, outside = static_cast<int>(model.environment.size());
   for (std::size_t first = 0; first < count; first += 8) {
     const Rows<8> rows(q, first, count, n);
-    placement.place(rows.row, rows.count, gradient != nullptr);
+    placement.place(rows.row, rows.count);
     int chosen[8];
     for (int k = 0; k < rows.count; ++k) chosen[k] = static_cast<int>(pair[first + k]);
-    const WitnessLanes w = witness(model, placement.state, chosen, rows.count);
+    const WitnessLanes w = witness(model, placement.exact[0], chosen, rows.count);
     write(model, w, rows.count, first, result);
     if (gradient == nullptr) continue;
     for (int j = 0; j < n; ++j) {
-      const Vec<Double8>& axis = placement.state.axis[j];
-      const Vec<Double8>& origin = placement.state.origin[j];
+      const Vec<Double8>& axis = placement.exact[0][j + 1].z;
+      const Vec<Double8>& origin = placement.exact[0][j + 1].origin;
       const Double8 a = dot(w.normal, cross(axis, w.centre_a - origin));
       const Double8 b = dot(w.normal, cross(axis, w.centre_b - origin));
       for (int k = 0; k < rows.count; ++k) {

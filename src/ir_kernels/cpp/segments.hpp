@@ -201,29 +201,86 @@ template <class V> IR_INLINE Touch<V> outside_cylinder(Vec<V> a, Vec<V> d, V rad
   return r;
 }
 
-// Penetration of one segment into a cylinder (double, scalar): caps, side, and the rims swept along the segment.
-void depth_in_cylinder(const double a[3], const double b[3], double radius, double half, double& depth, double n[3]);
+// Cosine and sine of k turns / 64.
+struct Circle {
+  double c[64], s[64];
+};
+extern const Circle circle;
+
+// Penetration of a segment that crosses the cylinder: caps, side, and the rims swept along the segment, whose
+// directions are perpendicular to it: the best of 64 on that circle, then golden section between its neighbours.
+template <class V> __attribute__((noinline)) void depth_in_cylinder(const Vec<V>& a, const Vec<V>& b, V radius, V half,
+                                                                    V& depth, Vec<V>& n) {
+  using S = Scalar<V>;
+  const V zero{}, one = splat<V>(1), tiny = splat<V>(Limits<V>::tiny);
+  const Vec<V> d = b - a;
+  depth = half - min(a.z, b.z);
+  n = {zero, zero, one};
+  shallower<V>(half + max(a.z, b.z), {zero, zero, -one}, depth, n);
+  const auto normalised = [&](const Vec<V>& v) { return (1 / sqrt(max(dot(v, v), tiny))) * v; };
+  const auto overlap = [&](const Vec<V>& u) {
+    return radius * sqrt(u.x * u.x + u.y * u.y) + half * abs(u.z) - ahead(u, a, b);
+  };
+  const V flat = d.x * d.x + d.y * d.y;
+  const V t = clamp(-(a.x * d.x + a.y * d.y) / max(flat, tiny), zero, one);
+  Vec<V> radial{a.x + t * d.x, a.y + t * d.y, zero};
+  const V away = dot(radial, radial);
+  radial = select(away > flat * Limits<V>::parallel + tiny, radial,
+                  select(flat > tiny, Vec<V>{-d.y, d.x, zero}, Vec<V>{one, zero, zero}));
+  radial = normalised(radial);
+  shallower(overlap(radial), radial, depth, n);
+  const Vec<V> opposite{-radial.x, -radial.y, zero};
+  shallower(overlap(opposite), opposite, depth, n);
+  const Vec<V> u = normalised(select(abs(d.x) < abs(d.z), Vec<V>{zero, d.z, -d.y}, Vec<V>{d.y, -d.x, zero}));
+  const Vec<V> v = normalised(cross(d, u));
+  const auto at = [&](V c, V s) { return c * u + s * v; };
+  V least = splat<V>(S(1e30)), best = zero;
+  for (int k = 0; k < 64; ++k) {
+    const V now = overlap(at(splat<V>(S(circle.c[k])), splat<V>(S(circle.s[k]))));
+    const Mask<V> m = now < least;
+    least = select<V>(m, now, least);
+    best = select<V>(m, splat<V>(S(k)), best);
+  }
+  V bc, bs;  // cosine and sine of the best
+  for (int k = 0; k < Lanes<V>::width; ++k) {
+    const int which = static_cast<int>(best[k]);
+    bc[k] = S(circle.c[which]);
+    bs[k] = S(circle.s[which]);
+  }
+  // directions (1, w) in the frame of the best and its perpendicular, |w| <= tan(turn / 64)
+  const auto turned = [&](V w) { return normalised(at(bc - w * bs, bs + w * bc)); };
+  const S golden = S(0.61803398874989484820);
+  V low = splat<V>(S(-0.0985)), high = splat<V>(S(0.0985));
+  V left = high - golden * (high - low), right = low + golden * (high - low);
+  V at_left = overlap(turned(left)), at_right = overlap(turned(right));
+  for (int k = 0; k < (Lanes<V>::width == 16 ? 20 : 40); ++k) {
+    const Mask<V> m = at_left < at_right;
+    high = select<V>(m, right, high);
+    low = select<V>(m, low, left);
+    const V kept = select<V>(m, left, right), at_kept = select<V>(m, at_left, at_right);
+    const V fresh = select<V>(m, high - golden * (high - low), low + golden * (high - low));
+    const V at_fresh = overlap(turned(fresh));
+    left = select<V>(m, fresh, kept);
+    right = select<V>(m, kept, fresh);
+    at_left = select<V>(m, at_fresh, at_kept);
+    at_right = select<V>(m, at_kept, at_fresh);
+  }
+  const Vec<V> rim = turned((low + high) * S(0.5));
+  const V rim_depth = overlap(rim);
+  const Mask<V> m = (dot(d, d) > S(1e-12)) & (rim_depth < depth);
+  depth = select<V>(m, rim_depth, depth);
+  n = select(m, rim, n);
+}
 
 template <class V> __attribute__((noinline)) Touch<V> segment_cylinder(const Vec<V>& a, const Vec<V>& b, V radius,
                                                                        V half) {
   const Vec<V> d = b - a;
   Mask<V> crossing, ignored;
   Touch<V> r = outside_cylinder(a, d, radius, half, crossing);
-  const std::uint32_t inside = bits(crossing);
-  if (__builtin_expect(inside != 0, 0)) {
-    V depth{};
-    Vec<V> n{};
-    for (int k = 0; k < Lanes<V>::width; ++k) {
-      if (!(inside >> k & 1)) continue;
-      const double from[3] = {double(a.x[k]), double(a.y[k]), double(a.z[k])};
-      const double to[3] = {double(b.x[k]), double(b.y[k]), double(b.z[k])};
-      double least, direction[3];
-      depth_in_cylinder(from, to, double(radius[k]), double(half[k]), least, direction);
-      depth[k] = Scalar<V>(least);
-      n.x[k] = Scalar<V>(direction[0]);
-      n.y[k] = Scalar<V>(direction[1]);
-      n.z[k] = Scalar<V>(direction[2]);
-    }
+  if (__builtin_expect(any(crossing), 0)) {
+    V depth;
+    Vec<V> n;
+    depth_in_cylinder(a, b, radius, half, depth, n);
     const Vec<V> out = a + (depth + Limits<V>::nudge) * n;
     r.t = select<V>(crossing, nearest_to_cylinder(out, d, radius, half, ignored), r.t);
     r.distance = select<V>(crossing, -depth, r.distance);

@@ -2,7 +2,7 @@
 //
 // A policy says how far is near enough: a pair z of capsule c may be skipped where its distance certainly exceeds
 // outside(c) + shift[z] (self pair i: own(i) + shift[z]) in every lane; else take(z, c or i, distance) gets the exact
-// values.
+// values. farthest(c) is the highest lane of outside(c).
 // shift[z] = -inf: the pair doesn't count.
 #pragma once
 
@@ -72,21 +72,19 @@ IR_INLINE void visit_environment(const Model& model, const State<V>& s, int c, P
   const V dx = m.x - x, dy = m.y - y, dz = m.z - z;
   const S spread = std::sqrt(highest<V>(dx * dx + dy * dy + dz * dz));
   const S around = spread + S(capsule.half) + radius;
-  float reach = static_cast<float>(around + highest<V>(policy.outside(c)) + policy.highest_shift) * 1.00001f + 1e-5f;
+  const Float16 zero{};
   for (const Leaf& leaf : model.leaves) {
-    const Float16 zero{};
+    const float reach = static_cast<float>(around + policy.farthest(c) + policy.highest_shift) * 1.00001f + 1e-5f;
     const Float16 px = splat<Float16>(float(x)), py = splat<Float16>(float(y)), pz = splat<Float16>(float(z));
     const Float16 gx = max(max(leaf.low[0] - px, px - leaf.high[0]), zero);
     const Float16 gy = max(max(leaf.low[1] - py, py - leaf.high[1]), zero);
     const Float16 gz = max(max(leaf.low[2] - pz, pz - leaf.high[2]), zero);
     const float limit = reach > 0.0f ? reach * reach : 0.0f;
     std::uint32_t near = bits(gx * gx + gy * gy + gz * gz <= limit);
-    if (near == 0) continue;
     for (; near != 0; near &= near - 1) {
       const int body = leaf.body[__builtin_ctz(near)];
       if (body >= 0) visit_body(model, s, c, body, policy);
     }
-    reach = static_cast<float>(around + highest<V>(policy.outside(c)) + policy.highest_shift) * 1.00001f + 1e-5f;
   }
 }
 
