@@ -309,6 +309,16 @@ def test_a_driver_that_falls_silent_ends_the_program(cell, wait_for):
     wait_for(lambda: cell.driver.log[-1] == "stopped")
 
 
+def test_a_driver_that_falls_silent_in_a_pause_ends_the_program_and_the_bit_is_taken_back(cell):
+    def fall_silent(at):
+        if at.phase == "pause: BUS_POWER_OFF":
+            cell.driver.timer.cancel()
+
+    result = cell.run([pause(60.0, "BUS_POWER_OFF")], feedback=fall_silent)
+    assert result.status.code == StatusCode.ROBOT_STATE_STALE
+    assert cell.driver.log[-2:] == ["ab=1", "ab=0"]
+
+
 def test_a_driver_that_hibernates_during_a_movement_ends_the_program(cell):
     def hibernate(at):
         if at.phase == "moving":
