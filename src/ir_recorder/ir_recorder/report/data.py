@@ -16,6 +16,7 @@ from ir_recorder.report.series import envelope, floats
 from ir_recorder.report.words import mode_words
 
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
+_BITS = {"ab": "AB", "hib": "HIB", "bbs": "BBS", "drives_ready": "drives", "emergency_stop": "e-stop"}
 MOST_CLEARANCES = 6_000
 
 
@@ -73,7 +74,7 @@ def _lanes(analysis: Analysis) -> Iterator[dict[str, Any]]:
             for name in names:
                 spans = list(_bit_spans(series, name, recording.duration))
                 if spans:
-                    yield {"label": f"{name.upper().replace('_', ' ')} {side}", "spans": spans, "thin": True}
+                    yield {"label": f"{_BITS[name]} {side}", "spans": spans, "thin": True}
 
 
 def _mode_spans(analysis: Analysis) -> Iterator[list[Any]]:

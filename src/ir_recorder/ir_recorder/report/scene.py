@@ -41,6 +41,7 @@ def scene(analysis: Analysis) -> dict[str, Any] | None:
         "jointAxes": [[round(float(x), 9) for x in axis] for axis in cell.robot.joint_axis],
         "shapes": [*_robot_shapes(cell), *_load_shapes(cell)],
         "bodies": _bodies(cell),
+        "labels": _labels(cell),
         "zones": _zones(cell),
         "parts": _part_places(analysis, cell),
         "loads": [[round(t, 3), load] for t, load in _load_changes(analysis)],
@@ -91,6 +92,19 @@ def _bodies(cell: Cell) -> list[dict[str, Any]]:
                 pose = _matrix(body.pose)
                 bodies.append({"name": body.name, "owner": machine.name, "pose": pose, **_mesh(mesh)})
     return bodies
+
+
+def _labels(cell: Cell) -> list[dict[str, Any]]:
+    """Where the name of each machine stands: above the middle of its bodies."""
+    labels = []
+    for machine in cell.equipment:
+        bounds = [body.bounds() for body in machine.world_bodies() if body.kind != "plane"]
+        if bounds:
+            low = np.min([b[0] for b in bounds], axis=0)
+            high = np.max([b[1] for b in bounds], axis=0)
+            point = [*(low[:2] + high[:2]) / 2.0, high[2] + 0.08]
+            labels.append({"name": machine.name, "point": [round(float(x), 3) for x in point]})
+    return labels
 
 
 def _zones(cell: Cell) -> list[dict[str, Any]]:

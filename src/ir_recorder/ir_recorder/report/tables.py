@@ -23,16 +23,11 @@ from ir_recorder.report.words import (
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
     """A table; cells are HTML. A head that starts with ">" is a column of numbers."""
     columns = "".join(f"<th{_number(head)}>{text(head.lstrip('>'))}</th>" for head in heads)
-    body = "".join(
-        "<tr>" + "".join(f"<td{_number(h)}>{cell}</td>" for h, cell in zip(heads, row, strict=True)) + "</tr>"
-        for row in rows
-    )
+    body = "".join(f"<tr>{_cells(heads, row)}</tr>" for row in rows)
     if not body:
         return '<p class="empty">Nothing was recorded.</p>'
-    return (
-        f'<div class="scroll"><table class="{kind}"><thead><tr>{columns}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
-    )
+    head = f"<thead><tr>{columns}</tr></thead>"
+    return f'<div class="scroll"><table class="{kind}">{head}<tbody>{body}</tbody></table></div>'
 
 
 def step_table(results: Sequence[StepResult]) -> str:
@@ -41,7 +36,7 @@ def step_table(results: Sequence[StepResult]) -> str:
         "#",
         "step",
         "load",
-        ">s",
+        ">time",
         ">planned",
         ">measured",
         ">deviation",
@@ -49,28 +44,27 @@ def step_table(results: Sequence[StepResult]) -> str:
         ">mean",
         ">peak",
     )
-    return table(
-        (*heads, ">clearance", "nearest pair", ">tool off by"), (_step(result) for result in results)
-    )
+    return table((*heads, ">clearance", ">tool off by"), (_step(result) for result in results))
 
 
 def _step(result: StepResult) -> tuple[str, ...]:
-    movement, near = result.step.movement, result.clearance
-    plan = movement.report.energy
-    unfinished = "" if result.step.outcome == "ended" else f' <b class="bad">{text(result.step.outcome)}</b>'
+    step, near = result.step, result.clearance
+    plan = step.movement.report.energy
+    label = f'<button class="go" data-time="{step.start:.3f}">{text(step.label)}</button>'
+    if step.outcome != "ended":
+        label += f' <b class="bad">{text(step.outcome)}</b>'
     return (
-        str(result.step.index + 1),
-        f'<button class="go" data-time="{result.step.start:.3f}">{text(result.step.label)}</button>{unfinished}',
-        text(movement.load or DASH),
-        f"{result.seconds:.2f}",
+        str(step.index + 1),
+        label,
+        text(step.movement.load or DASH),
+        f"{result.seconds:.2f} s",
         joules(plan) if plan else DASH,
         joules(result.energy),
-        percent(result.energy / plan - 1.0) if plan and not movement.is_pause else DASH,
+        percent(result.energy / plan - 1.0) if plan and not step.movement.is_pause else DASH,
         joules(result.indirect_energy),
         watts(result.mean_power),
         watts(result.peak_power),
-        millimetres(near.least) if near else DASH,
-        text(near.least_pair) if near else DASH,
+        f"{millimetres(near.least)}<small>{text(near.least_pair)}</small>" if near else DASH,
         millimetres(result.tool_deviation),
     )
 
@@ -165,6 +159,10 @@ def problem_list(problems: Sequence[str]) -> str:
         return ""
     items = "".join(f"<li>{text(problem)}</li>" for problem in problems)
     return f'<div class="problems"><b>Not everything could be read</b><ul>{items}</ul></div>'
+
+
+def _cells(heads: Sequence[str], row: Sequence[str]) -> str:
+    return "".join(f"<td{_number(head)}>{cell}</td>" for head, cell in zip(heads, row, strict=True))
 
 
 def _share(share: Share) -> str:

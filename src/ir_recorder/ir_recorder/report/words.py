@@ -9,7 +9,7 @@ DASH = "–"
 
 
 def joules(value: float) -> str:
-    """1234.5 -> "1 235 J", from 10 kJ on "12.3 kJ"."""
+    """Whole joules ("1 235 J"), from 10 kJ on "12.3 kJ"."""
     if not math.isfinite(value):
         return DASH
     if abs(value) >= 10_000.0:
@@ -38,7 +38,10 @@ def millimetres(value: float) -> str:
 
 def percent(value: float) -> str:
     """A ratio as a signed percentage."""
-    return f"{value * 100.0:+.2f} %" if math.isfinite(value) else DASH
+    if not math.isfinite(value):
+        return DASH
+    shown = f"{value * 100.0:+.2f}"
+    return "0.00 %" if shown in ("+0.00", "-0.00") else f"{shown} %"
 
 
 def number(value: float, unit: str) -> str:
@@ -51,7 +54,7 @@ def number(value: float, unit: str) -> str:
 
 
 def mode_words(name: str) -> str:
-    """ "BUS_POWER_OFF" -> "bus power off"."""
+    """A mode's name as words: "bus power off"."""
     return name.lower().replace("_", " ")
 
 

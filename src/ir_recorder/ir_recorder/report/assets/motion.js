@@ -21,6 +21,7 @@ class Motion {
       names: c.pairs, pair: words(c.pair) }));
     this.mostPower = Math.max(this.power.reduce((a, b) => Math.max(a, b), 0), 1);
     this.path = this.toolPath();
+    this.labels = this.machineLabels();
     this.home = this.overview();
     this.eye = { ...this.home };
     this.recolour();
@@ -38,6 +39,7 @@ class Motion {
     this.ramp = RAMP.map(colour);
     this.pathTints = new Float32Array(this.path.length);
     for (let i = 0; i < this.frames; i++) this.pathTints.set(this.powerTint(this.power[i]), 3 * i);
+    for (const name of ["trail", "grid"]) if (this[name]) { this.renderer.release(this[name]); this[name] = null; }
     this.schedule();
   }
   powerTint(watts) {
@@ -152,6 +154,25 @@ class Motion {
     if (this.show.nearest) this.drawNearest(time);
     if (this.show.zones) this.drawZones();
     r.end();
+    this.placeLabels(view, box);
+  }
+  /* The machines' names, above the middle of each. */
+  machineLabels() {
+    return this.scene.labels.map(({ name, point }) => {
+      const element = document.createElement("span");
+      element.className = "machine";
+      element.textContent = name;
+      this.canvas.parentElement.append(element);
+      return { element, point };
+    });
+  }
+  placeLabels(view, box) {
+    for (const { element, point } of this.labels) {
+      const [x, y, , w] = M4.point(view, point);
+      element.hidden = w < 0.1 || Math.abs(x) > w || Math.abs(y) > w;
+      element.style.left = `${(x / w * 0.5 + 0.5) * box.width}px`;
+      element.style.top = `${(0.5 - y / w * 0.5) * box.height}px`;
+    }
   }
   items(time, frame) {
     const poses = this.linkPoses(frame), load = this.load(time).split("+"), items = [];
@@ -177,14 +198,17 @@ class Motion {
       this.gridPoints = new Float32Array(points);
     }
     if (this.renderer instanceof GlRenderer) this.renderer.drawMesh(this.floorMesh, IDENTITY, this.tints.ground, 1, 1);
-    const tints = new Float32Array(this.gridPoints.length);
-    for (let i = 0; i < tints.length; i += 3) tints.set(this.tints.grid, i);
-    this.renderer.drawLines(this.gridPoints, tints, false, 0.6);
+    if (!this.grid) {
+      const tints = new Float32Array(this.gridPoints.length);
+      for (let i = 0; i < tints.length; i += 3) tints.set(this.tints.grid, i);
+      this.grid = this.renderer.path(this.gridPoints, tints, false);
+    }
+    this.renderer.drawPath(this.grid, { wide: 1, alpha: 0.6 });
   }
   drawTrail(frame) {
-    const now = 3 * (Math.floor(frame) + 1);
-    this.renderer.drawLines(this.path.subarray(0, now), this.pathTints.subarray(0, now), true, 1);
-    this.renderer.drawLines(this.path, this.pathTints, true, 0.22);
+    if (!this.trail) this.trail = this.renderer.path(this.path, this.pathTints, true);
+    this.renderer.drawPath(this.trail, { wide: 1.5, alpha: 0.3 });
+    this.renderer.drawPath(this.trail, { wide: 4, count: Math.floor(frame) });
   }
   pairAt(time) {
     for (const c of this.nearest) {
@@ -199,7 +223,9 @@ class Motion {
     if (!hit) return;
     const ends = (s) => [...s.subarray(3 * hit.k, 3 * hit.k + 3)].map((v) => v * 5e-4);
     const tint = hit.c.distance[hit.k] < 0.02 ? this.tints.bad : this.tints.a3;
-    this.renderer.drawLines(new Float32Array([...ends(hit.c.a), ...ends(hit.c.b)]), new Float32Array([...tint, ...tint]), false, 1, true);
+    const line = this.renderer.path(new Float32Array([...ends(hit.c.a), ...ends(hit.c.b)]), new Float32Array([...tint, ...tint]), false);
+    this.renderer.drawPath(line, { wide: 3, onTop: true });
+    this.renderer.release(line);
   }
   drawZones() {
     for (const zone of this.scene.zones) {

@@ -50,9 +50,28 @@ void main() { vec3 m = normalize(n); vec3 v = normalize(eye - p); if (dot(m, v) 
   float sky = 0.5 + 0.5 * m.z; float sun = max(dot(m, light), 0.0);
   float shine = pow(max(dot(reflect(-light, m), v), 0.0), 24.0) * 0.18;
   vec3 lit = tint * (0.42 + 0.24 * sky + 0.5 * sun) + shine; gl_FragColor = vec4(mix(lit, tint, flatness), alpha); }`;
-const LINE_VERTEX = `attribute vec3 point; attribute vec3 tint; uniform mat4 view; varying vec3 c;
-void main() { c = tint; gl_Position = view * vec4(point, 1.0); }`;
+/* A line is a quad as wide as asked for in pixels: WebGL's own lines are one pixel wide. */
+const LINE_VERTEX = `attribute vec3 point, other, tint; attribute float side; uniform mat4 view; uniform vec2 pixel; uniform float wide;
+varying vec3 c;
+void main() { c = tint; vec4 a = view * vec4(point, 1.0); vec4 b = view * vec4(other, 1.0);
+  vec2 along = (b.xy / max(b.w, 0.01) - a.xy / max(a.w, 0.01)) / pixel; float n = length(along);
+  vec2 across = n > 1e-4 ? vec2(-along.y, along.x) / n : vec2(0.0);
+  gl_Position = a + vec4(across * side * wide * pixel * a.w, 0.0, 0.0); }`;
 const LINE_FRAGMENT = `precision mediump float; varying vec3 c; uniform float alpha; void main() { gl_FragColor = vec4(c, alpha); }`;
+
+/* Corners of the quads of all segments: point, other end, tint and side of each, 10 numbers a corner. */
+function lineQuads(points, tints, strip) {
+  const count = strip ? points.length / 3 - 1 : points.length / 6, out = new Float32Array(Math.max(count, 0) * 60);
+  for (let s = 0; s < count; s++) {
+    const i = strip ? s : 2 * s;
+    [[i, i + 1, 1], [i, i + 1, -1], [i + 1, i, -1], [i + 1, i, -1], [i + 1, i, 1], [i, i + 1, 1]].forEach(([a, b, side], k) => {
+      const at = s * 60 + k * 10;
+      for (let d = 0; d < 3; d++) { out[at + d] = points[3 * a + d]; out[at + 3 + d] = points[3 * b + d]; out[at + 6 + d] = tints[3 * a + d]; }
+      out[at + 9] = side;
+    });
+  }
+  return out;
+}
 
 class GlRenderer {
   static create(canvas) {
@@ -63,8 +82,7 @@ class GlRenderer {
     this.canvas = canvas;
     this.gl = gl;
     this.solid = this.program(VERTEX, FRAGMENT, ["point", "normal"], ["model", "view", "tint", "light", "eye", "alpha", "flatness"]);
-    this.lines = this.program(LINE_VERTEX, LINE_FRAGMENT, ["point", "tint"], ["view", "alpha"]);
-    this.scratch = [gl.createBuffer(), gl.createBuffer()];
+    this.lines = this.program(LINE_VERTEX, LINE_FRAGMENT, ["point", "other", "tint", "side"], ["view", "alpha", "pixel", "wide"]);
   }
   program(vertex, fragment, attributes, uniforms) {
     const gl = this.gl, program = gl.createProgram();
@@ -134,19 +152,33 @@ class GlRenderer {
     for (const [mesh, model] of items) this.drawMesh(mesh, M4.times(SHADOW, model), tint, alpha, 1);
     gl.disable(gl.STENCIL_TEST);
   }
-  /* points and tints: 3 numbers a corner. strip: one path, else pairs. */
-  drawLines(points, tints, strip, alpha = 1, onTop = false) {
+  /* Lines to draw again and again. points and tints: 3 numbers a corner; strip: one path, else pairs. */
+  path(points, tints, strip) {
+    return { buffer: this.fill(this.gl.createBuffer(), lineQuads(points, tints, strip)), count: strip ? points.length / 3 - 1 : points.length / 6 };
+  }
+  /* The first `count` segments of a path, `wide` pixels wide. */
+  drawPath(path, { count = path.count, wide = 2, alpha = 1, onTop = false } = {}) {
     const gl = this.gl;
-    if (points.length < 6) return;
+    if (count < 1) return;
     gl.useProgram(this.lines.program);
     gl.uniformMatrix4fv(this.lines.view, false, this.view);
     gl.uniform1f(this.lines.alpha, alpha);
-    this.attribute(0, this.fill(this.scratch[0], points));
-    this.attribute(1, this.fill(this.scratch[1], tints));
+    gl.uniform1f(this.lines.wide, wide * (window.devicePixelRatio || 1) / 2);
+    gl.uniform2f(this.lines.pixel, 2 / this.canvas.width, 2 / this.canvas.height);
+    gl.bindBuffer(gl.ARRAY_BUFFER, path.buffer);
+    [[0, 3, 0], [1, 3, 12], [2, 3, 24], [3, 1, 36]].forEach(([index, size, offset]) => {
+      gl.enableVertexAttribArray(index);
+      gl.vertexAttribPointer(index, size, gl.FLOAT, false, 40, offset);
+    });
     if (onTop) gl.disable(gl.DEPTH_TEST);
-    gl.drawArrays(strip ? gl.LINE_STRIP : gl.LINES, 0, points.length / 3);
+    gl.depthMask(false);
+    gl.drawArrays(gl.TRIANGLES, 0, count * 6);
+    gl.depthMask(true);
     gl.enable(gl.DEPTH_TEST);
+    gl.disableVertexAttribArray(2);
+    gl.disableVertexAttribArray(3);
   }
+  release(path) { this.gl.deleteBuffer(path.buffer); }
   end() {}
 }
 
@@ -188,14 +220,19 @@ class PlainRenderer {
     }
   }
   drawShadows() {}
-  drawLines(points, tints, strip, alpha = 1, onTop = false) {
-    for (let i = 0; i + 1 < points.length / 3; i += strip ? 1 : 2) {
+  path(points, tints, strip) { return { points, tints, strip, count: strip ? points.length / 3 - 1 : points.length / 6 }; }
+  drawPath(path, { count = path.count, alpha = 1, onTop = false } = {}) {
+    const { points, tints, strip } = path;
+    for (let k = 0; k < count; k++) {
+      const i = strip ? k : 2 * k;
       const a = this.screen(points.subarray(3 * i, 3 * i + 3)), b = this.screen(points.subarray(3 * i + 3, 3 * i + 6));
       if (!a || !b) continue;
-      const item = { corners: [a, b], depth: (a[2] + b[2]) / 2, fill: rgb([...tints.subarray(3 * i, 3 * i + 3)]), alpha };
-      if (onTop) this.faces.push({ ...item, depth: 0 }); else if (points[3 * i + 2] === 0 && points[3 * i + 5] === 0) this.under.push(item); else this.faces.push(item);
+      const depth = onTop ? 0 : (a[2] + b[2]) / 2, fill = rgb([...tints.subarray(3 * i, 3 * i + 3)]);
+      const onFloor = points[3 * i + 2] === 0 && points[3 * i + 5] === 0;
+      (onFloor ? this.under : this.faces).push({ corners: [a, b], depth, fill, alpha });
     }
   }
+  release() {}
   end() {
     const g = this.g;
     for (const list of [this.under, this.faces.sort((a, b) => b.depth - a.depth)]) {
