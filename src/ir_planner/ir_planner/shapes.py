@@ -100,7 +100,8 @@ def station_shapes(name: str, pose: FloatArray) -> tuple[Shape, ...]:
     back = tip - 0.15 * np.asarray(pose)[:3, 0]
     line = Shape("stations", "line", np.eye(4), np.array([0.01, 0.0, 0.0]), WAY, np.stack([back, tip]))
     label = np.eye(4)
-    label[:3, 3] = (*tip, 0.0, 0.0, 0.12)
+    label[:3, 3] = tip
+    label[2, 3] += 0.12
     return line, Shape("stations", "text", label, np.full(3, 0.08), (1.0, 1.0, 1.0, 1.0), _NONE, name)
 
 

@@ -1,0 +1,85 @@
+"""Joules at the mains: the balance closes for every movement, and standing still costs what Table II says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from ir_kernels.power import REGENERATIONS
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.blending import standing, stretched
+from ir_planner.budget import Budget
+from ir_planner.energy import holding_watts, movement_energy
+from ir_planner.movement import timed_movement
+from ir_planner.objective import best_stretch
+from ir_planner.scene import PlanningScene
+
+Degrees = Callable[..., Any]
+
+
+@pytest.fixture
+def fast(demo_scene: PlanningScene, degrees: Degrees, budget: Budget) -> JointTrajectory:
+    path = np.stack([degrees(0, -50, 60, 0, 0, 0), degrees(80, -110, 120, 0, 30, 0)])
+    return timed_movement(path, demo_scene, PlanOptions(objective="time"), budget).trajectory
+
+
+@pytest.mark.parametrize("regeneration", REGENERATIONS)
+def test_base_axes_burnt_and_capacitor_sum_up(
+    fast: JointTrajectory, demo_scene: PlanningScene, regeneration: Any
+) -> None:
+    energy = movement_energy(fast, replace(demo_scene, regeneration=regeneration))
+    parts = energy.base + energy.joints.sum() + energy.burnt + energy.capacitor
+    assert energy.total == pytest.approx(parts, rel=1e-9)
+    assert energy.total == pytest.approx(float(np.mean(energy.watts)) * fast.duration, rel=1e-9)
+    assert energy.peak == pytest.approx(energy.watts.max())
+    assert energy.burnt >= 0.0
+
+
+def test_sharing_the_bus_costs_no_more_than_burning_and_no_less_than_feeding_back(
+    fast: JointTrajectory, demo_scene: PlanningScene
+) -> None:
+    total = {
+        kind: movement_energy(fast, replace(demo_scene, regeneration=kind)).total for kind in REGENERATIONS
+    }
+    assert total["fed_back"] < total["shared"] < total["none"]
+
+
+def test_the_steps_are_fine_enough(fast: JointTrajectory, demo_scene: PlanningScene) -> None:
+    coarse, fine = (movement_energy(fast, demo_scene, step).total for step in (1e-3, 1e-4))
+    assert coarse == pytest.approx(fine, rel=2e-4)
+
+
+def test_holding_at_machine_home_is_table_2(demo_scene: PlanningScene) -> None:
+    home = np.array(demo_scene.cell.machine_home)
+    assert holding_watts(home, demo_scene) == pytest.approx(735.0, rel=0.01)
+    assert holding_watts(home, replace(demo_scene, loads=())) == pytest.approx(420.0, rel=0.01)
+    second = stretched(standing(home, demo_scene.cell.robot.joint_names), 1000.0)
+    assert movement_energy(second, demo_scene).total == pytest.approx(735.0, rel=0.01)
+
+
+def test_lowering_a_load_gives_energy_back_on_the_bus(
+    demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+) -> None:
+    path = np.stack([degrees(0, -90, 60, 0, 0, 0), degrees(0, -40, 60, 0, 0, 0)])
+    slow = timed_movement(path, demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget).trajectory
+    down = movement_energy(slow, demo_scene)
+    back = movement_energy(
+        timed_movement(path[::-1], demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget).trajectory,
+        demo_scene,
+    )
+    assert down.joints.sum() < back.joints.sum()
+    assert down.total >= down.base - 1e-9
+
+
+def test_the_objective_trades_time_for_joules(fast: JointTrajectory, demo_scene: PlanningScene) -> None:
+    assert best_stretch(fast, demo_scene, "time", 500.0) == 1.0
+    assert best_stretch(fast, demo_scene, "movement_cost", 500.0) == 1.0
+    both = best_stretch(fast, demo_scene, "time_and_energy", 500.0)
+    frugal = best_stretch(fast, demo_scene, "energy", 500.0)
+    assert 1.0 <= both <= frugal
+    assert movement_energy(stretched(fast, frugal), demo_scene).total < movement_energy(fast, demo_scene).total
+    assert best_stretch(fast, demo_scene, "time_and_energy", 1e6) == 1.0

@@ -1,0 +1,84 @@
+"""What people type as a goal, and what they are told when it is none."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ir_description import Cell, load_cell
+from ir_msgs_py.status import StatusCode
+from ir_planner.errors import PlannerError, RequestError
+from ir_planner.goals import one_goal, parse_goal
+
+CELL = load_cell("demo")
+
+
+def test_a_station_is_its_pose_and_keeps_its_name() -> None:
+    goal = parse_goal("lathe_work", CELL)
+    assert goal.station == "lathe_work"
+    assert goal.configuration is None
+    assert np.array_equal(goal.pose, CELL.station("lathe_work").pose)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("text", "posture"), [("home", "machine_home"), ("Park", "park")])
+def test_postures_have_names(text: str, posture: str) -> None:
+    assert np.array_equal(parse_goal(text, CELL).configuration, getattr(CELL, posture))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "text", ["A1 10 A2 -90 A3 90 A4 0 A5 -5 A6 0", "a1=10, a2=-90, a3=90, a4=0, a5=-5, a6=0", "A6 0 A5 -5 A4 0 A3 90 A2 -90 A1 10"]
+)  # fmt: skip
+def test_joint_values_are_degrees_in_any_order(text: str) -> None:
+    assert np.degrees(parse_goal(text, CELL).configuration) == pytest.approx([10, -90, 90, 0, -5, 0])  # type: ignore[arg-type]
+
+
+def test_a_pose_is_metres_and_kukas_angles() -> None:
+    pose = parse_goal("X 1.8 Y 0.1 Z 1.2 A 0 B 90 C 0", CELL).pose
+    assert pose is not None
+    assert pose[:3, 3] == pytest.approx([1.8, 0.1, 1.2])
+    assert pose[:3, 0] == pytest.approx([0.0, 0.0, -1.0]), "B 90 turns the tool's x downwards"
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "says"),
+    [
+        ("lath", StatusCode.INVALID_OBJECT_NAME, "lathe_work"),
+        ("A1 10 A2 -90", StatusCode.INVALID_GOAL_CONSTRAINTS, "A1 A2 A3 A4 A5 A6"),
+        ("A1 10 A1 10 A3 90 A4 0 A5 -5 A6 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "once"),
+        ("A1 ten A2 -90 A3 90 A4 0 A5 -5 A6 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "'ten'"),
+        ("A1 nan A2 -90 A3 90 A4 0 A5 -5 A6 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "finite"),
+        ("A1 190 A2 -90 A3 90 A4 0 A5 -5 A6 0", StatusCode.GOAL_STATE_INVALID, "joint_a1 is 190 deg"),
+        ("X 1 Y 2 Z", StatusCode.INVALID_GOAL_CONSTRAINTS, "X Y Z A B C"),
+        ("X 1e9 Y 0 Z 1 A 0 B 0 C 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "100"),
+        ("home\n", None, ""),
+        ("ho\0me", StatusCode.INVALID_GOAL_CONSTRAINTS, "one line"),
+        ("x" * 10_000, StatusCode.INVALID_GOAL_CONSTRAINTS, "300"),
+    ],
+)
+def test_what_is_no_goal_is_named(text: str, code: StatusCode | None, says: str) -> None:
+    if code is None:
+        assert parse_goal(text, CELL).configuration is not None
+        return
+    with pytest.raises(RequestError, match=re.escape(says)) as caught:
+        parse_goal(text, CELL)
+    assert caught.value.code == code
+
+
+def test_exactly_one_form_is_taken() -> None:
+    home = np.array(CELL.machine_home)
+    assert one_goal("", home, None, CELL).configuration is not None
+    for text, q, pose in (("", None, None), ("home", home, None), ("", home, np.eye(4))):
+        with pytest.raises(RequestError, match="exactly one"):
+            one_goal(text, q, pose, CELL)
+
+
+@given(st.text(max_size=80))
+def test_no_text_escapes_as_another_error(text: str) -> None:
+    cell: Cell = CELL
+    try:
+        parse_goal(text, cell)
+    except PlannerError as error:
+        assert str(error)

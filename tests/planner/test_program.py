@@ -1,0 +1,149 @@
+"""The demonstration program: every movement certified, parts in hand where they should be, one id per content."""
+
+from __future__ import annotations
+
+import time
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from ir_description import Cell, PowerData, load_cell
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import MovementKind
+from ir_msgs_py.status import StatusCode
+from ir_planner.budget import Budget
+from ir_planner.errors import CancelledError, RequestError
+from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
+
+
+def no_progress(phase: str, done: int, total: int, cost: float) -> None:
+    """Nobody listens."""
+
+
+def planned(cell: Cell, power: PowerData, *stations: str, cycle_time: float = 0.0, **choices: Any) -> ProgramPlan:
+    choices = {"planning_time": 60.0, **choices}
+    request = ProgramRequest(
+        cell, power, stations, np.array(cell.machine_home), PlanOptions(**choices), cycle_time
+    )
+    return plan_program(request, Budget(100_000, time.monotonic() + 60.0, time.monotonic), no_progress)
+
+
+@pytest.fixture(scope="module")
+def demo(demo_cell: Cell, power: PowerData) -> ProgramPlan:
+    plan = planned(demo_cell, power)
+    assert plan.status.ok, plan.status.message
+    return plan
+
+
+def test_every_movement_is_certified_and_costs_joules(demo: ProgramPlan) -> None:
+    moves = [movement for movement in demo.movements if not movement.is_pause]
+    assert len(moves) > 10
+    for movement in moves:
+        assert movement.report.certified
+        assert movement.report.energy > 0.0
+        assert movement.trajectory is not None
+        assert movement.trajectory_id == movement.trajectory.trajectory_id
+        assert movement.duration == movement.trajectory.duration
+    assert demo.report.certified
+    assert demo.report.energy == pytest.approx(sum(movement.report.energy for movement in demo.movements))
+    assert demo.report.duration == pytest.approx(sum(movement.duration for movement in demo.movements))
+
+
+def test_each_movement_starts_where_the_last_one_ended(demo: ProgramPlan, demo_cell: Cell) -> None:
+    ends = [movement.trajectory.positions[[0, -1]] for movement in demo.movements if movement.trajectory is not None]
+    assert np.array_equal(ends[0][0], demo_cell.machine_home)
+    for before, after in pairwise(ends):
+        assert np.array_equal(before[1], after[0])
+
+
+def test_the_part_is_in_the_hand_between_fetching_and_putting_down(demo: ProgramPlan) -> None:
+    held = False
+    for movement in demo.movements:
+        assert movement.load == ("gripper+gear" if held else "gripper")
+        if movement.attach:
+            assert (movement.attach, movement.to_station) == ("gear", "infeed_pick")
+            held = True
+        if movement.detach:
+            assert (movement.detach, movement.to_station) == ("gear", "outfeed_place")
+            held = False
+    assert not held
+
+
+def test_stations_are_entered_and_left_in_a_straight_line_with_their_contacts_named(
+    demo: ProgramPlan, demo_scene: Any
+) -> None:
+    service = [m for m in demo.movements if m.kind in (MovementKind.SERVICE_ENTRY, MovementKind.SERVICE_EXIT)]
+    assert {m.to_station for m in service} == {"infeed_pick", "lathe_work", "gauge_measure", "outfeed_place"}
+    for movement in service:
+        station = demo_scene.station(movement.to_station)
+        assert movement.trajectory is not None
+        q = movement.trajectory.sample(np.linspace(0.0, movement.duration, 200)).q
+        tcp = demo_scene.chain.tcp_poses(q)[:, :3, 3] - np.asarray(station.pose)[:3, 3]
+        along = tcp @ np.asarray(station.pose)[:3, 0]
+        aside = tcp - along[:, None] * np.asarray(station.pose)[:3, 0]
+        assert np.abs(aside).max() < 1e-3
+        assert along.min() == pytest.approx(-station.approach_distance, abs=1e-6)
+        assert along.max() == pytest.approx(0.0, abs=1e-6)
+    contacts = {(c.body_a, c.body_b) for m in service for c in m.report.contacts}
+    assert ("gear_held", "lathe_spindle") in contacts
+    assert all(contact.allowed_contact for m in service for contact in m.report.contacts)
+
+
+def test_signals_and_pauses_stand_where_the_program_says(demo: ProgramPlan) -> None:
+    texts = [(m.wait_for, m.set_signals) for m in demo.movements]
+    assert [wait for wait, _ in texts if wait] == [("lathe_door_open",), ("lathe_done",), ("conveyor_free",)]
+    assert ("lathe_open_door=0", "lathe_start=0") in [signals for _, signals in texts]
+    rests = [(m.duration, m.power_mode) for m in demo.movements if m.power_mode]
+    assert rests == [(180.0, "BUS_POWER_OFF"), (1800.0, "HIBERNATION")]
+    for movement in demo.movements:
+        if movement.is_pause and movement.duration > 0.0:
+            assert movement.report.energy > 0.0
+
+
+def test_the_same_program_has_the_same_id(demo: ProgramPlan, demo_cell: Cell, power: PowerData) -> None:
+    again = planned(load_cell("demo"), power)
+    assert again.program_id == demo.program_id
+    assert planned(demo_cell, power, velocity_scaling=0.5).program_id != demo.program_id
+
+
+def test_a_cycle_time_is_filled_and_too_short_a_one_refused(demo_cell: Cell, power: PowerData) -> None:
+    free = planned(demo_cell, power, "home", "gauge_measure", "park")
+    longer = planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=10.0)
+    assert longer.report.duration == pytest.approx(10.0, abs=1e-4)
+    assert longer.report.certified
+    assert longer.report.peak_power < free.report.peak_power
+    with pytest.raises(RequestError, match="the shortest is"):
+        planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=1.0)
+
+
+def test_a_station_that_nobody_reaches_fails_with_its_name(demo_cell: Cell, power: PowerData) -> None:
+    shut = demo_cell.with_equipment("lathe", state="door_closed")
+    plan = planned(shut, power, "lathe_work")
+    assert plan.status.code in (StatusCode.GOAL_IN_COLLISION, StatusCode.PLANNING_FAILED)
+    assert "lathe_work" in plan.status.message
+    assert plan.movements == ()
+
+
+def test_an_unknown_station_lists_the_known(demo_cell: Cell, power: PowerData) -> None:
+    with pytest.raises(RequestError, match="infeed_pick, lathe_work"):
+        planned(demo_cell, power, "moon")
+
+
+def test_progress_is_told_and_a_cancel_stops(demo_cell: Cell, power: PowerData) -> None:
+    heard: list[str] = []
+    request = ProgramRequest(demo_cell, power, (), np.array(demo_cell.machine_home), PlanOptions())
+    budget = Budget(100_000, time.monotonic() + 60.0, time.monotonic, lambda: "movements" in heard)
+    with pytest.raises(CancelledError):
+        plan_program(request, budget, lambda phase, done, total, cost: heard.append(phase))
+    assert heard.index("configurations") < heard.index("station graph") < heard.index("movements")
+
+
+def test_automatic_pauses_take_the_cheapest_mode(power: PowerData) -> None:
+    from ir_description import cell_from_yaml, cell_to_yaml
+
+    text = cell_to_yaml(load_cell("demo"))
+    assert "power_mode: BUS_POWER_OFF" in text
+    plan = planned(cell_from_yaml(text.replace("power_mode: BUS_POWER_OFF", "power_mode: AUTO")), power)
+    chosen = [movement.power_mode for movement in plan.movements if movement.duration == 180.0]
+    assert chosen == ["BUS_POWER_OFF"]

@@ -1,0 +1,66 @@
+"""A pause in, a power mode out: break-even figures of the data, and never a mode that costs more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ir_description import load_cell, load_power_data
+from ir_planner.errors import RequestError
+from ir_planner.scene import load_text, scene_with
+from ir_planner.settings import PauseSettings
+from ir_planner.standby import break_even, mode_watts, pause_energy, plan_standby
+
+CELL = load_cell("demo")
+POWER = load_power_data()
+SCENE = scene_with(CELL, load_text(CELL), POWER)
+EMPTY = replace(SCENE, loads=())
+HOME = np.array(CELL.machine_home)
+TIMES = PauseSettings()
+
+
+@pytest.mark.parametrize("payload", [0.0, 155.0])
+def test_the_modes_draw_what_table_2_says(payload: float) -> None:
+    scene = SCENE if payload else EMPTY
+    for mode in POWER.modes:
+        assert mode_watts(mode.name, HOME, scene) == pytest.approx(
+            POWER.measured(payload, mode.name), rel=0.01
+        )
+
+
+def test_break_even_with_the_tool_alone_is_that_of_the_data() -> None:
+    assert break_even("BUS_POWER_OFF", HOME, SCENE, TIMES) == pytest.approx(98.0, rel=0.005)
+    assert break_even("HIBERNATION", HOME, SCENE, TIMES) == pytest.approx(1012.0, rel=0.005)
+
+
+def test_times_default_to_those_of_the_controllers_data() -> None:
+    for mode in POWER.modes[1:]:
+        assert (TIMES.enter(mode.name), TIMES.leave(mode.name), TIMES.minimum_stay(mode.name)) == (
+            mode.time_to_pause,
+            mode.regular_time_to_operate,
+            mode.minimum_stay,
+        )
+
+
+@given(st.floats(0.01, 5000.0))
+@settings(deadline=None, max_examples=60)
+def test_the_chosen_mode_is_the_cheapest_that_the_pause_has_time_for(pause: float) -> None:
+    standby = plan_standby(pause, HOME, SCENE, TIMES)
+    assert standby.energy == min(standby.energies)
+    assert standby.saving == pytest.approx(pause_energy("STAND_ON_MOTORS", pause, HOME, SCENE, TIMES) - standby.energy)
+    assert pause >= standby.chosen.time_min_pause
+    assert standby.wake_at + standby.chosen.regular_time_to_operate == pytest.approx(pause)
+
+
+def test_longer_pauses_go_deeper() -> None:
+    chosen = [plan_standby(pause, HOME, SCENE, TIMES).chosen.name for pause in (0.5, 10.0, 200.0, 3000.0)]
+    assert chosen == ["STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION"]
+
+
+@pytest.mark.parametrize("pause", [0.0, -3.0, float("nan"), float("inf"), 1e9])
+def test_what_is_no_pause_is_refused(pause: float) -> None:
+    with pytest.raises(RequestError, match="pause is"):
+        plan_standby(pause, HOME, SCENE, TIMES)

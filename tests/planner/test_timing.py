@@ -1,0 +1,199 @@
+"""Movements keep speed, acceleration, jerk and torque at 10 kHz, and are as fast as one of them allows."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.asynchronous import own_laws
+from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, stretched
+from ir_planner.budget import Budget
+from ir_planner.errors import RequestError
+from ir_planner.movement import timed_movement
+from ir_planner.scene import PlanningScene
+from ir_planner.spline_timing import time_spline
+from ir_planner.time_law import StepLaws, TimeLaw
+from ir_planner.timing import MotionLimits, fastest_law, torque_use
+
+_spec = importlib.util.spec_from_file_location("planner_oracles", Path(__file__).parent / "oracles.py")
+assert _spec is not None
+assert _spec.loader is not None
+oracles = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(oracles)
+
+NAMES = ("joint_a1", "joint_a2", "joint_a3", "joint_a4", "joint_a5", "joint_a6")
+Degrees = Callable[..., Any]
+MOVES = [
+    ((0, -90, 90, 0, 0, 0), (90, -60, 60, 30, 30, 0)),
+    ((0, -90, 90, 0, 0, 0), (0, -50, 50, 0, 40, 0)),
+    ((0, -90, 90, 0, 0, 0), (0, -90, 90, 0, 60, 180)),
+    ((20, -60, 80, 0, 40, 0), (22, -61, 79, 0, 40, 0)),
+    ((0, -60, 60, 0, 0, 0), (0, -110, 110, 0, 0, 0)),
+]
+
+
+def at_10_khz(trajectory: JointTrajectory) -> Any:
+    return trajectory.sample(np.arange(0.0, trajectory.duration, 1e-4))
+
+
+@pytest.mark.parametrize(("start", "goal"), MOVES)
+def test_a_ptp_keeps_all_limits_and_uses_one_of_them_up(
+    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+) -> None:
+    options = PlanOptions(objective="time", safety_distance=0.0)
+    movement = timed_movement(np.stack([degrees(*start), degrees(*goal)]), demo_scene, options, budget)
+    motion = at_10_khz(movement.trajectory)
+    robot = demo_scene.cell.robot
+    tau = oracles.torques(demo_scene, motion.q, motion.qd, motion.qdd)
+    share = {
+        "velocity": np.abs(motion.qd) / robot.velocity_max,
+        "acceleration": np.abs(motion.qdd) / robot.acceleration_max,
+        "jerk": np.abs(motion.qddd) / robot.jerk_max,
+        "torque": np.abs(tau) / oracles.torque_available(robot, motion.qd),
+    }
+    largest = {name: float(values.max()) for name, values in share.items()}
+    assert max(largest.values()) <= 1.0 + 1e-6, largest
+    # the jerk is at its limit by construction, unless torque slowed the ramps: then torque is near its share
+    assert max(largest["velocity"], largest["acceleration"], largest["torque"]) > 0.93, largest
+    report = movement.evaluation.report
+    assert report.certified
+    assert (report.torque_ratio >= share["torque"].max(axis=0) - 1e-6).all(), "the bound is no bound"
+
+
+def test_torques_of_the_planner_are_those_of_pinocchio(demo_scene: PlanningScene) -> None:
+    rng = np.random.default_rng(3)
+    robot = demo_scene.cell.robot
+    q = rng.uniform(robot.position_min, robot.position_max, (50, 6))
+    qd, qdd = rng.normal(size=(2, 50, 6))
+    ours = demo_scene.dynamics.inverse_dynamics(q, qd, qdd)
+    assert ours == pytest.approx(oracles.torques(demo_scene, q, qd, qdd), rel=1e-9, abs=1e-6)
+    share = torque_use(demo_scene.dynamics, q, qd, qdd)
+    assert share == pytest.approx(np.abs(ours) / oracles.torque_available(robot, qd), rel=1e-9)
+
+
+def test_a_heavier_load_takes_longer(demo_scene: PlanningScene, degrees: Degrees) -> None:
+    a, b = degrees(0, -50, 50, 0, 40, 0), degrees(0, -110, 110, 0, 0, 0)
+    empty = replace(demo_scene, loads=())
+    with_tool = fastest_law(a, b, demo_scene.limits, demo_scene.dynamics).total
+    assert fastest_law(a, b, empty.limits, empty.dynamics).total < with_tool
+
+
+def test_scaling_limits_what_it_says(demo_scene: PlanningScene, degrees: Degrees, budget: Budget) -> None:
+    path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(90, -60, 60, 30, 30, 0)])
+    options = PlanOptions(
+        objective="time", velocity_scaling=0.3, acceleration_scaling=0.5, safety_distance=0.0
+    )
+    report = timed_movement(path, demo_scene, options, budget).evaluation.report
+    assert report.velocity_ratio.max() == pytest.approx(0.3, rel=0.02)
+    assert report.acceleration_ratio.max() <= 0.5 + 1e-9
+
+
+def test_a_wished_duration_is_met_and_too_short_a_one_refused(
+    demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+) -> None:
+    path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(40, -80, 90, 0, 0, 0)])
+    movement = timed_movement(path, demo_scene, PlanOptions(duration=3.25), budget)
+    assert movement.trajectory.duration == pytest.approx(3.25, abs=1e-5)
+    assert movement.violation is None
+    with pytest.raises(RequestError, match=r"duration is 0\.2 s: the shortest"):
+        timed_movement(path, demo_scene, PlanOptions(duration=0.2), budget)
+
+
+@pytest.mark.parametrize(("start", "goal"), MOVES[:3])
+def test_asynchronous_joints_arrive_on_their_own(
+    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+) -> None:
+    path = np.stack([degrees(*start), degrees(*goal)])
+    options = PlanOptions(objective="time", timing="asynchronous", safety_distance=0.0)
+    movement = timed_movement(path, demo_scene, options, budget)
+    assert movement.note == ""
+    assert movement.violation is None
+    laws = own_laws(path[0], path[1], demo_scene.limits, demo_scene.dynamics)
+    moving = np.abs(path[1] - path[0]) > 1e-6
+    assert len({law.total for law, moves in zip(laws.laws, moving, strict=True) if moves}) > 1
+    motion = at_10_khz(movement.trajectory)
+    tau = oracles.torques(demo_scene, motion.q, motion.qd, motion.qdd)
+    robot = demo_scene.cell.robot
+    assert (np.abs(tau) / oracles.torque_available(robot, motion.qd)).max() <= 1.0 + 1e-6
+    assert (np.abs(motion.qd) <= robot.velocity_max * (1 + 1e-9)).all()
+    assert movement.trajectory.positions[-1] == pytest.approx(path[1], abs=0.0)
+
+
+def test_corners_are_cut_within_the_limits_and_save_time(
+    demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+) -> None:
+    path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(30, -95, 95, 0, 0, 0), degrees(60, -90, 90, 0, 0, 0)])
+    options = PlanOptions(objective="time")
+    movement = timed_movement(path, demo_scene, options, budget)
+    laws = tuple(
+        StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),)) for a, b in zip(path, path[1:], strict=False)
+    )
+    stopping = blended(TimedPath(path, laws, (0,)), NAMES)
+    assert movement.trajectory.duration < stopping.duration - 0.05
+    assert movement.violation is None
+
+
+def test_a_blend_is_the_sum_of_its_laws() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.5], [0.5, 2.0]])
+    laws = (StepLaws((TimeLaw((20, 100, 20, 30, 20, 80, 20)),)), StepLaws((TimeLaw((30, 50, 30, 0, 30, 50, 30)),)))
+    timed = TimedPath(path, laws, largest_overlaps(laws))
+    trajectory = blended(timed, ("a", "b"))
+    t = np.arange(timed.total + 1)
+    expected = path[0].copy() + sum(
+        law.at(t - begin)[0] * delta
+        for law, begin, delta in zip(laws, timed.starts, np.diff(path, axis=0), strict=True)
+    )
+    assert trajectory.sample(t * 1e-3).q == pytest.approx(expected, abs=1e-9)
+
+
+def test_stretching_keeps_the_path_and_divides_the_speed() -> None:
+    laws = (StepLaws((TimeLaw((20, 100, 20, 30, 20, 80, 20)),)),)
+    fast = blended(TimedPath(np.array([[0.0], [1.0]]), laws, ()), ("a",))
+    slow = stretched(fast, 1.2345678)
+    factor = slow.duration / fast.duration
+    assert factor == pytest.approx(1.234568, abs=1e-9)
+    t = np.linspace(0.0, fast.duration, 777)
+    assert slow.sample(t * factor).q == pytest.approx(fast.sample(t).q, abs=1e-9)
+    assert slow.sample(t * factor).qd * factor == pytest.approx(fast.sample(t).qd, abs=1e-7)
+
+
+def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene, budget: Budget) -> None:
+    home = np.array(demo_scene.cell.machine_home)
+    movement = timed_movement(np.stack([home, home]), demo_scene, PlanOptions(), budget)
+    assert movement.trajectory == standing(home, NAMES)
+    assert movement.evaluation.report.certified
+    assert movement.evaluation.report.energy == pytest.approx(movement.evaluation.report.duration * 735.0, rel=0.01)
+
+
+def test_a_spline_through_points_keeps_its_limits(demo_scene: PlanningScene, degrees: Degrees) -> None:
+    points = np.stack(
+        [degrees(0, -90, 90, 0, 0, 0), degrees(20, -80, 85, 10, 20, 0), degrees(50, -85, 95, 0, 30, 40),
+         degrees(60, -90, 90, 0, 0, 0)]
+    )  # fmt: skip
+    limits = demo_scene.limits
+    trajectory = time_spline(points, NAMES, limits, demo_scene.dynamics)
+    motion = at_10_khz(trajectory)
+    assert (np.abs(motion.qd) <= limits.velocity * (1 + 1e-6)).all()
+    assert (np.abs(motion.qdd) <= limits.acceleration * (1 + 1e-6)).all()
+    assert (np.abs(motion.qddd) <= limits.jerk * (1 + 1e-6)).all()
+    for q in points:
+        assert np.abs(trajectory.positions - q).max(axis=1).min() < 1e-9
+    used = max(
+        float((np.abs(motion.qd) / limits.velocity).max()),
+        float((np.abs(motion.qdd) / limits.acceleration).max()),
+        float(torque_use(demo_scene.dynamics, motion.q, motion.qd, motion.qdd).max()),
+    )
+    assert used > 0.7, "the spline is slower than it needs to be"
+
+
+def test_limits_scale_with_the_request() -> None:
+    one = np.ones(2)
+    scaled = MotionLimits(one, 2 * one, 3 * one).scaled(0.5, 0.25)
+    assert (scaled.velocity[0], scaled.acceleration[0], scaled.jerk[0]) == (0.5, 0.5, 0.75)
