@@ -288,8 +288,13 @@ class SimDriver(Node):
             notices = simulation.notices.take()
             entries = report(simulation, self._plant.worst_lag)
         for level, sentence in notices:
-            log = self.get_logger()
-            (log.info if level is Level.OK else log.warning if level is Level.WARN else log.error)(sentence)
+            # a line of its own for each severity: rclpy lets a line log with one severity only
+            if level is Level.OK:
+                self.get_logger().info(sentence)
+            elif level is Level.WARN:
+                self.get_logger().warning(sentence)
+            else:
+                self.get_logger().error(sentence)
         msg = DiagnosticArray(status=[_diagnostic(entry) for entry in entries])
         msg.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(msg)
