@@ -25,7 +25,7 @@ setup(
             "ir_recorder = ir_recorder.node:main",
             "ir-record = ir_recorder.node:main",
             "ir-play = ir_recorder.play.node:main",
-            "ir-report = ir_recorder.report.command:main",
+            "ir-report = ir_recorder.report_main:main",
         ],
     },
 )

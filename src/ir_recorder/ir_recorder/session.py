@@ -12,6 +12,7 @@ from ir_recorder.writer import RecordingSummary, RecordingWriter
 CELL_ATTACHMENT = "cell.yaml"
 URDF_ATTACHMENT = "robot.urdf"
 FACTS_RECORD = "ir_recorder"
+OWN_FACTS = ("version", "started_ns")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from importlib.resources import files
 from pathlib import Path
 
 from ir_recorder.analysis import Analysis, Finding, Tolerances
-from ir_recorder.analysis import findings as all_findings
 from ir_recorder.errors import PathError
 from ir_recorder.report.bars import joule_bars
 from ir_recorder.report.data import page_data
@@ -24,34 +23,31 @@ from ir_recorder.report.tables import (
     table_2,
 )
 from ir_recorder.report.words import joules, millimetres, number, percent, seconds, text, watts
+from ir_recorder.session import OWN_FACTS
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
 SCRIPTS = ("charts.js", "renderer.js", "motion.js", "app.js")
-NOTE = "note."  # facts whose key starts like this are shown at the top
 
 
 def write_report(
     analysis: Analysis,
+    checks: Sequence[Finding],
     path: str | Path,
-    findings: Sequence[Finding] | None = None,
     tolerances: Tolerances | None = None,
 ) -> Path:
     """Writes the page and returns its absolute path; PathError when it can't be written."""
     target = Path(path).absolute()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(report_html(analysis, findings, tolerances), encoding="utf-8")
+        target.write_text(report_html(analysis, checks, tolerances), encoding="utf-8")
     except OSError as error:
         raise PathError(f"{target} can't be written: {error.strerror}") from error
     return target
 
 
-def report_html(
-    analysis: Analysis, findings: Sequence[Finding] | None = None, tolerances: Tolerances | None = None
-) -> str:
-    """The page as text. findings: the checks to show; None: those that the recording allows."""
+def report_html(analysis: Analysis, checks: Sequence[Finding], tolerances: Tolerances | None = None) -> str:
+    """The page as text, with the checks to show; the tolerances give the safety distance of the chart."""
     bounds = tolerances or Tolerances()
-    checks = all_findings(analysis, bounds) if findings is None else tuple(findings)
     name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
     parts = {
         "title": text(f"{name} – report of a recording"),
@@ -96,11 +92,12 @@ def _verdict(checks: Sequence[Finding]) -> str:
 
 
 def _notes(analysis: Analysis) -> str:
-    notes = [(k.removeprefix(NOTE), v) for k, v in analysis.recording.facts if k.startswith(NOTE)]
-    if not notes:
+    """What the recorder was told of this run, as shortened transitions."""
+    facts = [(key, value) for key, value in analysis.recording.facts if key not in OWN_FACTS]
+    if not facts:
         return ""
-    items = "".join(f"<li><b>{text(key)}</b> {text(value)}</li>" for key, value in notes)
-    return f'<ul class="notes">{items}</ul>'
+    items = "".join(f"<li>{text(key.replace('_', ' '))} <b>{text(value)}</b></li>" for key, value in facts)
+    return f'<ul class="notes"><li class="head">Told of this run</li>{items}</ul>'
 
 
 def _tiles(analysis: Analysis, checks: Sequence[Finding]) -> str:

@@ -1,0 +1,44 @@
+"""`ir-report FILE [-o out/report.html]`: explains a recording as one HTML page."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from ir_recorder.analysis import analyse, findings
+from ir_recorder.errors import RecorderError
+from ir_recorder.picture import write_picture
+from ir_recorder.reader import read_recording
+from ir_recorder.report import write_report
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what `run` reads."""
+    parser.add_argument("file", help="recording (.mcap)")
+    parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
+    parser.add_argument("--picture", default="", help="picture to write as well (.png)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Writes the page and says where; RecorderError when the file can't be read or the page not be
+    written.
+    """
+    analysis = analyse(read_recording(options.file))
+    for problem in analysis.problems:
+        sys.stderr.write(f"{options.file}: {problem}\n")
+    sys.stdout.write(f"{write_report(analysis, findings(analysis), options.output)}\n")
+    if options.picture:
+        sys.stdout.write(f"{write_picture(analysis, options.picture)}\n")
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Returns 0 when the page was written, 1 with a sentence when not."""
+    parser = argparse.ArgumentParser(prog="ir-report", description="Explains a recording as one HTML page.")
+    add_arguments(parser)
+    try:
+        return run(parser.parse_args(arguments))
+    except RecorderError as error:
+        sys.stderr.write(f"ir-report: {error}\n")
+        return 1
