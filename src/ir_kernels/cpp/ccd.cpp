@@ -9,8 +9,8 @@
 namespace ir::inverse {
 namespace {
 
-using dynamics::D8;
-using dynamics::I8;
+using dynamics::Doubles;
+using dynamics::Integers;
 using dynamics::splat;
 
 constexpr double kDampingStart = 1e-4, kDampingDown = 0.1, kDampingUp = 10.0;
@@ -18,16 +18,16 @@ constexpr double kDampingLeast = 1e-12, kDampingMost = 1e6;
 constexpr double kTurn = 2.0 * M_PI;
 
 struct V3 {
-  D8 x, y, z;
+  Doubles x, y, z;
 };
 V3 operator+(const V3& a, const V3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 V3 operator-(const V3& a, const V3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-V3 operator*(const V3& a, D8 s) { return {a.x * s, a.y * s, a.z * s}; }
-D8 dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+V3 operator*(const V3& a, Doubles s) { return {a.x * s, a.y * s, a.z * s}; }
+Doubles dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 V3 cross(const V3& a, const V3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-V3 constant(const double v[3]) { return {splat<D8>(v[0]), splat<D8>(v[1]), splat<D8>(v[2])}; }
+V3 constant(const double v[3]) { return {splat<Doubles>(v[0]), splat<Doubles>(v[1]), splat<Doubles>(v[2])}; }
 
 // Orientation by columns.
 struct M3 {
@@ -48,23 +48,23 @@ M3 times(const M3& m, const double R[3][3]) {
 }
 M3 constant(const double R[3][3]) {
   M3 m;
-  for (int j = 0; j < 3; ++j) m.column[j] = {splat<D8>(R[0][j]), splat<D8>(R[1][j]), splat<D8>(R[2][j])};
+  for (int j = 0; j < 3; ++j) m.column[j] = {splat<Doubles>(R[0][j]), splat<Doubles>(R[1][j]), splat<Doubles>(R[2][j])};
   return m;
 }
 
 // Arc tangent of y / x in all four quadrants (Cephes), atan2(0, 0) = 0.
-D8 arctan2(D8 y, D8 x) {
-  const D8 ax = dynamics::abs(x), ay = dynamics::abs(y);
-  const D8 large = dynamics::max(ax, ay), small = dynamics::min(ax, ay);
-  D8 t = small / dynamics::max(large, splat<D8>(1e-300));
-  const I8 upper = t > 0.66;
+Doubles arctan2(Doubles y, Doubles x) {
+  const Doubles ax = dynamics::abs(x), ay = dynamics::abs(y);
+  const Doubles large = dynamics::max(ax, ay), small = dynamics::min(ax, ay);
+  Doubles t = small / dynamics::max(large, splat<Doubles>(1e-300));
+  const Integers upper = t > 0.66;
   t = upper ? (t - 1.0) / (t + 1.0) : t;
-  const D8 z = t * t;
-  const D8 p = (((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z -
+  const Doubles z = t * t;
+  const Doubles p = (((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z -
                 1.228866684490136173410e2) * z - 6.485021904942025371773e1;
-  const D8 q = ((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z +
+  const Doubles q = ((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z +
                 4.853903996359136964868e2) * z + 1.945506571482613964425e2;
-  D8 angle = t * (z * p / q) + t;
+  Doubles angle = t * (z * p / q) + t;
   angle = upper ? angle + 3.061616997868382943065e-17 + 0.78539816339744830962 : angle;
   angle = ay > ax ? 1.57079632679489661923 - angle : angle;
   angle = x < 0.0 ? 3.14159265358979323846 - angle : angle;
@@ -77,8 +77,8 @@ struct Pose {
 };
 
 // Axes z through o of all joints and the pose of the tool, in the world.
-Pose forward(const CcdProblem& c, const D8* q, V3* z, V3* o) {
-  D8 s[kMaxJoints], k[kMaxJoints];
+Pose forward(const CcdProblem& c, const Doubles* q, V3* z, V3* o) {
+  Doubles s[kMaxJoints], k[kMaxJoints];
   dynamics::sincos(c.n, q, s, k);
   M3 R = constant(c.turn[0]);
   V3 p = constant(c.offset[0]);
@@ -96,10 +96,10 @@ Pose forward(const CcdProblem& c, const D8* q, V3* z, V3* o) {
   return {times(R, c.tool_turn), p + times(R, c.tool_offset)};
 }
 
-D8 psi_of(const CcdProblem& c, const Pose& pose) {
+Doubles psi_of(const CcdProblem& c, const Pose& pose) {
   const V3 step = pose.p - constant(c.target);
   const M3 target = constant(c.target_turn);
-  D8 turn{};
+  Doubles turn{};
   for (int j = 0; j < 3; ++j) {
     const V3 d = pose.R.column[j] - target.column[j];
     turn += dot(d, d);
@@ -110,58 +110,58 @@ D8 psi_of(const CcdProblem& c, const Pose& pose) {
 // Axis times sine (doubled) and cosine (doubled, less one) of the rotation that brings the tool to the target.
 struct Turn {
   V3 twice_sine;
-  D8 length, angle;
+  Doubles length, angle;
 };
 Turn turn_to_target(const CcdProblem& c, const Pose& pose) {
   const M3 target = constant(c.target_turn);
-  V3 sine{D8{}, D8{}, D8{}};
-  D8 trace{};
+  V3 sine{Doubles{}, Doubles{}, Doubles{}};
+  Doubles trace{};
   for (int j = 0; j < 3; ++j) {
     sine = sine + cross(pose.R.column[j], target.column[j]);
     trace += dot(pose.R.column[j], target.column[j]);
   }
-  const D8 length = dynamics::sqrt(dot(sine, sine));
+  const Doubles length = dynamics::sqrt(dot(sine, sine));
   return {sine, length, arctan2(length, trace - 1.0)};
 }
 
 // The value within the limits that minimises Psi = const - 2 (c cos + s sin) of the increment; of equal ones the nearest.
-D8 best_value(D8 q, D8 c, D8 s, double low, double high) {
-  const D8 phi = arctan2(s, c);
-  const D8 free = q + phi;
-  const D8 turn = dynamics::copysign(splat<D8>(kTurn), phi);
-  const auto inside = [=](D8 x) { return (x >= low) & (x <= high); };
-  const I8 here = inside(free), back = inside(free - turn), on = inside(free + turn);
-  D8 value = here ? free : (back ? free - turn : free + turn);
+Doubles best_value(Doubles q, Doubles c, Doubles s, double low, double high) {
+  const Doubles phi = arctan2(s, c);
+  const Doubles free = q + phi;
+  const Doubles turn = dynamics::copysign(splat<Doubles>(kTurn), phi);
+  const auto inside = [=](Doubles x) { return (x >= low) & (x <= high); };
+  const Integers here = inside(free), back = inside(free - turn), on = inside(free + turn);
+  Doubles value = here ? free : (back ? free - turn : free + turn);
   if (dynamics::any(~(here | back | on))) {
-    D8 ends[2] = {low - q, high - q}, sine[2]{}, cosine[2]{};
+    Doubles ends[2] = {low - q, high - q}, sine[2]{}, cosine[2]{};
     dynamics::sincos(2, ends, sine, cosine);
-    const I8 lower = c * cosine[0] + s * sine[0] >= c * cosine[1] + s * sine[1];
-    value = here | back | on ? value : (lower ? splat<D8>(low) : splat<D8>(high));
+    const Integers lower = c * cosine[0] + s * sine[0] >= c * cosine[1] + s * sine[1];
+    value = here | back | on ? value : (lower ? splat<Doubles>(low) : splat<Doubles>(high));
   }
   return value;
 }
 
 // One pass over the joints of the lanes in `going`, from the tool to the base. `pose` and the axes belong to q.
-void sweep(const CcdProblem& c, D8* q, Pose pose, const V3* z, const V3* o, I8 going) {
+void sweep(const CcdProblem& c, Doubles* q, Pose pose, const V3* z, const V3* o, Integers going) {
   const M3 target = constant(c.target_turn);
   const double wo = 0.5 * c.rotation_length * c.rotation_length;
   for (int i = c.n - 1; i >= 0; --i) {
     const V3 from = pose.p - o[i], to = constant(c.target) - o[i];
-    D8 along{}, together{};
-    V3 across{D8{}, D8{}, D8{}};
+    Doubles along{}, together{};
+    V3 across{Doubles{}, Doubles{}, Doubles{}};
     for (int j = 0; j < 3; ++j) {
       along += dot(pose.R.column[j], z[i]) * dot(target.column[j], z[i]);
       together += dot(pose.R.column[j], target.column[j]);
       across = across + cross(pose.R.column[j], target.column[j]);
     }
-    const D8 k1 = dot(to, z[i]) * dot(from, z[i]) + wo * along;
-    const D8 k2 = dot(to, from) + wo * together;
-    const D8 k3 = dot(z[i], cross(from, to) + across * splat<D8>(wo));
-    const D8 value = going ? best_value(q[i], k2 - k1, k3, c.low[i], c.high[i]) : q[i];
-    const D8 phi = value - q[i];
+    const Doubles k1 = dot(to, z[i]) * dot(from, z[i]) + wo * along;
+    const Doubles k2 = dot(to, from) + wo * together;
+    const Doubles k3 = dot(z[i], cross(from, to) + across * splat<Doubles>(wo));
+    const Doubles value = going ? best_value(q[i], k2 - k1, k3, c.low[i], c.high[i]) : q[i];
+    const Doubles phi = value - q[i];
     q[i] = value;
     if (i == 0) break;
-    D8 sine{}, cosine{};
+    Doubles sine{}, cosine{};
     dynamics::sincos(1, &phi, &sine, &cosine);
     const auto turned = [&](const V3& v) { return v * cosine + cross(z[i], v) * sine + z[i] * (dot(z[i], v) * (1.0 - cosine)); };
     for (V3& column : pose.R.column) column = turned(column);
@@ -170,20 +170,20 @@ void sweep(const CcdProblem& c, D8* q, Pose pose, const V3* z, const V3* o, I8 g
 }
 
 // Damped least-squares step; joints at a limit that would leave it are held.
-void newton_step(const CcdProblem& c, const D8* q, const Pose& pose, const V3* z, const V3* o, D8 damping, D8* next) {
+void newton_step(const CcdProblem& c, const Doubles* q, const Pose& pose, const V3* z, const V3* o, Doubles damping, Doubles* next) {
   const int n = c.n;
   const Turn turn = turn_to_target(c, pose);
-  const D8 factor = turn.length > 1e-12 ? turn.angle / dynamics::max(turn.length, splat<D8>(1e-12)) : splat<D8>(0.5);
+  const Doubles factor = turn.length > 1e-12 ? turn.angle / dynamics::max(turn.length, splat<Doubles>(1e-12)) : splat<Doubles>(0.5);
   const V3 step = constant(c.target) - pose.p;
   const V3 rotation = turn.twice_sine * (factor * c.rotation_length);
   V3 linear[kMaxJoints], angular[kMaxJoints];
-  D8 A[kMaxJoints * kMaxJoints], b[kMaxJoints];
+  Doubles A[kMaxJoints * kMaxJoints], b[kMaxJoints];
   for (int i = 0; i < n; ++i) {
     linear[i] = cross(z[i], pose.p - o[i]);
-    angular[i] = z[i] * splat<D8>(c.rotation_length);
+    angular[i] = z[i] * splat<Doubles>(c.rotation_length);
     b[i] = dot(linear[i], step) + dot(angular[i], rotation);
-    const I8 held = ((q[i] <= c.low[i]) & (b[i] < 0.0)) | ((q[i] >= c.high[i]) & (b[i] > 0.0));
-    const D8 free = held ? D8{} : splat<D8>(1.0);
+    const Integers held = ((q[i] <= c.low[i]) & (b[i] < 0.0)) | ((q[i] >= c.high[i]) & (b[i] > 0.0));
+    const Doubles free = held ? Doubles{} : splat<Doubles>(1.0);
     linear[i] = linear[i] * free;
     angular[i] = angular[i] * free;
     b[i] *= free;
@@ -191,44 +191,44 @@ void newton_step(const CcdProblem& c, const D8* q, const Pose& pose, const V3* z
     A[i * n + i] += damping;
   }
   for (int j = 0; j < n; ++j) {  // L D L'
-    const D8 inverse = 1.0 / A[j * n + j];
+    const Doubles inverse = 1.0 / A[j * n + j];
     for (int i = j + 1; i < n; ++i) {
-      const D8 f = A[i * n + j] * inverse;
+      const Doubles f = A[i * n + j] * inverse;
       for (int k = j + 1; k <= i; ++k) A[i * n + k] -= f * A[k * n + j];
       b[i] -= f * b[j];
     }
   }
   for (int j = n - 1; j >= 0; --j) {
-    D8 x = b[j];
+    Doubles x = b[j];
     for (int i = j + 1; i < n; ++i) x -= A[i * n + j] * b[i];
     b[j] = x / A[j * n + j];
-    next[j] = dynamics::min(dynamics::max(q[j] + b[j], splat<D8>(c.low[j])), splat<D8>(c.high[j]));
+    next[j] = dynamics::min(dynamics::max(q[j] + b[j], splat<Doubles>(c.low[j])), splat<Doubles>(c.high[j]));
   }
 }
 
-void run_lanes(const CcdProblem& c, D8* q, D8& psi, D8& distance, D8& angle, I8& sweeps, I8& steps) {
+void run_lanes(const CcdProblem& c, Doubles* q, Doubles& psi, Doubles& distance, Doubles& angle, Integers& sweeps, Integers& steps) {
   V3 z[kMaxJoints], o[kMaxJoints];
-  for (int i = 0; i < c.n; ++i) q[i] = dynamics::min(dynamics::max(q[i], splat<D8>(c.low[i])), splat<D8>(c.high[i]));
-  sweeps = steps = I8{};
+  for (int i = 0; i < c.n; ++i) q[i] = dynamics::min(dynamics::max(q[i], splat<Doubles>(c.low[i])), splat<Doubles>(c.high[i]));
+  sweeps = steps = Integers{};
   Pose pose = forward(c, q, z, o);
   psi = psi_of(c, pose);
   for (long k = 0; k < c.max_sweeps; ++k) {
-    const I8 going = psi >= c.xi;
+    const Integers going = psi >= c.xi;
     if (!dynamics::any(going)) break;
     sweep(c, q, pose, z, o, going);
     pose = forward(c, q, z, o);
     psi = psi_of(c, pose);
     sweeps -= going;
   }
-  D8 damping = splat<D8>(kDampingStart), next[kMaxJoints];
+  Doubles damping = splat<Doubles>(kDampingStart), next[kMaxJoints];
   V3 next_z[kMaxJoints], next_o[kMaxJoints];
   for (long k = 0; k < c.newton_steps; ++k) {
-    const I8 going = (psi >= c.newton_tolerance) & (damping < kDampingMost);
+    const Integers going = (psi >= c.newton_tolerance) & (damping < kDampingMost);
     if (!dynamics::any(going)) break;
     newton_step(c, q, pose, z, o, damping, next);
     const Pose tried = forward(c, next, next_z, next_o);
-    const D8 value = psi_of(c, tried);
-    const I8 better = (value < psi) & going;
+    const Doubles value = psi_of(c, tried);
+    const Integers better = (value < psi) & going;
     const auto take = [better](V3& a, const V3& b) {
       a = {better ? b.x : a.x, better ? b.y : a.y, better ? b.z : a.z};
     };
@@ -240,8 +240,8 @@ void run_lanes(const CcdProblem& c, D8* q, D8& psi, D8& distance, D8& angle, I8&
     for (int j = 0; j < 3; ++j) take(pose.R.column[j], tried.R.column[j]);
     take(pose.p, tried.p);
     psi = better ? value : psi;
-    const D8 following = dynamics::max(damping * (better ? splat<D8>(kDampingDown) : splat<D8>(kDampingUp)),
-                                       splat<D8>(kDampingLeast));
+    const Doubles following = dynamics::max(damping * (better ? splat<Doubles>(kDampingDown) : splat<Doubles>(kDampingUp)),
+                                       splat<Doubles>(kDampingLeast));
     damping = going ? following : damping;
     steps -= going;
   }
@@ -314,13 +314,13 @@ CcdProblem::CcdProblem(int joints, const double* origin, const double* axis, con
 }
 
 void run(const CcdProblem& c, const double* starts, long P, const CcdArrays& out) {
-  for (long first = 0; first < P; first += 8) {
-    D8 q[kMaxJoints], psi, distance, angle;
-    I8 sweeps, steps;
+  for (long first = 0; first < P; first += dynamics::kLanes) {
+    Doubles q[kMaxJoints], psi, distance, angle;
+    Integers sweeps, steps;
     dynamics::load_columns(starts, P, c.n, first, q);
     run_lanes(c, q, psi, distance, angle, sweeps, steps);
     dynamics::store_columns(q, P, c.n, first, out.q);
-    for (long l = 0; l < std::min<long>(8, P - first); ++l) {
+    for (long l = 0; l < std::min<long>(dynamics::kLanes, P - first); ++l) {
       out.psi[first + l] = psi[l];
       out.distance[first + l] = distance[l];
       out.angle[first + l] = angle[l];

@@ -1,4 +1,4 @@
-// Cyclic coordinate descent (eqs. 2 and 3) with a damped least-squares finish, eight starts to a register.
+// Cyclic coordinate descent (eqs. 2 and 3) with a damped least-squares finish, a register of starts at once.
 #pragma once
 
 #include <cstdint>

@@ -21,15 +21,15 @@ struct Piece {
   double begin, end;
 };
 
-// Eight pieces with their polynomials; unused lanes repeat the last piece.
+// A register of pieces with their polynomials; unused lanes repeat the last piece.
 struct Batch {
-  D8 begin, end;
-  D8 c[kMaxJoints][kMaxTerms];
-  bool rests[kMaxJoints][8];  // the joint doesn't move at all in the segment
+  Doubles begin, end;
+  Doubles c[kMaxJoints][kMaxTerms];
+  bool rests[kMaxJoints][kLanes];  // the joint doesn't move at all in the segment
 };
 
 Interval evaluate(const Interval* a, int terms, const Interval& x) {
-  if (terms <= 0) return point(D8{});
+  if (terms <= 0) return point(Doubles{});
   Interval value = a[terms - 1];
   for (int k = terms - 2; k >= 0; --k) value = value * x + a[k];
   return value;
@@ -40,7 +40,7 @@ struct Motion {
   Interval at_middle[4], over[4];
 };
 
-Motion enclose(const D8* c, int terms, D8 middle, const Interval& d) {
+Motion enclose(const Doubles* c, int terms, Doubles middle, const Interval& d) {
   Interval a[kMaxTerms];
   for (int k = 0; k < terms; ++k) a[k] = point(c[k]);
   for (int i = 0; i < terms - 1; ++i)  // Taylor shift to the middle by repeated synthetic division
@@ -48,7 +48,7 @@ Motion enclose(const D8* c, int terms, D8 middle, const Interval& d) {
   Motion motion;
   int left = terms;
   for (int order = 0; order < 4; ++order) {
-    motion.at_middle[order] = left > 0 ? a[0] : point(D8{});
+    motion.at_middle[order] = left > 0 ? a[0] : point(Doubles{});
     motion.over[order] = evaluate(a, left, d);
     for (int k = 1; k < left; ++k) a[k - 1] = a[k] * double(k);
     --left;
@@ -67,9 +67,9 @@ void smooth_torque(const Model<double>& m, const S* sn, const S* cs, const S* qd
 
 // Largest |tau| / limit per joint over the pieces, never too small.
 void upper_ratios(const Model<double>& m, const Envelope& envelope, const Batch& batch, int terms,
-                  double upper[][8]) {
+                  double upper[][kLanes]) {
   const int n = m.n;
-  const D8 middle = 0.5 * (batch.begin + batch.end);
+  const Doubles middle = 0.5 * (batch.begin + batch.end);
   const Interval d = point(batch.begin) - point(middle);
   const Interval e = point(batch.end) - point(middle);
   const Interval step{d.lo, e.hi};
@@ -95,7 +95,7 @@ void upper_ratios(const Model<double>& m, const Envelope& envelope, const Batch&
     const Interval tau = intersect(over[i].v, at_middle[i] + over[i].d * step);
     const Interval speed = qd[i].v;
     const double coulomb = m.drive[i].coulomb;
-    for (int l = 0; l < 8; ++l) {
+    for (int l = 0; l < kLanes; ++l) {
       const double v0 = speed.lo[l], v1 = speed.hi[l];
       const bool rests = batch.rests[i][l];
       const double least = rests || v0 > 0.0 ? (rests ? 0.0 : coulomb) : -coulomb;
@@ -109,13 +109,13 @@ void upper_ratios(const Model<double>& m, const Envelope& envelope, const Batch&
 }
 
 // |tau| / limit per joint at times of the pieces.
-void sampled_ratios(const Model<double>& m, const Envelope& envelope, const Batch& batch, int terms, D8 t,
-                    double ratio[][8]) {
+void sampled_ratios(const Model<double>& m, const Envelope& envelope, const Batch& batch, int terms, Doubles t,
+                    double ratio[][kLanes]) {
   const int n = m.n;
-  D8 theta[kMaxJoints], sn[kMaxJoints], cs[kMaxJoints], qd[kMaxJoints], qdd[kMaxJoints], tau[kMaxJoints];
+  Doubles theta[kMaxJoints], sn[kMaxJoints], cs[kMaxJoints], qd[kMaxJoints], qdd[kMaxJoints], tau[kMaxJoints];
   for (int i = 0; i < n; ++i) {
-    const D8* c = batch.c[i];
-    D8 q{}, v{}, a{};
+    const Doubles* c = batch.c[i];
+    Doubles q{}, v{}, a{};
     for (int k = terms - 1; k >= 0; --k) {
       a = a * t + 2.0 * v;
       v = v * t + q;
@@ -128,7 +128,7 @@ void sampled_ratios(const Model<double>& m, const Envelope& envelope, const Batc
   sincos(n, theta, sn, cs);
   smooth_torque(m, sn, cs, qd, qdd, tau);
   for (int i = 0; i < n; ++i)
-    for (int l = 0; l < 8; ++l) {
+    for (int l = 0; l < kLanes; ++l) {
       const double v = qd[i][l], coulomb = m.drive[i].coulomb;
       const double size = batch.rests[i][l]      ? std::abs(tau[i][l])
                           : std::abs(v) < kRest  ? std::abs(tau[i][l]) + coulomb
@@ -154,10 +154,10 @@ TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, con
   std::vector<double> upper_of;  // (pieces, n)
   while (!pieces.empty()) {
     upper_of.assign(pieces.size() * n, 0.0);
-    for (std::size_t first = 0; first < pieces.size(); first += 8) {
+    for (std::size_t first = 0; first < pieces.size(); first += kLanes) {
       Batch batch;
-      const std::size_t used = std::min<std::size_t>(8, pieces.size() - first);
-      for (std::size_t l = 0; l < 8; ++l) {
+      const std::size_t used = std::min<std::size_t>(kLanes, pieces.size() - first);
+      for (std::size_t l = 0; l < kLanes; ++l) {
         const Piece& p = pieces[first + std::min(l, used - 1)];
         batch.begin[l] = p.begin;
         batch.end[l] = p.end;
@@ -167,11 +167,11 @@ TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, con
           for (int k = 0; k < terms; ++k) batch.c[i][k][l] = c[k];
         }
       }
-      double upper[kMaxJoints][8], ratio[kMaxJoints][8];
+      double upper[kMaxJoints][kLanes], ratio[kMaxJoints][kLanes];
       upper_ratios(m, envelope, batch, terms, upper);
       for (std::size_t l = 0; l < used; ++l)
         for (int i = 0; i < n; ++i) upper_of[(first + l) * n + i] = upper[i][l];
-      for (const D8 t : {batch.begin, 0.5 * (batch.begin + batch.end), batch.end}) {
+      for (const Doubles t : {batch.begin, 0.5 * (batch.begin + batch.end), batch.end}) {
         sampled_ratios(m, envelope, batch, terms, t, ratio);
         for (std::size_t l = 0; l < used; ++l)
           for (int i = 0; i < n; ++i)

@@ -59,22 +59,22 @@ bool inverse_dynamics_of(const Model<T>& m, const double* q, const double* qd, c
 
 // Symmetric inertia about the origin of a frame with its first moment; no mass is left in base parameters.
 struct Composite {
-  Vector<D8> h;
-  D8 xx, xy, xz, yy, yz, zz;
+  Vector<Doubles> h;
+  Doubles xx, xy, xz, yy, yz, zz;
 };
 
 // The composite of frame i seen in frame i-1.
-Composite out_of_link(const Joint<double>& j, D8 s, D8 c, const Composite& b) {
-  const Vector<D8> x = out_of_link(j, s, c, {b.xx, b.xy, b.xz});
-  const Vector<D8> y = out_of_link(j, s, c, {b.xy, b.yy, b.yz});
-  const Vector<D8> z = out_of_link(j, s, c, {b.xz, b.yz, b.zz});
-  const Vector<D8> row0 = out_of_link(j, s, c, {x.x, y.x, z.x});
-  const Vector<D8> row1 = out_of_link(j, s, c, {x.y, y.y, z.y});
-  const Vector<D8> row2 = out_of_link(j, s, c, {x.z, y.z, z.z});
+Composite out_of_link(const Joint<double>& j, Doubles s, Doubles c, const Composite& b) {
+  const Vector<Doubles> x = out_of_link(j, s, c, {b.xx, b.xy, b.xz});
+  const Vector<Doubles> y = out_of_link(j, s, c, {b.xy, b.yy, b.yz});
+  const Vector<Doubles> z = out_of_link(j, s, c, {b.xz, b.yz, b.zz});
+  const Vector<Doubles> row0 = out_of_link(j, s, c, {x.x, y.x, z.x});
+  const Vector<Doubles> row1 = out_of_link(j, s, c, {x.y, y.y, z.y});
+  const Vector<Doubles> row2 = out_of_link(j, s, c, {x.z, y.z, z.z});
   Composite a;
   a.h = out_of_link(j, s, c, b.h);
   const auto [r0, r1, r2] = j.r;
-  const D8 spread = 2.0 * (a.h.x * r0 + a.h.y * r1 + a.h.z * r2);
+  const Doubles spread = 2.0 * (a.h.x * r0 + a.h.y * r1 + a.h.z * r2);
   a.xx = row0.x + spread - 2.0 * r0 * a.h.x;
   a.yy = row1.y + spread - 2.0 * r1 * a.h.y;
   a.zz = row2.z + spread - 2.0 * r2 * a.h.z;
@@ -85,13 +85,13 @@ Composite out_of_link(const Joint<double>& j, D8 s, D8 c, const Composite& b) {
 }
 
 // H as columns H[i * n + k]
-void composite_bodies(const Model<double>& m, const D8* s, const D8* c, D8* H) {
+void composite_bodies(const Model<double>& m, const Doubles* s, const Doubles* c, Doubles* H) {
   const int n = m.n;
   Composite body{};
   for (int i = n - 1; i >= 0; --i) {
     const Joint<double>& j = m.joint[i];
-    Composite own{{splat<D8>(j.hx), splat<D8>(j.hy), D8{}}, splat<D8>(j.xx), splat<D8>(j.xy), splat<D8>(j.xz),
-                  D8{},        splat<D8>(j.yz), splat<D8>(j.zz)};
+    Composite own{{splat<Doubles>(j.hx), splat<Doubles>(j.hy), Doubles{}}, splat<Doubles>(j.xx), splat<Doubles>(j.xy), splat<Doubles>(j.xz),
+                  Doubles{},        splat<Doubles>(j.yz), splat<Doubles>(j.zz)};
     if (i + 1 < n) {
       const Composite outer = out_of_link(m.joint[i + 1], s[i + 1], c[i + 1], body);
       own = {own.h + outer.h, own.xx + outer.xx, own.xy + outer.xy, own.xz + outer.xz,
@@ -99,7 +99,7 @@ void composite_bodies(const Model<double>& m, const D8* s, const D8* c, D8* H) {
     }
     body = own;
     H[i * n + i] = body.zz;
-    Vector<D8> force{-body.h.y, body.h.x, D8{}}, moment{body.xz, body.yz, body.zz};
+    Vector<Doubles> force{-body.h.y, body.h.x, Doubles{}}, moment{body.xz, body.yz, body.zz};
     for (int k = i; k > 0; --k) {
       force = out_of_link(m.joint[k], s[k], c[k], force);
       moment = add_moment(m.joint[k], out_of_link(m.joint[k], s[k], c[k], moment), force);
@@ -109,17 +109,17 @@ void composite_bodies(const Model<double>& m, const D8* s, const D8* c, D8* H) {
 }
 
 // Solves the symmetric positive definite A x = b in place (L D L'); A is destroyed.
-void solve_symmetric(int n, D8* A, D8* b) {
+void solve_symmetric(int n, Doubles* A, Doubles* b) {
   for (int j = 0; j < n; ++j) {
-    const D8 inverse = 1.0 / A[j * n + j];
+    const Doubles inverse = 1.0 / A[j * n + j];
     for (int i = j + 1; i < n; ++i) {
-      const D8 factor = A[i * n + j] * inverse;
+      const Doubles factor = A[i * n + j] * inverse;
       for (int k = j + 1; k <= i; ++k) A[i * n + k] -= factor * A[k * n + j];
       b[i] -= factor * b[j];
     }
   }
   for (int j = n - 1; j >= 0; --j) {
-    D8 x = b[j];
+    Doubles x = b[j];
     for (int i = j + 1; i < n; ++i) x -= A[i * n + j] * b[i];
     b[j] = x / A[j * n + j];
   }
@@ -129,20 +129,20 @@ void solve_symmetric(int n, D8* A, D8* b) {
 
 bool inverse_dynamics(const Model<double>& m, const double* q, const double* qd, const double* qdd, long N,
                       double* tau) {
-  return m.n == 6 ? inverse_dynamics_of<6, D8>(m, q, qd, qdd, N, tau)
-                  : inverse_dynamics_of<0, D8>(m, q, qd, qdd, N, tau);
+  return m.n == 6 ? inverse_dynamics_of<6, Doubles>(m, q, qd, qdd, N, tau)
+                  : inverse_dynamics_of<0, Doubles>(m, q, qd, qdd, N, tau);
 }
 
 bool inverse_dynamics(const Model<float>& m, const double* q, const double* qd, const double* qdd, long N,
                       double* tau) {
-  return m.n == 6 ? inverse_dynamics_of<6, F16>(m, q, qd, qdd, N, tau)
-                  : inverse_dynamics_of<0, F16>(m, q, qd, qdd, N, tau);
+  return m.n == 6 ? inverse_dynamics_of<6, Floats>(m, q, qd, qdd, N, tau)
+                  : inverse_dynamics_of<0, Floats>(m, q, qd, qdd, N, tau);
 }
 
 bool bias(const Model<double>& m, const double* q, const double* qd, long N, double* tau) {
-  D8 Q[kMaxJoints], D[kMaxJoints] = {}, A[kMaxJoints] = {}, s[kMaxJoints], c[kMaxJoints], t[kMaxJoints];
-  Finite<D8> finite;
-  for (long first = 0; first < N; first += 8) {
+  Doubles Q[kMaxJoints], D[kMaxJoints] = {}, A[kMaxJoints] = {}, s[kMaxJoints], c[kMaxJoints], t[kMaxJoints];
+  Finite<Doubles> finite;
+  for (long first = 0; first < N; first += kLanes) {
     load_columns(q, N, m.n, first, Q);
     if (qd) load_columns(qd, N, m.n, first, D);
     finite.look(Q, m.n);
@@ -155,10 +155,10 @@ bool bias(const Model<double>& m, const double* q, const double* qd, long N, dou
 }
 
 bool counterbalance(const Model<double>& m, const double* q, long N, double* tau) {
-  D8 Q[kMaxJoints], s[kMaxJoints], c[kMaxJoints], t[kMaxJoints] = {};
-  Finite<D8> finite;
+  Doubles Q[kMaxJoints], s[kMaxJoints], c[kMaxJoints], t[kMaxJoints] = {};
+  Finite<Doubles> finite;
   const int b = m.balance.joint;
-  for (long first = 0; first < N; first += 8) {
+  for (long first = 0; first < N; first += kLanes) {
     load_columns(q, N, m.n, first, Q);
     finite.look(Q, m.n);
     if (b >= 0) {
@@ -171,9 +171,9 @@ bool counterbalance(const Model<double>& m, const double* q, long N, double* tau
 }
 
 bool mass_matrix(const Model<double>& m, const double* q, long N, double* H) {
-  D8 Q[kMaxJoints], s[kMaxJoints], c[kMaxJoints], columns[kMaxJoints * kMaxJoints];
-  Finite<D8> finite;
-  for (long first = 0; first < N; first += 8) {
+  Doubles Q[kMaxJoints], s[kMaxJoints], c[kMaxJoints], columns[kMaxJoints * kMaxJoints];
+  Finite<Doubles> finite;
+  for (long first = 0; first < N; first += kLanes) {
     load_columns(q, N, m.n, first, Q);
     finite.look(Q, m.n);
     angles<0>(m, Q, s, c);
@@ -186,10 +186,10 @@ bool mass_matrix(const Model<double>& m, const double* q, long N, double* H) {
 bool forward_dynamics(const Model<double>& m, const double* q, const double* qd, const double* tau, long N,
                       double* qdd) {
   const int n = m.n;
-  D8 Q[kMaxJoints], D[kMaxJoints], A[kMaxJoints] = {}, s[kMaxJoints], c[kMaxJoints], h[kMaxJoints], t[kMaxJoints];
-  D8 H[kMaxJoints * kMaxJoints];
-  Finite<D8> finite;
-  for (long first = 0; first < N; first += 8) {
+  Doubles Q[kMaxJoints], D[kMaxJoints], A[kMaxJoints] = {}, s[kMaxJoints], c[kMaxJoints], h[kMaxJoints], t[kMaxJoints];
+  Doubles H[kMaxJoints * kMaxJoints];
+  Finite<Doubles> finite;
+  for (long first = 0; first < N; first += kLanes) {
     load_columns(q, N, n, first, Q);
     load_columns(qd, N, n, first, D);
     load_columns(tau, N, n, first, t);
@@ -214,11 +214,11 @@ bool forward_dynamics(const Model<double>& m, const double* q, const double* qd,
 bool torque_gradients(const Model<double>& m, const double* q, const double* qd, const double* qdd, long N,
                       double* of_q, double* of_qd, double* of_qdd) {
   const int n = m.n;
-  D8 Q[kMaxJoints], D[kMaxJoints], A[kMaxJoints], s[kMaxJoints], c[kMaxJoints];
-  D8 by_q[kMaxJoints * kMaxJoints], by_qd[kMaxJoints * kMaxJoints], H[kMaxJoints * kMaxJoints];
-  Dual<D8> sn[kMaxJoints], cs[kMaxJoints], speed[kMaxJoints], rate[kMaxJoints], t[kMaxJoints];
-  Finite<D8> finite;
-  for (long first = 0; first < N; first += 8) {
+  Doubles Q[kMaxJoints], D[kMaxJoints], A[kMaxJoints], s[kMaxJoints], c[kMaxJoints];
+  Doubles by_q[kMaxJoints * kMaxJoints], by_qd[kMaxJoints * kMaxJoints], H[kMaxJoints * kMaxJoints];
+  Dual<Doubles> sn[kMaxJoints], cs[kMaxJoints], speed[kMaxJoints], rate[kMaxJoints], t[kMaxJoints];
+  Finite<Doubles> finite;
+  for (long first = 0; first < N; first += kLanes) {
     load_columns(q, N, n, first, Q);
     load_columns(qd, N, n, first, D);
     load_columns(qdd, N, n, first, A);
@@ -227,10 +227,10 @@ bool torque_gradients(const Model<double>& m, const double* q, const double* qd,
     finite.look(A, n);
     angles<0>(m, Q, s, c);
     for (int i = 0; i < n; ++i) {
-      sn[i] = {s[i], D8{}};
-      cs[i] = {c[i], D8{}};
-      speed[i] = {D[i], D8{}};
-      rate[i] = {A[i], D8{}};
+      sn[i] = {s[i], Doubles{}};
+      cs[i] = {c[i], Doubles{}};
+      speed[i] = {D[i], Doubles{}};
+      rate[i] = {A[i], Doubles{}};
     }
     for (int k = 0; k < n; ++k) {
       sn[k].d = c[k];
@@ -238,12 +238,12 @@ bool torque_gradients(const Model<double>& m, const double* q, const double* qd,
       newton_euler(m, sn, cs, speed, rate, t);
       if (m.balance.joint == k) t[k] = t[k] - balance_torque(m.balance, sn[k], cs[k]);
       for (int i = 0; i < n; ++i) by_q[i * n + k] = t[i].d;
-      sn[k].d = cs[k].d = D8{};
-      speed[k].d = splat<D8>(1.0);
+      sn[k].d = cs[k].d = Doubles{};
+      speed[k].d = splat<Doubles>(1.0);
       newton_euler(m, sn, cs, speed, rate, t);
       for (int i = 0; i < n; ++i) by_qd[i * n + k] = t[i].d;
       by_qd[k * n + k] += m.drive[k].viscous;
-      speed[k].d = D8{};
+      speed[k].d = Doubles{};
     }
     composite_bodies(m, s, c, H);
     for (int i = 0; i < n; ++i) H[i * n + i] += m.drive[i].rotor;

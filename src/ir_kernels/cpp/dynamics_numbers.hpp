@@ -26,26 +26,26 @@ inline Dual<S> operator+(const Dual<S>& a, double k) { return {a.v + k, a.d}; }
 // Lanes of closed intervals. Every operation rounds outwards by two units in the last place, so the true value of the
 // expression for any point of the arguments lies inside, whatever the rounding of the processor.
 struct Interval {
-  D8 lo, hi;
+  Doubles lo, hi;
 };
 
 constexpr double kOutward = 4.5e-16;  // two units in the last place
 constexpr double kTiny = 1e-300;      // where these underflow
 
-inline Interval outward(D8 lo, D8 hi) {
+inline Interval outward(Doubles lo, Doubles hi) {
   return {lo - (abs(lo) * kOutward + kTiny), hi + (abs(hi) * kOutward + kTiny)};
 }
-inline Interval point(D8 x) { return {x, x}; }
+inline Interval point(Doubles x) { return {x, x}; }
 inline Interval operator-(const Interval& a) { return {-a.hi, -a.lo}; }
 inline Interval operator+(const Interval& a, const Interval& b) { return outward(a.lo + b.lo, a.hi + b.hi); }
 inline Interval operator-(const Interval& a, const Interval& b) { return outward(a.lo - b.hi, a.hi - b.lo); }
 inline Interval operator+(const Interval& a, double k) { return outward(a.lo + k, a.hi + k); }
 inline Interval operator*(const Interval& a, double k) {
-  const D8 p = a.lo * k, q = a.hi * k;
+  const Doubles p = a.lo * k, q = a.hi * k;
   return outward(min(p, q), max(p, q));
 }
 inline Interval operator*(const Interval& a, const Interval& b) {
-  const D8 p = a.lo * b.lo, q = a.lo * b.hi, r = a.hi * b.lo, s = a.hi * b.hi;
+  const Doubles p = a.lo * b.lo, q = a.lo * b.hi, r = a.hi * b.lo, s = a.hi * b.hi;
   return outward(min(min(p, q), min(r, s)), max(max(p, q), max(r, s)));
 }
 
@@ -53,12 +53,12 @@ inline Interval intersect(const Interval& a, const Interval& b) { return {max(a.
 
 // Sines and cosines of all angles of an interval; its ends' values and, where the slope changes sign between them, +-1.
 inline void sincos(const Interval& x, Interval& s, Interval& c) {
-  D8 ends[2] = {x.lo, x.hi}, sine[2]{}, cosine[2]{};
+  Doubles ends[2] = {x.lo, x.hi}, sine[2]{}, cosine[2]{};
   sincos(2, ends, sine, cosine);
-  const I8 wide = x.hi - x.lo > 3.0;  // more than one turning point may hide between the ends
-  const auto range = [&](D8 a, D8 b, D8 slope_a, D8 slope_b) {
-    D8 lo = min(a, b) - 1e-15, hi = max(a, b) + 1e-15;
-    const D8 one = splat<D8>(1.0);
+  const Integers wide = x.hi - x.lo > 3.0;  // more than one turning point may hide between the ends
+  const auto range = [&](Doubles a, Doubles b, Doubles slope_a, Doubles slope_b) {
+    Doubles lo = min(a, b) - 1e-15, hi = max(a, b) + 1e-15;
+    const Doubles one = splat<Doubles>(1.0);
     // a turning point within rounding of an end is no higher than the end, to rounding squared
     hi = ((slope_a > 0.0) & (slope_b < 0.0)) | wide ? one : hi;
     lo = ((slope_a < 0.0) & (slope_b > 0.0)) | wide ? -one : lo;
