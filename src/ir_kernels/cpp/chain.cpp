@@ -51,6 +51,12 @@ Chain::Chain(int count, const double* joint_origin, const double* joint_axis, co
     multiply(turn, &internal[9 * (k + 1)], turned);
     transposed_times(&internal[9 * k], turned, 3, joints[k].turn);
     transposed_times(&internal[9 * k], shift, 1, joints[k].shift);
+    for (int j = 0; j < 3; ++j) {
+      int used = 0;
+      for (int i = 0; i < 3; ++i)
+        if (joints[k].turn[3 * i + j] != 0.0) ++used, joints[k].only[j] = i;
+      if (used != 1) joints[k].only[j] = -1;
+    }
   }
 }
 
@@ -68,14 +74,15 @@ void Chain::forward(const Double8* q, Frame<Double8>* frames) const {
   frames[0] = f;
   for (int k = 0; k < n; ++k) {
     const Joint& joint = joints[k];
-    Vec<Double8> origin = f.origin, turned[3] = {};
-    add_scaled(origin, joint.shift[0], f.x);
-    add_scaled(origin, joint.shift[1], f.y);
-    add_scaled(origin, joint.shift[2], f.z);
+    const Vec<Double8> columns[3] = {f.x, f.y, f.z}, origin = place(f, joint.shift);
+    Vec<Double8> turned[3];
     for (int j = 0; j < 3; ++j) {
-      add_scaled(turned[j], joint.turn[j], f.x);
-      add_scaled(turned[j], joint.turn[3 + j], f.y);
-      add_scaled(turned[j], joint.turn[6 + j], f.z);
+      if (joint.only[j] >= 0) {  // axes along or across each other: most robots
+        turned[j] = splat<Double8>(joint.turn[3 * joint.only[j] + j]) * columns[joint.only[j]];
+      } else {
+        turned[j] = splat<Double8>(joint.turn[j]) * f.x + splat<Double8>(joint.turn[3 + j]) * f.y +
+                    splat<Double8>(joint.turn[6 + j]) * f.z;
+      }
     }
     Double8 s, c;
     sincos(q[k], s, c);

@@ -12,19 +12,13 @@ namespace ir {
 
 struct Joint {
   double turn[9];   // fixed rotation from the previous internal frame to this one at q = 0, row major
+  int only[3];      // of each of its columns the only row that isn't 0, or -1
   double shift[3];  // origin of this one in the previous internal frame
 };
 
 template <class V> struct Frame {
   Vec<V> x, y, z, origin;
 };
-
-// acc + k v where k is often 0 or 1
-template <class V> IR_INLINE void add_scaled(Vec<V>& acc, double k, const Vec<V>& v) {
-  if (k == 0.0) return;
-  const V s = splat<V>(Scalar<V>(k));
-  acc = {acc.x + s * v.x, acc.y + s * v.y, acc.z + s * v.z};
-}
 
 struct Chain {
   int n = 0;
@@ -43,11 +37,9 @@ struct Chain {
 };
 
 template <class V> IR_INLINE Vec<V> place(const Frame<V>& f, const double p[3]) {
-  Vec<V> r = f.origin;
-  add_scaled(r, p[0], f.x);
-  add_scaled(r, p[1], f.y);
-  add_scaled(r, p[2], f.z);
-  return r;
+  const V x = splat<V>(Scalar<V>(p[0])), y = splat<V>(Scalar<V>(p[1])), z = splat<V>(Scalar<V>(p[2]));
+  return {f.origin.x + x * f.x.x + y * f.y.x + z * f.z.x, f.origin.y + x * f.x.y + y * f.y.y + z * f.z.y,
+          f.origin.z + x * f.x.z + y * f.y.z + z * f.z.z};
 }
 
 }  // namespace ir

@@ -131,6 +131,16 @@ IR_INLINE std::uint32_t bits(Int8 m) {
 }
 template <class M> IR_INLINE bool any(M m) { return bits(m) != 0; }
 
+// Whether a <= b in some lane.
+template <class V> IR_INLINE bool any_not_above(V a, V b) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof(Scalar<V>) == 4) return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LE_OQ) != 0;
+  else return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LE_OQ) != 0;
+#else
+  return any(a <= b);
+#endif
+}
+
 // The largest lane.
 template <class V> IR_INLINE Scalar<V> highest(V v) {
 #if defined(__AVX512F__)

@@ -102,6 +102,8 @@ void Model::finish() {
     pair_of[environment[z][0] * kind.size() + environment[z][1]] = static_cast<std::int32_t>(z);
   for (SelfPair& pair : self_pairs) {
     const bool first = capsules[pair.a].link >= capsules[pair.b].link;
+    const Capsule &a = capsules[pair.a], &b = capsules[pair.b];
+    pair.around = a.radius + b.radius + a.half + b.half;
     pair.outer = first ? pair.a : pair.b;
     pair.inner = first ? pair.b : pair.a;
   }

@@ -30,6 +30,7 @@ struct Capsule {
 struct SelfPair {
   int a, b;          // capsules
   int outer, inner;  // the same, the outer one on the link that is farther from the base
+  double around;     // sum of the radii and half lengths
 };
 
 // Sixteen bodies' boxes in the world (relative to the base's origin), for culling; unused places are at infinity.

@@ -66,34 +66,31 @@ template <int width> struct Rows {
   }
 };
 
-// Gathers one capsule (or body) per lane.
+// One capsule per lane, and one body per lane.
 struct Gathered {
   Vec<Double8> a, b;
   Double8 inverse_square, radius;
 };
-// Lanes with the same capsule are placed together.
-Gathered gather(const Model& model, const std::vector<Frame<Double8>>& frames, const int capsule[8]) {
-  Gathered to{};
-  Int8 index;
-  for (int k = 0; k < 8; ++k) index[k] = capsule[k];
-  for (int k = 0; k < 8; ++k) {
-    bool seen = false;
-    for (int j = 0; j < k; ++j) seen |= capsule[j] == capsule[k];
-    if (seen) continue;
-    const Capsule& c = model.capsules[capsule[k]];
-    const Int8 same = index == index[k];
-    to.a = select(same, place(frames[c.link], c.p0), to.a);
-    to.b = select(same, place(frames[c.link], c.p1), to.b);
-    to.inverse_square = same ? splat<Double8>(c.inverse_square) : to.inverse_square;
-    to.radius = same ? splat<Double8>(c.radius) : to.radius;
-  }
-  return to;
-}
-
 struct GatheredBody {
   Vec<Double8> axis[3];
   Double8 offset[3], half[3], radius, half_length;
 };
+
+IR_INLINE void put(Gathered& to, Int8 where, const Capsule& c, const std::vector<Frame<Double8>>& frames) {
+  to.a = select(where, place(frames[c.link], c.p0), to.a);
+  to.b = select(where, place(frames[c.link], c.p1), to.b);
+  to.inverse_square = where ? splat<Double8>(c.inverse_square) : to.inverse_square;
+  to.radius = where ? splat<Double8>(c.radius) : to.radius;
+}
+IR_INLINE void put(GatheredBody& to, Int8 where, const Body<double>& body) {
+  for (int i = 0; i < 3; ++i) {
+    to.axis[i] = select(where, splat3<Double8>(body.axis[i]), to.axis[i]);
+    to.offset[i] = where ? splat<Double8>(body.offset[i]) : to.offset[i];
+    to.half[i] = where ? splat<Double8>(body.half[i]) : to.half[i];
+  }
+  to.radius = where ? splat<Double8>(body.radius) : to.radius;
+  to.half_length = where ? splat<Double8>(body.half_length) : to.half_length;
+}
 
 struct WitnessLanes {
   Double8 distance;
@@ -123,33 +120,30 @@ IR_INLINE Vec<Double8> normal_of(const Vec<Double8>& gap, Double8 distance, cons
 // Exact witness of one pair per lane, in double; lanes of the same kind of body are computed together.
 WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& frames, const int* pair, int count) {
   const int outside = static_cast<int>(model.environment.size());
+  Gathered a{}, b{};
   GatheredBody f{};
-  int kind[8], first[8], second[8];
-  std::uint32_t kinds = 0;
   constexpr int own = 6;  // after the kinds of bodies
-  for (int k = 0; k < 8; ++k) {
-    const int z = pair[std::min(k, count - 1)];
+  std::uint32_t kinds = 0;
+  Int8 index, kind{};
+  for (int k = 0; k < 8; ++k) index[k] = pair[std::min(k, count - 1)];
+  for (std::uint32_t left = 0xff; left != 0;) {  // lanes with the same pair together
+    const int z = static_cast<int>(index[__builtin_ctz(left)]);
+    const Int8 same = index == z;
+    left &= ~bits(same);
+    int now = own;
     if (z >= outside) {
       const SelfPair& p = model.self_pairs[z - outside];
-      first[k] = p.a;
-      second[k] = p.b;
-      kind[k] = own;
+      put(a, same, model.capsules[p.a], frames);
+      put(b, same, model.capsules[p.b], frames);
     } else {
-      const auto& e = model.environment[z];
-      first[k] = second[k] = e[0];
-      kind[k] = model.kind[e[1]];
-      const Body<double>& body = model.bodies_double[e[1]];
-      for (int i = 0; i < 3; ++i) {
-        f.axis[i].x[k] = body.axis[i][0], f.axis[i].y[k] = body.axis[i][1], f.axis[i].z[k] = body.axis[i][2];
-        f.offset[i][k] = body.offset[i];
-        f.half[i][k] = body.half[i];
-      }
-      f.radius[k] = body.radius;
-      f.half_length[k] = body.half_length;
+      const auto& [capsule_index, body] = model.environment[z];
+      put(a, same, model.capsules[capsule_index], frames);
+      put(f, same, model.bodies_double[body]);
+      now = model.kind[body];
     }
-    kinds |= 1u << kind[k];
+    kind = same ? Int8{} + now : kind;
+    kinds |= 1u << now;
   }
-  const Gathered a = gather(model, frames, first);
   const Vec<Double8> la{dot(f.axis[0], a.a) - f.offset[0], dot(f.axis[1], a.a) - f.offset[1],
                         dot(f.axis[2], a.a) - f.offset[2]};
   const Vec<Double8> lb{dot(f.axis[0], a.b) - f.offset[0], dot(f.axis[1], a.b) - f.offset[1],
@@ -157,8 +151,7 @@ WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& fram
   Touch<Double8> touch{};
   Double8 radius_b{};
   const auto keep = [&](int which, const Touch<Double8>& found) {
-    Int8 m;
-    for (int k = 0; k < 8; ++k) m[k] = kind[k] == which ? -1 : 0;
+    const Int8 m = kind == which;
     touch.distance = m ? found.distance : touch.distance;
     touch.t = m ? found.t : touch.t;
     touch.normal = select(m, found.normal, touch.normal);
@@ -176,7 +169,7 @@ WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& fram
       if (kind[k] != mesh) continue;
       const double from[3] = {la.x[k], la.y[k], la.z[k]}, to[3] = {lb.x[k], lb.y[k], lb.z[k]};
       double t = 0.0, n[3];
-      const int body = model.environment[pair[std::min(k, count - 1)]][1];
+      const int body = model.environment[index[k]][1];
       found.distance[k] = segment_hull(model.hulls[body], from, to, t, n);
       found.t[k] = t;
       found.normal.x[k] = n[0], found.normal.y[k] = n[1], found.normal.z[k] = n[2];
@@ -197,12 +190,10 @@ WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& fram
   const Vec<Double8> n = touch.normal;
   touch.normal = n.x * f.axis[0] + n.y * f.axis[1] + n.z * f.axis[2];
   if (kinds >> own & 1) {
-    const Gathered b = gather(model, frames, second);
     const auto p = segment_segment(a.a, a.b - a.a, a.inverse_square, b.a, b.b - b.a, b.inverse_square);
     const Double8 distance = sqrt(dot(p.gap, p.gap));
     keep(own, {distance, p.s, normal_of(p.gap, distance, a.b - a.a, b.b - b.a)});
-    for (int k = 0; k < 8; ++k)
-      if (kind[k] == own) radius_b[k] = b.radius[k];
+    radius_b = kind == own ? b.radius : radius_b;
   }
   WitnessLanes w;
   w.normal = touch.normal;

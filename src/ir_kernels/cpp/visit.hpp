@@ -29,7 +29,7 @@ template <class V> IR_INLINE V square_apart(const Vec<V>& a, const Vec<V>& b, co
 // exceeds `need`.
 template <class V> IR_INLINE bool may_matter(V square, V need) {
   const V positive = max(need, V{});
-  return any(square <= positive * positive);
+  return any_not_above<V>(square, positive * positive);
 }
 
 template <class V, class Policy>
@@ -62,7 +62,7 @@ IR_INLINE void visit_environment(const Model& model, const State<V>& s, int c, P
       return f.axis[2][0] * p.x + (f.axis[2][1] * p.y + (f.axis[2][2] * p.z - f.offset[2]));
     };
     const V distance = min(height(s.a[c]), height(s.b[c])) - radius;
-    if (any(distance <= policy.outside(c) + policy.shift[z])) policy.take(z, c, distance);
+    if (any_not_above<V>(distance, policy.outside(c) + policy.shift[z])) policy.take(z, c, distance);
   }
   if (model.leaves.empty()) return;
   // A ball about the capsule in all lanes: around the middle of one of them.
@@ -95,10 +95,8 @@ template <class V, class Policy> IR_INLINE void visit_self(const Model& model, c
     const S shift = policy.shift[outside + i];
     if (shift == -std::numeric_limits<S>::infinity()) continue;
     const SelfPair& pair = model.self_pairs[i];
-    const Capsule &first = model.capsules[pair.a], &second = model.capsules[pair.b];
     const Vec<V> gap = s.middle[pair.a] - s.middle[pair.b];
-    const S around = static_cast<S>(first.radius + second.radius + first.half + second.half);
-    if (!may_matter<V>(dot(gap, gap), policy.own(i) + (shift + around))) continue;
+    if (!may_matter<V>(dot(gap, gap), policy.own(i) + (shift + static_cast<S>(pair.around)))) continue;
     policy.take(static_cast<int>(outside + i), static_cast<int>(i), self_distance(model, s, pair));
   }
 }
