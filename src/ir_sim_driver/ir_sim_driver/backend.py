@@ -11,6 +11,9 @@ from typing import Any, NamedTuple, Protocol
 
 from ir_sim_driver.arrays import Array
 
+STANDING = 1e-3
+"""Speed [rad/s] below which a joint stands."""
+
 
 class Work(NamedTuple):
     """What the motors did in K steps: speed (K, n) [rad/s] in the middle of the step, torque (K, n) [Nm] at
@@ -24,13 +27,20 @@ class Work(NamedTuple):
 class Backend(Protocol):
     """A robot of n joints that is stepped.
 
-    q, qd (n,): present position [rad] and speed [rad/s]. torque (n,): of the motors in the last step [Nm].
+    q (n,): present position [rad].
     disturbance (n,) or None: outside torque [Nm] that acts in every step until it is changed.
     """
 
     q: Array
-    qd: Array
     disturbance: Array | None
+
+    @property
+    def qd(self) -> Array:
+        """Present speed (n,) [rad/s]."""
+
+    @property
+    def standing(self) -> bool:
+        """Whether no joint moves faster than STANDING."""
 
     @property
     def torque(self) -> Array:

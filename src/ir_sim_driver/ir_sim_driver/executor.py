@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from ir_sim_driver.arrays import Array
+from ir_sim_driver.backend import Backend
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.lead_in import Route
 from ir_sim_driver.path import Motion, Path
 from ir_sim_driver.path_speed import PathSpeed
 from ir_sim_driver.tolerances import Tolerances
-from ir_sim_driver.tool_point import ToolPoint
+from ir_sim_driver.tool_point import EXACT_FROM, ToolPoint
 
 
 @dataclass(eq=False)
@@ -33,6 +34,7 @@ class _Run:
     goal_time: float
     label: str
     wait: int  # steps until it may start
+    quiet: float  # bound of the tool's deviation [m] below which nothing can be broken
     s: float = 0.0
     settling: int = 0
     stopping: bool = False
@@ -140,14 +142,17 @@ class Executor:
                 self._will_end(ErrorCode.INVALID_GOAL, "preempted by another trajectory", canceled=False)
             self._finish()
         s = self._settings
+        path_tolerance = Tolerances.of(self._names, goal.path_tolerance, s.path_tolerance)
+        quiet = min(s.tube, self._tool.quiet_bound(path_tolerance.position))
         self._run = _Run(
             Outcome(goal_id, ErrorCode.SUCCESSFUL, ""),
             route,
-            Tolerances.of(self._names, goal.path_tolerance, s.path_tolerance),
+            path_tolerance,
             Tolerances.of(self._names, goal.goal_tolerance, s.goal_tolerance),
             goal.goal_time or s.goal_time,
             goal.label or goal.trajectory.trajectory_id,
             max(0, round(delay / self._dt)),
+            -1.0 if path_tolerance.has_velocity else quiet,
         )
         # a route from rest starts with speed zero, so path time may start at once; one in motion carries on
         self._speed.value = 1.0 if moving else 0.0
@@ -204,22 +209,24 @@ class Executor:
             self._finish()
         return self.command
 
-    def supervise(self, q: Array, qd: Array) -> None:
+    def supervise(self, robot: Backend) -> None:
         """Compare the robot with the command after the step: tube, tolerances, end."""
+        q = robot.q
         error = self.command - q
-        self.deviation = self._tool.deviation(self.command, q)
+        bound = self._tool.bound(error)
+        self.deviation = bound if bound <= EXACT_FROM else self._tool.deviation(self.command, q)
         run = self._run
         if run is None:
             return
         run.deviation = max(run.deviation, self.deviation)
         if not run.stopping:
-            sentence = self._broken(run, error, qd)
+            sentence = "" if bound <= run.quiet else self._broken(run, error, robot)
             if sentence:
                 self.stop(ErrorCode.PATH_TOLERANCE_VIOLATED, sentence)
             elif run.s >= run.route.path.duration and run.wait == 0:
-                self._settle(run, error, qd)
+                self._settle(run, error, robot)
 
-    def _broken(self, run: _Run, error: Array, qd: Array) -> str:
+    def _broken(self, run: _Run, error: Array, robot: Backend) -> str:
         if self.deviation > self._settings.tube:
             return (
                 f"the tool is {self.deviation * 1e3:.2f} mm from the commanded path at "
@@ -229,13 +236,13 @@ class Executor:
             )
         sentence = run.path_tolerance.broken_position(self._names, error)
         if not sentence and run.path_tolerance.has_velocity:
-            sentence = run.path_tolerance.broken_velocity(self._names, self.motion().qd - qd)
+            sentence = run.path_tolerance.broken_velocity(self._names, self.motion().qd - robot.qd)
         return f"{sentence} at {self.path_time:.3f} s; stopped on the path" if sentence else ""
 
-    def _settle(self, run: _Run, error: Array, qd: Array) -> None:
+    def _settle(self, run: _Run, error: Array, robot: Backend) -> None:
         sentence = run.goal_tolerance.broken_position(self._names, error)
-        if not sentence:
-            sentence = run.goal_tolerance.broken_velocity(self._names, qd)
+        if not sentence and run.goal_tolerance.has_velocity:
+            sentence = run.goal_tolerance.broken_velocity(self._names, robot.qd)
         if not sentence:
             self._finish()
             return

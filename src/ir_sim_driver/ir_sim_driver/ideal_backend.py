@@ -1,4 +1,4 @@
-"""A robot that tracks exactly; torques come from the dynamics model, computed for many steps at once.
+"""A robot that tracks exactly; speeds and torques are computed for many steps at once, from where it was.
 
 For tests of everything around the physics, and for long simulated shifts. A disturbance has no effect on it.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from ir_kernels.dynamics import DynamicsModel
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import Work
+from ir_sim_driver.backend import STANDING, Work
 
 BRAKE_FACTOR = 2.0
 """Deceleration of the mechanical brakes over the joint's acceleration limit."""
@@ -26,45 +26,53 @@ class IdealBackend:
         self._base_pose = np.eye(4) if base_pose is None else base_pose
         self._brake_step: Array = BRAKE_FACTOR * dt * np.array(robot.acceleration_max)
         self.disturbance: Array | None = None
-        self._rows: list[tuple[Array, Array, Array] | None] = []
         n = len(robot.joint_names)
+        self._done = Work(np.empty((0, n)), np.empty((0, n)))
         self._last: Array = np.zeros(n)
-        self._speeds: Array = np.empty((0, n))
-        self._torques: Array = np.empty((0, n))
-        self.set_load(())
+        self._dynamics = DynamicsModel(robot, (), self._base_pose)
+        self._path: list[Array] = []  # two positions more than unsettled steps
+        self._driven: list[bool] = []
         self.reset(np.array(robot.machine_home))
 
     def reset(self, q: Array) -> None:
         """Stand still at q."""
+        self._settle()
         self.q: Array = np.array(q, dtype=np.float64)
-        self.qd: Array = np.zeros(len(self.q))
-        self._speed: Array = self.qd
+        self._before: Array = self.q  # one and two steps ago
+        self._earlier: Array = self.q
+        self._path = [self.q, self.q]
 
     def set_load(self, loads: Sequence[Any]) -> None:
         """Carry these loads."""
-        if self._rows:
-            self._settle()
+        self._settle()
         self._dynamics = DynamicsModel(self._robot, tuple(loads), self._base_pose)
+
+    @property
+    def qd(self) -> Array:
+        """Speed now: the last difference and half of its change."""
+        last, change = self.q - self._before, self.q - 2.0 * self._before + self._earlier
+        return (last + 0.5 * change) / self._dt
+
+    @property
+    def standing(self) -> bool:
+        """Whether the robot stands."""
+        if self.q is self._before:
+            return True
+        return bool(np.abs(self.q - self._before).max() < STANDING * self._dt)
 
     def track(self, q_next: Array) -> None:
         """Be at q_next after the step."""
-        speed = (q_next - self.q) / self._dt
-        qdd = (speed - self._speed) / self._dt
-        self._rows.append((self.q, 0.5 * (speed + self._speed), qdd))
-        self.q, self._speed = q_next, speed
-        self.qd = speed + (0.5 * self._dt) * qdd
+        self._go(q_next, True)
 
     def brake(self) -> None:
         """Slow every joint down by what its brake can do in one step."""
-        self._speed = np.sign(self._speed) * np.maximum(np.abs(self._speed) - self._brake_step, 0.0)
-        self.qd = self._speed
-        self.q = self.q + self._dt * self._speed
-        self._rows.append(None)
+        speed = (self.q - self._before) / self._dt
+        slower = np.sign(speed) * np.maximum(np.abs(speed) - self._brake_step, 0.0)
+        self._go(self.q + self._dt * slower if slower.any() else self.q, False)
 
     def rest(self) -> None:
         """Stay."""
-        self._speed = self.qd = np.zeros(len(self.q))
-        self._rows.append(None)
+        self._go(self.q, False)
 
     @property
     def torque(self) -> Array:
@@ -75,22 +83,28 @@ class IdealBackend:
     def work(self) -> Work:
         """Torques of the steps since the last call."""
         self._settle()
-        speed, torque = self._speeds, self._torques
-        self._speeds = self._torques = np.empty((0, len(self.q)))
-        return Work(speed, torque)
+        done, empty = self._done, np.empty((0, len(self.q)))
+        self._done = Work(empty, empty)
+        return done
+
+    def _go(self, q_next: Array, driven: bool) -> None:
+        self._earlier, self._before, self.q = self._before, self.q, q_next
+        self._path.append(q_next)
+        self._driven.append(driven)
 
     def _settle(self) -> None:
-        n = len(self.q)
-        if not self._rows:
+        """Compute speeds and torques of the steps that have none yet."""
+        if not self._driven:
             return
-        driven = [k for k, row in enumerate(self._rows) if row is not None]
-        speed, torque = np.zeros((2, len(self._rows), n))
-        if driven:
-            q, qd, qdd = (np.array(part) for part in zip(*filter(None, self._rows), strict=True))
-            speed[driven] = qd
-            torque[driven] = self._dynamics.inverse_dynamics(q, qd, qdd)
-        self._rows.clear()
+        q = np.array(self._path)
+        steps = np.diff(q, axis=0) / self._dt
+        qdd = np.diff(steps, axis=0) / self._dt
+        middle = 0.5 * (steps[1:] + steps[:-1])
+        driven = np.array(self._driven)[:, None]
+        torque = np.where(driven, self._dynamics.inverse_dynamics(q[1:-1], middle, qdd), 0.0)
+        self._path, self._driven = self._path[-2:], []
         self._last = torque[-1]
-        if self._speeds.size:
-            speed, torque = np.vstack((self._speeds, speed)), np.vstack((self._torques, torque))
-        self._speeds, self._torques = speed, torque
+        speed = np.where(driven, middle, 0.0)
+        if len(self._done.speed):
+            speed, torque = np.vstack((self._done.speed, speed)), np.vstack((self._done.torque, torque))
+        self._done = Work(speed, torque)

@@ -29,15 +29,14 @@ class BasePower:
 
     def set_tool(self, always: float, drive_bus: float) -> None:
         """Take the tool's watts: always, and more while the drive bus is up."""
-        self._always: float = always
-        self._drive_bus: float = drive_bus
+        self._watts = {level: watts + always for level, watts in self._controller.items()}
+        for level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
+            self._watts[level] += drive_bus
+        self._watts[Mode.STAND_ON_MOTORS] += self._drives
 
     def of(self, level: Mode) -> float:
         """Watts in STAND_ON_MOTORS or a rest, without holding torque."""
-        watts = self._controller[level] + self._always
-        if level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
-            watts += self._drive_bus
-        return watts + self._drives if level is Mode.STAND_ON_MOTORS else watts
+        return self._watts[level]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ Times come from the controller's data and are parameters; names and numbers are 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ir_msgs_py.power import Mode
 from ir_msgs_py.settings import check_settings, setting
@@ -79,8 +80,7 @@ class Rest:
     minimum_stay: float
 
 
-@dataclass(frozen=True)
-class Wish:
+class Wish(NamedTuple):
     """What the rest of the controller wants of the power modes, level by level.
 
     rest: the mode to rest in (STAND_ON_MOTORS: be ready, None: no opinion). motion: a movement waits or runs.

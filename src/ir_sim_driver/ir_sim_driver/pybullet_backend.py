@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import Work
+from ir_sim_driver.backend import STANDING, Work
 from ir_sim_driver.control import CommandFollower, ControlSettings
 from ir_sim_driver.drivetrain import Drivetrain
 from ir_sim_driver.errors import BackendError
@@ -57,7 +57,7 @@ class PyBulletBackend:
         self.disturbance: Array | None = None
         self.torque = self._still
         self.q: Array = np.array(robot.machine_home, dtype=np.float64)
-        self.qd: Array = self._still
+        self.qd = self._still
         self._speed: Array = self._still
         self._speeds: list[Array] = []
         self._torques: list[Array] = []
@@ -69,6 +69,11 @@ class PyBulletBackend:
     def close(self) -> None:
         """Let go of the physics server."""
         self._bullet.disconnect(physicsClientId=self._client)
+
+    @property
+    def standing(self) -> bool:
+        """Whether the robot stands."""
+        return bool(np.abs(self.qd).max() < STANDING)
 
     def reset(self, q: Array) -> None:
         """Stand still at q; starts the physics server again when it is gone."""

@@ -34,8 +34,7 @@ from ir_sim_driver.simulation_settings import SimulationSettings
 from ir_sim_driver.tool_point import ToolPoint
 from ir_sim_driver.trajectory_checks import check_goal, check_trajectory, checked_route
 
-METER_STEPS = 10
-_STANDING = 1e-3  # rad/s
+METER_STEPS = 50
 _HOME = 0.01  # rad
 _MANUAL = (OperatingMode.T1, OperatingMode.T2)
 
@@ -267,7 +266,7 @@ class Simulation:
             self.emergency.step()
         elif self.modes.level is Mode.STAND_ON_MOTORS:
             backend.track(executor.advance(self._scaling(), self.modes.motors_on))
-            executor.supervise(backend.q, backend.qd)
+            executor.supervise(backend)
         else:
             backend.rest()
 
@@ -306,7 +305,7 @@ class Simulation:
         return wish
 
     def _standing(self) -> bool:
-        return self.executor.path_speed == 0.0 and bool(np.abs(self.backend.qd).max() < _STANDING)
+        return self.executor.path_speed == 0.0 and self.backend.standing
 
     def _react_to_plc(self) -> None:
         plc = self.plc

@@ -34,13 +34,16 @@ class ToolPoint:
         positions: Array = self.chain.tcp_poses(q)[:, :3, 3]
         return positions
 
+    def bound(self, error: Array) -> float:
+        """Upper bound [m] of the tool's deviation when the joints are off by error (n,)."""
+        return float(self._reach @ np.abs(error))
+
+    def quiet_bound(self, tolerance: Array) -> float:
+        """Bound [m] below which no joint can be off by more than its tolerance (n,)."""
+        return float((self._reach * tolerance).min())
+
     def deviation(self, commanded: Array, q: Array) -> float:
-        """Distance [m] of the tcp at q from that at `commanded`; an upper bound where it is below
-        EXACT_FROM.
-        """
-        bound = float(self._reach @ np.abs(commanded - q))
-        if bound <= EXACT_FROM:
-            return bound
+        """Distance [m] of the tcp at q from that at `commanded` (n,)."""
         both = self.positions(np.array((commanded, q)))
         return float(np.linalg.norm(both[0] - both[1]))
 
