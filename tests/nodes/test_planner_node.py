@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -52,10 +53,8 @@ def planner_node(ros_context: Any) -> Iterator[PlannerNode]:
     executor.add_node(node)
 
     def spin() -> None:
-        try:
+        with contextlib.suppress(ExternalShutdownException, ShutdownException):
             executor.spin()
-        except (ExternalShutdownException, ShutdownException):
-            pass
 
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
@@ -96,7 +95,7 @@ def pose(x: float, y: float, z: float, frame: str = "cell", w: float = 1.0) -> P
     return msg
 
 
-# -- every service ---------------------------------------------------------------------------------------------
+# -- every service
 
 
 def test_set_cell_names_the_stations_and_get_cell_gives_its_text_back(call: Call) -> None:
@@ -239,7 +238,7 @@ def test_plan_standby_wakes_in_time(call: Call) -> None:
     assert answer.energy == pytest.approx(min(answer.alternative_energies))
 
 
-# -- the action ------------------------------------------------------------------------------------------------
+# -- the action
 
 
 @pytest.fixture
@@ -292,7 +291,7 @@ def test_a_cancelled_plan_stops_and_quick_services_answer_meanwhile(
     assert not result.result().result.movements
 
 
-# -- topics ----------------------------------------------------------------------------------------------------
+# -- topics
 
 
 def test_late_listeners_get_markers_and_trajectory_and_diagnostics_come(
@@ -323,80 +322,241 @@ def test_late_listeners_get_markers_and_trajectory_and_diagnostics_come(
     assert heard["/diagnostics"].status[0].name == "ir_planner"
 
 
-# -- bad input: a code and a sentence, and the node lives on ---------------------------------------------------------
+# -- bad input: a code and a sentence, and the node lives on
 
 
 NAN = float("nan")
 BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
-    ("two goals", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "park", "goal_state": state(HOME)}, -16, "exactly one"),
+    (
+        "two goals",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "park", "goal_state": state(HOME)},
+        -16,
+        "exactly one",
+    ),
     ("no goal", PlanRegionalMovement, "plan_regional_movement", {"start": state(HOME)}, -16, "exactly one"),
-    ("unknown goal", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "nowhere"}, -19, "gauge_measure"),
-    ("goal beyond a limit", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "A1 200 A2 -90 A3 90 A4 0 A5 0 A6 0"}, -27, "185"),
-    ("nan in start", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state([NAN, *HOME[1:]]), "goal": "park"}, -26, "finite"),
-    ("unknown joint", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME, ("a1", *JOINT_NAMES[1:])), "goal": "park"}, -26, "joint_a1"),
-    ("missing joint", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME[:5], JOINT_NAMES[:5]), "goal": "park"}, -26, "joint_a6"),
-    ("start in collision", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(np.radians([0, -20, 60, 0, 0, 0]).tolist()), "goal": "park"}, -10, "mm"),
-    ("goal in collision", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "A1 0 A2 -20 A3 60 A4 0 A5 0 A6 0"}, -12, "mm"),
-    ("unreachable pose", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "X 9 Y 0 Z 1 A 0 B 90 C 0"}, -31, "m"),
-    ("zero quaternion", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal_pose": pose(1.5, 0, 1.5, w=0.0)}, -16, "norm"),
-    ("unknown frame", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal_pose": pose(1.5, 0, 1.5, "moon")}, -21, "moon"),
-    ("nan pose", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal_pose": pose(NAN, 0, 1.5)}, -16, "finite"),
+    (
+        "unknown goal",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "nowhere"},
+        -19,
+        "gauge_measure",
+    ),
+    (
+        "goal beyond a limit",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "A1 200 A2 -90 A3 90 A4 0 A5 0 A6 0"},
+        -27,
+        "185",
+    ),
+    (
+        "nan in start",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state([NAN, *HOME[1:]]), "goal": "park"},
+        -26,
+        "finite",
+    ),
+    (
+        "unknown joint",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME, ("a1", *JOINT_NAMES[1:])), "goal": "park"},
+        -26,
+        "joint_a1",
+    ),
+    (
+        "missing joint",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME[:5], JOINT_NAMES[:5]), "goal": "park"},
+        -26,
+        "joint_a6",
+    ),
+    (
+        "start in collision",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(np.radians([0, -20, 60, 0, 0, 0]).tolist()), "goal": "park"},
+        -10,
+        "mm",
+    ),
+    (
+        "goal in collision",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "A1 0 A2 -20 A3 60 A4 0 A5 0 A6 0"},
+        -12,
+        "mm",
+    ),
+    (
+        "unreachable pose",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "X 9 Y 0 Z 1 A 0 B 90 C 0"},
+        -31,
+        "m",
+    ),
+    (
+        "zero quaternion",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal_pose": pose(1.5, 0, 1.5, w=0.0)},
+        -16,
+        "norm",
+    ),
+    (
+        "unknown frame",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal_pose": pose(1.5, 0, 1.5, "moon")},
+        -21,
+        "moon",
+    ),
+    (
+        "nan pose",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal_pose": pose(NAN, 0, 1.5)},
+        -16,
+        "finite",
+    ),
     *(
-        (f"planning_time {value}", PlanRegionalMovement, "plan_regional_movement",
-         {"start": state(HOME), "goal": "park", "options": PlanOptions(planning_time=value)}, -16, "planning_time")
+        (
+            f"planning_time {value}",
+            PlanRegionalMovement,
+            "plan_regional_movement",
+            {"start": state(HOME), "goal": "park", "options": PlanOptions(planning_time=value)},
+            -16,
+            "planning_time",
+        )
         for value in (0.0, -1.0, NAN)
     ),
-    ("nan safety distance", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "park", "options": PlanOptions(safety_distance=NAN)}, -16, "safety_distance"),
-    ("unknown objective", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "park", "options": PlanOptions(objective="beauty")}, -16, "time_and_energy"),
-    ("unknown planner", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "park", "options": PlanOptions(planner_id="prm")}, -16, "detours"),
-    ("velocity scaling above 1", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "park", "options": PlanOptions(velocity_scaling=1.5)}, -16, "1.5"),
-    ("unknown load", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "park", "options": PlanOptions(load="anvil")}, -19, "gear"),
-    ("too short a duration", PlanRegionalMovement, "plan_regional_movement",
-     {"start": state(HOME), "goal": "park", "options": PlanOptions(duration=0.05)}, -16, "shortest"),
+    (
+        "nan safety distance",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "park", "options": PlanOptions(safety_distance=NAN)},
+        -16,
+        "safety_distance",
+    ),
+    (
+        "unknown objective",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "park", "options": PlanOptions(objective="beauty")},
+        -16,
+        "time_and_energy",
+    ),
+    (
+        "unknown planner",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "park", "options": PlanOptions(planner_id="prm")},
+        -16,
+        "detours",
+    ),
+    (
+        "velocity scaling above 1",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "park", "options": PlanOptions(velocity_scaling=1.5)},
+        -16,
+        "1.5",
+    ),
+    (
+        "unknown load",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "park", "options": PlanOptions(load="anvil")},
+        -19,
+        "gear",
+    ),
+    (
+        "too short a duration",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal": "park", "options": PlanOptions(duration=0.05)},
+        -16,
+        "shortest",
+    ),
     ("unknown cell", SetCell, "set_cell", {"cell_file": "atlantis"}, -19, "demo"),
     ("broken cell", SetCell, "set_cell", {"cell_yaml": "format: ir_cell/1\nname: [1"}, -16, "<text>:3"),
     ("no cell given", SetCell, "set_cell", {}, -16, "neither"),
     ("unknown machine", SetEquipment, "set_equipment", {"name": "crane"}, -19, "lathe"),
-    ("unknown door state", SetEquipment, "set_equipment", {"name": "lathe", "state": "ajar"}, -19, "door_open"),
+    (
+        "unknown door state",
+        SetEquipment,
+        "set_equipment",
+        {"name": "lathe", "state": "ajar"},
+        -19,
+        "door_open",
+    ),
     ("state of five joints", CheckState, "check_state", {"state": JointState(position=HOME[:5])}, -17, "5"),
-    ("unknown station of a state", CheckState, "check_state",
-     {"state": state(HOME), "station": "moon"}, -19, "lathe_work"),
+    (
+        "unknown station of a state",
+        CheckState,
+        "check_state",
+        {"state": state(HOME), "station": "moon"},
+        -19,
+        "lathe_work",
+    ),
     ("ik of a configuration", ComputeIk, "compute_ik", {"goal": "park"}, -16, "pose"),
-    ("unknown ik method", ComputeIk, "compute_ik", {"goal": "gauge_measure", "method": "magic"}, -16, "analytic"),
+    (
+        "unknown ik method",
+        ComputeIk,
+        "compute_ik",
+        {"goal": "gauge_measure", "method": "magic"},
+        -16,
+        "analytic",
+    ),
     ("unknown trajectory", GetTrajectory, "get_trajectory", {"trajectory_id": "feedbeef"}, -19, "feedbeef"),
     ("unknown program", GetProgram, "get_program", {"program_id": "feedbeef"}, -19, "feedbeef"),
     ("no trajectory", EvaluateTrajectory, "evaluate_trajectory", {}, -16, "exactly one"),
     ("empty reference", PlanTrajectory, "plan_trajectory", {}, -2, "joint names"),
-    ("nan in reference", PlanTrajectory, "plan_trajectory",
-     {"reference": JointTrajectory(joint_names=list(JOINT_NAMES),
-                                   points=[JointTrajectoryPoint(positions=[NAN] * 6)])}, -2, "point 0 joint 0"),
-    ("reference of wrong joints", PlanTrajectory, "plan_trajectory",
-     {"reference": JointTrajectory(joint_names=["x"], points=[JointTrajectoryPoint(positions=[0.0])])},
-     -2, "joint_a1"),
+    (
+        "nan in reference",
+        PlanTrajectory,
+        "plan_trajectory",
+        {
+            "reference": JointTrajectory(
+                joint_names=list(JOINT_NAMES), points=[JointTrajectoryPoint(positions=[NAN] * 6)]
+            )
+        },
+        -2,
+        "point 0 joint 0",
+    ),
+    (
+        "reference of wrong joints",
+        PlanTrajectory,
+        "plan_trajectory",
+        {"reference": JointTrajectory(joint_names=["x"], points=[JointTrajectoryPoint(positions=[0.0])])},
+        -2,
+        "joint_a1",
+    ),
     ("unknown station in a program", PlanProgram, "plan_program", {"stations": ["moon"]}, -19, "lathe_work"),
-    ("nan cycle time", PlanProgram, "plan_program", {"stations": ["park"], "cycle_time": NAN}, -16, "cycle_time"),
-    ("too short a cycle", PlanProgram, "plan_program",
-     {"stations": ["home", "park"], "cycle_time": 0.1}, -16, "shortest"),
+    (
+        "nan cycle time",
+        PlanProgram,
+        "plan_program",
+        {"stations": ["park"], "cycle_time": NAN},
+        -16,
+        "cycle_time",
+    ),
+    (
+        "too short a cycle",
+        PlanProgram,
+        "plan_program",
+        {"stations": ["home", "park"], "cycle_time": 0.1},
+        -16,
+        "shortest",
+    ),
     ("negative pause", PlanStandby, "plan_standby", {"pause": -1.0}, -16, "-1"),
     ("nan pause", PlanStandby, "plan_standby", {"pause": NAN}, -16, "nan"),
-]  # fmt: skip
+]
 
 
 def test_bad_input_is_answered_by_a_sentence_and_the_node_lives(call: Call) -> None:

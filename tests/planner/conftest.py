@@ -1,4 +1,4 @@
-"""Cells, scenes and budgets that the planner's tests share; scenes are immutable, so one per session will do."""
+"""Cells, scenes and budgets that the planner's tests share; scenes never change: one per session will do."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ir_description import Cell, PowerData, load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_planner.budget import Budget
 from ir_planner.goals import Goal
 from ir_planner.planner import Planner
 from ir_planner.scene import PlanningScene, load_text, scene_with
+
+from ir_description import Cell, PowerData, load_cell, load_power_data
 
 
 @pytest.fixture(scope="session")

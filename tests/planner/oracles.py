@@ -1,12 +1,13 @@
-"""Second opinions for the planner's tests: torques by Pinocchio and the data's own formulas, dense samples."""
+"""Second opinions for the planner's tests: torques by Pinocchio and the data's own formulas."""
 
 from __future__ import annotations
 
 import numpy as np
 import pinocchio
-from ir_description import RobotModel, robot_urdf
 from ir_planner.scene import PlanningScene
 from numpy.typing import NDArray
+
+from ir_description import RobotModel, robot_urdf
 
 FloatArray = NDArray[np.float64]
 
@@ -32,8 +33,8 @@ def torques(scene: PlanningScene, q: FloatArray, qd: FloatArray, qdd: FloatArray
     model.gravity.linear = np.array([0.0, 0.0, -9.80665])
     data = model.createData()
     arm = np.array([pinocchio.rnea(model, data, *row) for row in zip(q, qd, qdd, strict=True)])
-    drives = robot.reflected_inertia * qdd + robot.friction_viscous * qd + robot.friction_coulomb * np.sign(qd)
-    total = arm + drives
+    friction = robot.friction_viscous * qd + robot.friction_coulomb * np.sign(qd)
+    total = arm + robot.reflected_inertia * qdd + friction
     total[:, 1] -= counterbalance(robot, q[:, 1])
     return np.asarray(total)
 

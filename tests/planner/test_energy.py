@@ -68,7 +68,9 @@ def test_lowering_a_load_gives_energy_back_on_the_bus(
     slow = timed_movement(path, demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget).trajectory
     down = movement_energy(slow, demo_scene)
     back = movement_energy(
-        timed_movement(path[::-1], demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget).trajectory,
+        timed_movement(
+            path[::-1], demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget
+        ).trajectory,
         demo_scene,
     )
     assert down.joints.sum() < back.joints.sum()
@@ -81,5 +83,7 @@ def test_the_objective_trades_time_for_joules(fast: JointTrajectory, demo_scene:
     both = best_stretch(fast, demo_scene, "time_and_energy", 500.0)
     frugal = best_stretch(fast, demo_scene, "energy", 500.0)
     assert 1.0 <= both <= frugal
-    assert movement_energy(stretched(fast, frugal), demo_scene).total < movement_energy(fast, demo_scene).total
+    assert (
+        movement_energy(stretched(fast, frugal), demo_scene).total < movement_energy(fast, demo_scene).total
+    )
     assert best_stretch(fast, demo_scene, "time_and_energy", 1e6) == 1.0

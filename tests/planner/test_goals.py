@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ir_description import Cell, load_cell
 from ir_msgs_py.status import StatusCode
-from ir_planner.errors import PlannerError, RequestError
+from ir_planner.errors import RequestError
 from ir_planner.goals import one_goal, parse_goal
+
+from ir_description import load_cell
 
 CELL = load_cell("demo")
 
@@ -29,8 +31,13 @@ def test_postures_have_names(text: str, posture: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["A1 10 A2 -90 A3 90 A4 0 A5 -5 A6 0", "a1=10, a2=-90, a3=90, a4=0, a5=-5, a6=0", "A6 0 A5 -5 A4 0 A3 90 A2 -90 A1 10"]
-)  # fmt: skip
+    "text",
+    [
+        "A1 10 A2 -90 A3 90 A4 0 A5 -5 A6 0",
+        "a1=10, a2=-90, a3=90, a4=0, a5=-5, a6=0",
+        "A6 0 A5 -5 A4 0 A3 90 A2 -90 A1 10",
+    ],
+)
 def test_joint_values_are_degrees_in_any_order(text: str) -> None:
     assert np.degrees(parse_goal(text, CELL).configuration) == pytest.approx([10, -90, 90, 0, -5, 0])  # type: ignore[arg-type]
 
@@ -77,8 +84,5 @@ def test_exactly_one_form_is_taken() -> None:
 
 @given(st.text(max_size=80))
 def test_no_text_escapes_as_another_error(text: str) -> None:
-    cell: Cell = CELL
-    try:
-        parse_goal(text, cell)
-    except PlannerError as error:
-        assert str(error)
+    with contextlib.suppress(RequestError):
+        parse_goal(text, CELL)

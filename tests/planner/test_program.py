@@ -1,4 +1,4 @@
-"""The demonstration program: every movement certified, parts in hand where they should be, one id per content."""
+"""The demonstration program: all movements certified, parts in hand where they should be, one id."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ir_description import Cell, PowerData, load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.status import StatusCode
@@ -16,12 +15,16 @@ from ir_planner.budget import Budget
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 
+from ir_description import Cell, PowerData, load_cell
+
 
 def no_progress(phase: str, done: int, total: int, cost: float) -> None:
     """Nobody listens."""
 
 
-def planned(cell: Cell, power: PowerData, *stations: str, cycle_time: float = 0.0, **choices: Any) -> ProgramPlan:
+def planned(
+    cell: Cell, power: PowerData, *stations: str, cycle_time: float = 0.0, **choices: Any
+) -> ProgramPlan:
     choices = {"planning_time": 60.0, **choices}
     request = ProgramRequest(
         cell, power, stations, np.array(cell.machine_home), PlanOptions(**choices), cycle_time
@@ -51,7 +54,11 @@ def test_every_movement_is_certified_and_costs_joules(demo: ProgramPlan) -> None
 
 
 def test_each_movement_starts_where_the_last_one_ended(demo: ProgramPlan, demo_cell: Cell) -> None:
-    ends = [movement.trajectory.positions[[0, -1]] for movement in demo.movements if movement.trajectory is not None]
+    ends = [
+        movement.trajectory.positions[[0, -1]]
+        for movement in demo.movements
+        if movement.trajectory is not None
+    ]
     assert np.array_equal(ends[0][0], demo_cell.machine_home)
     for before, after in pairwise(ends):
         assert np.array_equal(before[1], after[0])

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ir_description import cell_from_yaml, load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.budget import Budget
 from ir_planner.errors import CancelledError
 from ir_planner.regional import plan_regional
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
+
+from ir_description import cell_from_yaml, load_cell, load_power_data
 
 SceneOf = Callable[[str], PlanningScene]
 TASKS = [
@@ -27,7 +28,9 @@ TASKS = [
 
 
 def clearance_along(trajectory: Any, scene: PlanningScene, step: float = 5e-4) -> float:
-    return float(scene.collision.distances(trajectory.sample(np.arange(0.0, trajectory.duration, step)).q).min())
+    return float(
+        scene.collision.distances(trajectory.sample(np.arange(0.0, trajectory.duration, step)).q).min()
+    )
 
 
 @pytest.mark.parametrize(("cell", "task", "flip"), TASKS)
@@ -72,7 +75,9 @@ def test_the_same_request_gives_the_same_bytes_and_the_seed_is_echoed(
     def plan(seed: int) -> Any:
         budget = Budget(60_000, time.monotonic() + 60.0, time.monotonic)
         fresh = scene_with(scene.cell, scene.load_text, scene.power)
-        return plan_regional(np.array(task.start), np.array(task.goal), fresh, replace(options, seed=seed), budget)
+        return plan_regional(
+            np.array(task.start), np.array(task.goal), fresh, replace(options, seed=seed), budget
+        )
 
     first, second, other = plan(5), plan(5), plan(6)
     assert first.trajectory.trajectory_id == second.trajectory.trajectory_id
@@ -85,7 +90,12 @@ def test_the_same_request_gives_the_same_bytes_and_the_seed_is_echoed(
     [("start", StatusCode.START_STATE_IN_COLLISION), ("goal", StatusCode.GOAL_IN_COLLISION)],
 )
 def test_an_end_in_collision_is_named_with_pair_and_depth(
-    which: str, code: StatusCode, demo_scene: PlanningScene, degrees: Any, budget: Budget, options: PlanOptions
+    which: str,
+    code: StatusCode,
+    demo_scene: PlanningScene,
+    degrees: Any,
+    budget: Budget,
+    options: PlanOptions,
 ) -> None:
     home, inside = np.array(demo_scene.cell.machine_home), degrees(0, -20, 60, 0, 0, 0)
     ends = (inside, home) if which == "start" else (home, inside)
@@ -121,12 +131,14 @@ def test_where_no_way_leads_the_pair_the_place_and_what_was_tried_are_named(
     cell = cell_from_yaml(CAGE)
     scene = scene_with(cell, load_text(cell), load_power_data())
     budget = Budget(400, time.monotonic() + 60.0, time.monotonic)
-    plan = plan_regional(
-        degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0), scene, options, budget
-    )
+    plan = plan_regional(degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0), scene, options, budget)
     assert plan.status.code in (StatusCode.PLANNING_FAILED, StatusCode.GOAL_IN_COLLISION)
     blocked = plan_regional(
-        degrees(0, -90, 90, 0, 0, 0), degrees(0, -90, 90, 0, 0, 0) + degrees(5, 0, 0, 0, 0, 0), scene, options, budget
+        degrees(0, -90, 90, 0, 0, 0),
+        degrees(0, -90, 90, 0, 0, 0) + degrees(5, 0, 0, 0, 0, 0),
+        scene,
+        options,
+        budget,
     )
     assert blocked.status.ok
     message = plan.status.message

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ir_description import load_cell, load_power_data
 from ir_planner.errors import RequestError
 from ir_planner.scene import load_text, scene_with
 from ir_planner.settings import PauseSettings
 from ir_planner.standby import break_even, mode_watts, pause_energy, plan_standby
+
+from ir_description import load_cell, load_power_data
 
 CELL = load_cell("demo")
 POWER = load_power_data()
@@ -50,7 +51,9 @@ def test_times_default_to_those_of_the_controllers_data() -> None:
 def test_the_chosen_mode_is_the_cheapest_that_the_pause_has_time_for(pause: float) -> None:
     standby = plan_standby(pause, HOME, SCENE, TIMES)
     assert standby.energy == min(standby.energies)
-    assert standby.saving == pytest.approx(pause_energy("STAND_ON_MOTORS", pause, HOME, SCENE, TIMES) - standby.energy)
+    assert standby.saving == pytest.approx(
+        pause_energy("STAND_ON_MOTORS", pause, HOME, SCENE, TIMES) - standby.energy
+    )
     assert pause >= standby.chosen.time_min_pause
     assert standby.wake_at + standby.chosen.regular_time_to_operate == pytest.approx(pause)
 

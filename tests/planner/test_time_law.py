@@ -40,7 +40,9 @@ def test_the_reached_speed_fills_the_distance(speed: float, acceleration: float,
     reached = float(reached_speed(bounds)[0])
 
     def ramp(v: float) -> float:
-        return v / acceleration + acceleration / jerk if v * jerk >= acceleration**2 else 2 * np.sqrt(v / jerk)
+        return (
+            v / acceleration + acceleration / jerk if v * jerk >= acceleration**2 else 2 * np.sqrt(v / jerk)
+        )
 
     assert reached <= speed
     covered = reached * ramp(reached)

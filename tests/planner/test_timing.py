@@ -129,11 +129,14 @@ def test_asynchronous_joints_arrive_on_their_own(
 def test_corners_are_cut_within_the_limits_and_save_time(
     demo_scene: PlanningScene, degrees: Degrees, budget: Budget
 ) -> None:
-    path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(30, -95, 95, 0, 0, 0), degrees(60, -90, 90, 0, 0, 0)])
+    path = np.stack(
+        [degrees(0, -90, 90, 0, 0, 0), degrees(30, -95, 95, 0, 0, 0), degrees(60, -90, 90, 0, 0, 0)]
+    )
     options = PlanOptions(objective="time")
     movement = timed_movement(path, demo_scene, options, budget)
     laws = tuple(
-        StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),)) for a, b in zip(path, path[1:], strict=False)
+        StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),))
+        for a, b in zip(path, path[1:], strict=False)
     )
     stopping = blended(TimedPath(path, laws, (0,)), NAMES)
     assert movement.trajectory.duration < stopping.duration - 0.05
@@ -142,7 +145,10 @@ def test_corners_are_cut_within_the_limits_and_save_time(
 
 def test_a_blend_is_the_sum_of_its_laws() -> None:
     path = np.array([[0.0, 0.0], [1.0, 0.5], [0.5, 2.0]])
-    laws = (StepLaws((TimeLaw((20, 100, 20, 30, 20, 80, 20)),)), StepLaws((TimeLaw((30, 50, 30, 0, 30, 50, 30)),)))
+    laws = (
+        StepLaws((TimeLaw((20, 100, 20, 30, 20, 80, 20)),)),
+        StepLaws((TimeLaw((30, 50, 30, 0, 30, 50, 30)),)),
+    )
     timed = TimedPath(path, laws, largest_overlaps(laws))
     trajectory = blended(timed, ("a", "b"))
     t = np.arange(timed.total + 1)
@@ -169,7 +175,9 @@ def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene,
     movement = timed_movement(np.stack([home, home]), demo_scene, PlanOptions(), budget)
     assert movement.trajectory == standing(home, NAMES)
     assert movement.evaluation.report.certified
-    assert movement.evaluation.report.energy == pytest.approx(movement.evaluation.report.duration * 735.0, rel=0.01)
+    assert movement.evaluation.report.energy == pytest.approx(
+        movement.evaluation.report.duration * 735.0, rel=0.01
+    )
 
 
 def test_a_spline_through_points_keeps_its_limits(demo_scene: PlanningScene, degrees: Degrees) -> None:
