@@ -277,7 +277,7 @@ def test_a_cancelled_plan_stops_and_quick_services_answer_meanwhile(
         release.wait(30.0)
         return plan(*args)
 
-    planner_node.planner.plan_program = slow  # type: ignore[method-assign]
+    vars(planner_node.planner)["plan_program"] = slow
     sent = ros_executor.run(lambda: plan_action.send_goal_async(Plan.Goal()))
     wait_for(sent.done)
     wait_for(entered.is_set)

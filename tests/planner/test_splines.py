@@ -1,4 +1,4 @@
-"""Eq. (10): conditions at the ends, continuity at the joints, and the same curve from either way of solving."""
+"""Eq. (10): conditions at the ends, continuity, and the same curve from either way of solving."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Seven-phase laws: they close at 1 and at rest, keep their limits, and none is faster without breaking one."""
+"""Seven-phase laws: they close at 1 and at rest, keep their limits, and use the distance up."""
 
 from __future__ import annotations
 

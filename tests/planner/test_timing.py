@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -135,8 +136,7 @@ def test_corners_are_cut_within_the_limits_and_save_time(
     options = PlanOptions(objective="time")
     movement = timed_movement(path, demo_scene, options, budget)
     laws = tuple(
-        StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),))
-        for a, b in zip(path, path[1:], strict=False)
+        StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),)) for a, b in pairwise(path)
     )
     stopping = blended(TimedPath(path, laws, (0,)), NAMES)
     assert movement.trajectory.duration < stopping.duration - 0.05

@@ -21,6 +21,7 @@ from ir_description import load_cell, load_power_data
 Degrees = Callable[..., Any]
 NAMES = ("joint_a1", "joint_a2", "joint_a3", "joint_a4", "joint_a5", "joint_a6")
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+ROLLING = np.array([[0.0] * 6, [0.1] * 6])
 
 
 def moved(joint: int, angle_deg: float, seconds: float, **changes: Any) -> JointTrajectory:
@@ -39,8 +40,8 @@ def moved(joint: int, angle_deg: float, seconds: float, **changes: Any) -> Joint
         (moved(0, 20.0, 0.45), "acceleration", "joint_a1"),
         (moved(5, 20.0, 0.12), "jerk", "joint_a6"),
         (moved(0, 200.0, 60.0), "position", "[-185, 185] deg"),
-        (moved(0, 10.0, 5.0, velocities=np.array([[0.0] * 6, [0.1] * 6])), "velocity at rest", "ends with"),
-        (moved(0, 10.0, 5.0, accelerations=np.array([[0.1] * 6, [0.0] * 6])), "acceleration at rest", "starts with"),
+        (moved(0, 10.0, 5.0, velocities=ROLLING), "velocity at rest", "ends with"),
+        (moved(0, 10.0, 5.0, accelerations=ROLLING[::-1]), "acceleration at rest", "starts with"),
         (moved(1, 70.0, 5.0), "clearance", "must stay"),
     ],
 )  # fmt: skip
