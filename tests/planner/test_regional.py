@@ -119,8 +119,8 @@ equipment:
     pose: {xyz: [0, 0, 0]}
     zone: OPEN
     bodies:
-      - {name: left, kind: box, size: [8, 0.2, 8], xyz: [0, 1.0, 2]}
-      - {name: right, kind: box, size: [8, 0.2, 8], xyz: [0, -1.0, 2]}
+      - {name: left, kind: box, size: [8, 0.2, 8], xyz: [0, 0.65, 2]}
+      - {name: right, kind: box, size: [8, 0.2, 8], xyz: [0, -0.65, 2]}
 """
 
 
