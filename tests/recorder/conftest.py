@@ -302,7 +302,7 @@ def demo_run(rest: float = 0.4, move: float = 1.5) -> Run:
 def demo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A whole run, a few seconds long."""
     return demo_run().record(
-        tmp_path_factory.mktemp("recording") / "demo.mcap", facts={"hibernation": "shortened"}
+        tmp_path_factory.mktemp("recording") / "demo.mcap", facts={"hibernation_leave": "3 s"}
     )
 
 

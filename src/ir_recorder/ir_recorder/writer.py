@@ -114,7 +114,8 @@ class RecordingWriter:
                 os.fsync(self._file.fileno())
                 self._file.close()
             self._finished = True
-        return RecordingSummary(self.path, self._messages, (self._last - (self._first or self._last)) * 1e-9)
+        first = self._last if self._first is None else self._first
+        return RecordingSummary(self.path, self._messages, (self._last - first) * 1e-9)
 
     def _storage(self) -> _Storage:
         if self._failure is not None:

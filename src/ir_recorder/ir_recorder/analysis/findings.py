@@ -50,20 +50,15 @@ def findings(analysis: Analysis, tolerances: Tolerances | None = None) -> tuple[
     """All checks that the recording allows; a movement whose meter is missing fails."""
     bounds = tolerances or Tolerances()
     checks = [check for result in analysis.movements for check in _movement(result, bounds)]
-    checks += [
-        Finding(
-            f"step {r.step.index + 1} {r.step.label}",
-            0.0,
-            1.0,
-            0.0,
-            "",
-            False,
-            f"{r.step.outcome} {r.step.note}",
-        )
-        for r in analysis.steps
-        if r.step.outcome != "ended"
-    ]
-    return (*checks, *_table_2(analysis, bounds), *_grid(analysis))
+    return (*checks, *_unfinished(analysis), *_table_2(analysis, bounds), *_grid(analysis))
+
+
+def _unfinished(analysis: Analysis) -> Iterator[Finding]:
+    for result in analysis.steps:
+        step = result.step
+        if step.outcome != "ended":
+            note = f"{step.outcome} {step.note}".strip()
+            yield Finding(f"end of {step.index + 1} {step.label}", 0.0, 1.0, 0.0, "", False, note)
 
 
 def _movement(result: StepResult, bounds: Tolerances) -> Iterator[Finding]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator
 
+import numpy as np
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 
 from ir_recorder.analysis.steps import STARTED
-from ir_recorder.recording import Recording
+from ir_recorder.recording import PowerSeries, Recording
+
+STALE = 1.5  # s: how old the load in the diagnostics may be
+TOOL_STEP = 3.0  # W of base load: less than any tool that draws power
 
 
 class LoadTimeline:
@@ -39,15 +43,43 @@ class LoadTimeline:
 
 
 def load_timeline(recording: Recording) -> LoadTimeline:
-    """What the recording tells of the load."""
-    observations = [(event.time, normal(event.text)) for event in recording.loads]
+    """What the recording tells of the load.
+
+    While a program runs its steps say it, to the moment; before and after, the driver's diagnostics do,
+    once a second, and a step of the base load in between tells when a tool came or went.
+    """
+    steps = []
     for event in recording.events:
         load = normal(event.movement.load)
         if event.event == STARTED and event.movement.load:
-            observations.append((event.time, load))
+            steps.append((event.time, load))
         elif event.event == "ended" and event.movement.load:
-            observations.append((event.time, after(load, event.movement.attach, event.movement.detach)))
-    return LoadTimeline(tuple(observations))
+            steps.append((event.time, after(load, event.movement.attach, event.movement.detach)))
+    told = [(event.time, normal(event.text)) for event in recording.loads]
+    if steps:
+        first, last = steps[0][0], steps[-1][0] + STALE
+        told = [observation for observation in told if not first <= observation[0] <= last]
+    if recording.power is not None:
+        told = _sharpened(told, recording.power)
+    return LoadTimeline((*told, *steps))
+
+
+def _sharpened(told: list[tuple[float, str]], power: PowerSeries) -> list[tuple[float, str]]:
+    """Replaces what was told around a change by the readings before and after the step of the base load."""
+    jumps = np.flatnonzero((np.abs(np.diff(power.base_power)) > TOOL_STEP) & (np.diff(power.mode) == 0))
+    result: list[tuple[float, str]] = []
+    for time, load in told:
+        if result and result[-1][1] != load:
+            start = result[-1][0] - STALE
+            own = [k for k in jumps if start < power.time[k] and power.time[k + 1] <= time]
+            if own:
+                before, behind = float(power.time[own[0]]), float(power.time[own[-1] + 1])
+                old = result[-1][1]
+                while result and result[-1][0] > before and result[-1][1] == old:
+                    result.pop()
+                result += [(before, old), (behind, load)]
+        result.append((time, load))
+    return result
 
 
 def normal(load: str) -> str:

@@ -1,0 +1,189 @@
+"""Recordings are what rosbag2, Foxglove and plain MCAP readers expect."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from ir_recorder.definition import definitions_of
+from ir_recorder.errors import PathError, SchemaError, WriteError
+from ir_recorder.qos import QosOffer, offers_from_yaml, offers_to_yaml, request_for
+from ir_recorder.raw import read_raw
+from ir_recorder.schemas import SchemaLibrary
+from ir_recorder.session import CellFiles, RecordingSession
+from ir_recorder.topics import TopicSelection, single_type
+from ir_recorder.writer import RecordingWriter
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rclpy.serialization import serialize_message
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import JointState
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+
+
+def test_mcap_ros2_support_reads_every_message_back(demo_file: Path) -> None:
+    with demo_file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        statistics = reader.get_summary().statistics
+        decoded = sum(1 for _ in reader.iter_decoded_messages())
+    assert decoded == statistics.message_count > 1000
+
+
+def test_rosbags_reads_every_message_back(demo_file: Path) -> None:
+    with AnyReader([demo_file]) as reader:
+        topics = {connection.topic for connection in reader.connections}
+        count = sum(reader.deserialize(raw, c.msgtype) is not None for c, _, raw in reader.messages())
+        assert count == reader.message_count
+    assert {"/joint_states", "/ir_sim_driver/power_state", "/ir_program_runner/program_state"} <= topics
+
+
+def test_chunks_messages_and_attachments_are_indexed(demo_file: Path) -> None:
+    with demo_file.open("rb") as stream:
+        reader = make_reader(stream)
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+    assert len(summary.chunk_indexes) > 1
+    assert all(index.message_index_offsets for index in summary.chunk_indexes)
+    assert {index.name for index in summary.attachment_indexes} == {"cell.yaml", "robot.urdf"}
+    assert sum(summary.statistics.channel_message_counts.values()) == summary.statistics.message_count
+
+
+def test_channels_carry_what_rosbag2_wants(demo_file: Path) -> None:
+    with demo_file.open("rb") as stream:
+        channels = make_reader(stream).get_summary().channels.values()
+    for channel in channels:
+        assert channel.message_encoding == "cdr"
+        assert channel.metadata["topic_type_hash"].startswith("RIHS01_")
+        (profile,) = yaml.safe_load(channel.metadata["offered_qos_profiles"])
+        assert profile["reliability"] == "reliable"
+        assert profile["deadline"] == {"sec": 9223372036, "nsec": 854775807}
+    latched = next(c for c in channels if c.topic == "/ir_program_runner/program_state")
+    assert "durability: transient_local" in latched.metadata["offered_qos_profiles"]
+
+
+def test_a_schema_holds_all_types_a_message_is_built_from() -> None:
+    schema = SchemaLibrary().schema("ir_msgs/msg/ProgramState")
+    definitions = definitions_of(schema.name, schema.text)
+    used = {f.type for fields in definitions.values() for f in fields if not f.primitive}
+    assert used <= set(definitions)
+    assert "trajectory_msgs/JointTrajectoryPoint" in used
+
+
+@pytest.mark.parametrize(
+    "name", ["nothing_msgs/msg/Nothing", "ir_msgs/action/Plan_FeedbackMessage", "JointState"]
+)
+def test_types_that_cannot_be_recorded_are_named(name: str) -> None:
+    with pytest.raises(SchemaError, match=r"no definition|not a message type"):
+        SchemaLibrary().schema(name)
+
+
+def test_cdr_bytes_are_kept_as_they_came(tmp_path: Path) -> None:
+    data = serialize_message(JointState(name=["joint_a1"], position=[0.5]))
+    writer = RecordingWriter(tmp_path / "a.mcap")
+    channel = writer.register("/joint_states", JOINT_STATE)
+    for k in range(3):
+        writer.write(channel, 1_000_000_000 * k, data)
+    summary = writer.finish()
+    assert (summary.messages, summary.seconds) == (3, 2.0)
+    assert read_raw(summary.path).channel("/joint_states").messages == (data,) * 3
+
+
+def test_an_existing_file_is_kept_unless_told_otherwise(tmp_path: Path) -> None:
+    path = tmp_path / "mine.mcap"
+    path.write_text("mine")
+    with pytest.raises(PathError, match="is there already"):
+        RecordingWriter(path)
+    assert path.read_text() == "mine"
+    RecordingWriter(path, overwrite=True).finish()
+    assert path.read_bytes()[:5] == b"\x89MCAP"
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("", "empty"),
+        ("a\nb.mcap", "control characters"),
+        ("a\0b.mcap", "control characters"),
+        ("x" * 10_000 + ".mcap", "10005 bytes, at most 200"),
+        ("notes.txt", "must end in .mcap"),
+        ("/proc/recording.mcap", "can't be written"),
+    ],
+)
+def test_paths_that_cannot_become_recordings_are_refused(name: str, sentence: str) -> None:
+    with pytest.raises(PathError, match=sentence):
+        RecordingWriter(name)
+
+
+def test_a_full_disk_is_a_sentence_and_stays_one(tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    path.symlink_to("/dev/full")
+    with pytest.raises(WriteError, match=r"full\.mcap: No space left on device after 0 messages"):
+        RecordingWriter(path, overwrite=True)
+
+
+def test_a_writer_that_failed_refuses_further_messages(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.mcap")
+    channel = writer.register("/joint_states", JOINT_STATE)
+    writer.fail(OSError(28, "No space left on device"))
+    with pytest.raises(WriteError, match="No space left"):
+        writer.write(channel, 0, b"\0\1\0\0")
+    with pytest.raises(WriteError, match="No space left"):
+        writer.finish()
+
+
+def test_finishing_twice_changes_nothing(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.mcap")
+    first = writer.finish()
+    size = first.path.stat().st_size
+    assert writer.finish() == first
+    assert first.path.stat().st_size == size
+
+
+def test_facts_and_cell_are_in_the_file(tmp_path: Path) -> None:
+    session = RecordingSession(RecordingWriter(tmp_path / "a.mcap"), {"shift": "night"}, 5)
+    session.attach_cell(CellFiles("name: here", "<robot/>"), 6)
+    session.attach_cell(CellFiles("name: other", ""), 7)
+    raw = read_raw(session.finish().path)
+    assert raw.fact("shift") == "night"
+    assert raw.fact("started_ns") == "5"
+    assert raw.attachment("cell.yaml") == b"name: here"
+
+
+def test_offered_qualities_survive_the_file_in_names_and_numbers() -> None:
+    offers = (QosOffer(reliable=False, depth=7), QosOffer(transient_local=True))
+    assert offers_from_yaml(offers_to_yaml(offers)) == offers
+    old = "- {history: 1, depth: 3, reliability: 2, durability: 1}"
+    assert offers_from_yaml(old) == (QosOffer(reliable=False, transient_local=True, depth=3),)
+    assert offers_from_yaml("not: [a list") == ()
+
+
+def test_a_request_meets_all_offers() -> None:
+    mixed = request_for([QosOffer(transient_local=True), QosOffer(reliable=False)])
+    assert not mixed.reliable
+    assert not mixed.transient_local
+    assert request_for([QosOffer(transient_local=True)]).transient_local
+    assert request_for([]).reliable
+
+
+def test_the_cells_topics_are_chosen_and_strangers_are_not() -> None:
+    cell = TopicSelection()
+    for topic in ("/joint_states", "/robot_description", "/rosout", "/diagnostics", "/ir_planner/markers"):
+        assert topic in cell
+    assert "/ir_sim_driver/execute_trajectory/_action/status" in cell
+    for topic in ("/camera/image", "/ir_planner_2/markers", "/ir_sim_driver/x/_action/feedback", "/_hidden"):
+        assert topic not in cell
+
+
+def test_a_namespace_moves_the_selection() -> None:
+    cell = TopicSelection(namespace="/cell_1")
+    assert "/cell_1/joint_states" in cell
+    assert "/joint_states" not in cell
+    assert "/diagnostics" in cell
+    assert "/cell_1/other" in TopicSelection(("other",), "/cell_1")
+
+
+def test_topics_of_several_types_are_passed_over() -> None:
+    assert single_type("/a", ["std_msgs/msg/String"]) == "std_msgs/msg/String"
+    assert single_type("/a", ["std_msgs/msg/String", "std_msgs/msg/Bool"]) is None
