@@ -1,0 +1,24 @@
+"""The Python of docs/recording.md runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from ir_msgs_py.settings import describe
+from ir_recorder.settings import RecorderSettings
+
+PAGE = (Path(__file__).parents[2] / "docs" / "recording.md").read_text(encoding="utf-8")
+SNIPPETS = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+
+
+@pytest.mark.parametrize("code", SNIPPETS, ids=["with the package", "without it"])
+def test_snippets_run(code: str, demo_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(code.replace("out/demo.mcap", str(demo_file)), "recording.md", "exec"), {})
+    assert capsys.readouterr().out
+
+
+def test_every_parameter_is_in_the_table() -> None:
+    for setting in describe(RecorderSettings):
+        assert f"| `{setting.name}` |" in PAGE
