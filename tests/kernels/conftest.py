@@ -1,0 +1,19 @@
+"""The kernels' tests share literals (robots.py, geometry_cases.py) and run on every build that is installed."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ir_kernels import compiled
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+
+@pytest.fixture(params=["native", "baseline", "reference"])
+def core(request: pytest.FixtureRequest) -> Any:
+    """The compiled module, None for the NumPy reference."""
+    try:
+        return compiled.load(request.param)[1]
+    except ImportError as error:  # a machine without a compiler, or not the one that built `native`
+        pytest.skip(str(error))
