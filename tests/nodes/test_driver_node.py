@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 import numpy as np
 import pytest
 from ir_msgs.action import ExecuteTrajectory
@@ -10,10 +12,13 @@ from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, Sta
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.modbus_map import COILS
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.wake_on_lan import magic_packet
+from pymodbus.client import ModbusTcpClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from ir_description import load_cell
@@ -129,8 +134,6 @@ def test_bus_power_off_by_bits_and_back(make_driver, cell_client, listen, wait_f
 
 
 def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wait_for, ros_node):
-    import socket
-
     driver = make_driver()
     states = listen(names.JOINT_STATES, JointState)
     power = listen(names.POWER_STATE, PowerState)
@@ -203,3 +206,23 @@ def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_cli
     wait_for(lambda: cell_client.call(names.RECOVER, Recover.Request()).status.code == 1)
     wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
     assert np.allclose(states[-1].position, stopped, atol=1e-9)
+
+
+def test_a_plc_reaches_the_node_by_modbus(make_driver, listen, wait_for):
+    driver = make_driver(modbus=True, modbus_port=0)
+    power = listen(names.POWER_STATE, PowerState)
+    with ModbusTcpClient("127.0.0.1", port=driver.modbus_port) as plc:
+        plc.write_coil(COILS.index("ab"), True)
+        wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF, timeout=20.0)
+        assert plc.read_input_registers(0, count=1).registers == [PowerMode.BUS_POWER_OFF]
+
+
+def test_faster_than_real_time_the_driver_is_the_clock(make_driver, listen, wait_for):
+    make_driver(real_time_factor=4.0)
+    clock = listen("/clock", Clock)
+    states = listen(names.JOINT_STATES, JointState)
+    wait_for(lambda: len(clock) > 200 and len(states) > 200, timeout=20.0)
+    stamps = np.array([stamp_ns(msg) for msg in states])
+    assert (np.diff(stamps) == 2_000_000).all()
+    ticks = {msg.clock.sec * 1_000_000_000 + msg.clock.nanosec for msg in clock}
+    assert len(ticks & set(stamps.tolist())) > 100

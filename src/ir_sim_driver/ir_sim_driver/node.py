@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -48,12 +48,16 @@ from ir_sim_driver.messages import (
     goal_from_trajectory,
 )
 from ir_sim_driver.notices import Level
-from ir_sim_driver.parameters import DriverParameters
+from ir_sim_driver.parameters import DriverParameters, NodeSettings
+from ir_sim_driver.plc_link import PlcLink
 from ir_sim_driver.real_time import GridThread, ScaledClock
 from ir_sim_driver.services import Services
 from ir_sim_driver.shapes import Shape, shapes_of
 from ir_sim_driver.simulation import Simulation
 from ir_sim_driver.wake_on_lan import WakeListener
+
+if TYPE_CHECKING:
+    from ir_sim_driver.modbus import ModbusServer
 
 _NS = 1_000_000_000
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -84,6 +88,7 @@ class SimDriver(Node):
         self._open_topics()
         self._open_requests()
         self._listener = self._listen(options.wake_host, options.wake_port, options.mac)
+        self._modbus = self._serve_modbus(options) if options.modbus else None
         own_time = options.real_time_factor != 1.0
         clock = self.get_clock()
         start = clock.now().nanoseconds
@@ -105,11 +110,18 @@ class SimDriver(Node):
         """UDP port that Wake-on-LAN packets are heard on; 0 when the listener could not open it."""
         return 0 if self._listener is None else self._listener.port
 
+    @property
+    def modbus_port(self) -> int:
+        """TCP port of the Modbus server; 0 without one."""
+        return 0 if self._modbus is None else self._modbus.port
+
     def destroy_node(self) -> None:
         """Stop the plant, then the rest."""
         self._plant.close()
         if self._listener is not None:
             self._listener.close()
+        if self._modbus is not None:
+            self._modbus.close()
         self._driver.close()
         self._action.destroy()
         super().destroy_node()
@@ -154,6 +166,16 @@ class SimDriver(Node):
             return WakeListener(host, port, mac, self._wake)
         except OSError as error:
             self.get_logger().warning(f"no Wake-on-LAN: UDP {host}:{port} can't be opened ({error})")
+            return None
+
+    def _serve_modbus(self, options: NodeSettings) -> ModbusServer | None:
+        try:
+            from ir_sim_driver.modbus import ModbusServer  # only where it is wanted: pymodbus may be missing
+
+            link = PlcLink(self._driver, options.modbus_watchdog)
+            return ModbusServer(options.modbus_host, options.modbus_port, link)
+        except (ImportError, OSError) as error:
+            self.get_logger().warning(f"no Modbus: {error}")
             return None
 
     # the plant's thread

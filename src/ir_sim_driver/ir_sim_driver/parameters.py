@@ -56,6 +56,23 @@ class NodeSettings:
         maximum=65535,
         read_only=True,
     )
+    modbus: bool = setting(False, "Whether a PLC can connect by Modbus TCP.", read_only=True)
+    modbus_host: str = setting("127.0.0.1", "Address of the Modbus server.", read_only=True)
+    modbus_port: int = setting(
+        5020,
+        "TCP port of the Modbus server; 0 takes a free one. The usual one is 502.",
+        minimum=0,
+        maximum=65535,
+        read_only=True,
+    )
+    modbus_watchdog: float = setting(
+        2.0,
+        "Without a heartbeat for this long the link to the PLC counts as lost, if it has ever sent one.",
+        unit="s",
+        minimum=0.1,
+        maximum=3600.0,
+        read_only=True,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)

@@ -33,6 +33,7 @@ from ir_sim_driver.power_modes import OFF_THE_NETWORK, PowerModes, Wish
 from ir_sim_driver.simulation_settings import SimulationSettings
 from ir_sim_driver.tool_point import ToolPoint
 from ir_sim_driver.trajectory_checks import check_goal, check_trajectory, checked_route
+from ir_sim_driver.watchdog import Watchdog
 
 METER_STEPS = 50
 _HOME = 0.01  # rad
@@ -82,6 +83,7 @@ class Simulation:
         self.steps = 0
         self.speed_scaling = 1.0
         self.fault = ""
+        self.watch = Watchdog()
         self._goals = 0
         self._outcomes: list[Outcome] = []
         self._goal_energy = 0.0
@@ -239,6 +241,9 @@ class Simulation:
         dt = self.settings.dt
         self.plc.step(dt, self.pauses.rest is not None)
         self._react_to_plc()
+        if self.watch.step(self.time):
+            self.notices.add(Level.WARN, f"{self.watch.lost}; stopped on the path until it is back")
+            self.abort(f"{self.watch.lost}; stopped on the path")
         self.modes.step(dt, self._wish())
         if self.modes.mode is not self._last_mode:
             self._mode_changed(self._last_mode, self.modes.mode)
@@ -349,6 +354,8 @@ class Simulation:
         mode, plc = self.modes.mode, self.plc
         if self.fault:
             return f"the simulation has failed: {self.fault}"
+        if self.watch.lost:
+            return self.watch.lost
         if mode is Mode.EMERGENCY_STOP or plc.levels.emergency_stop:
             return "emergency stop: release it and recover first"
         if mode not in (*_READY, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES, Mode.FROM_BRAKES):

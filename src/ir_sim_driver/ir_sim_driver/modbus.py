@@ -1,0 +1,178 @@
+"""Modbus TCP server of the controller: a PLC sets its bits and reads the outputs.
+
+The server has a thread and an event loop of its own. What a request wants is asked of `Link`, which the plant
+implements; Modbus exceptions 01 to 03 come from the protocol, 04 says that the controller is off the network.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from typing import Any, Protocol
+
+from pymodbus import ModbusDeviceIdentification
+from pymodbus.constants import ExcCodes
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from ir_sim_driver.errors import DriverError
+from ir_sim_driver.modbus_map import (
+    COILS,
+    DISCRETE_INPUTS,
+    HEARTBEAT,
+    HOLDING_REGISTERS,
+    INPUT_REGISTERS,
+    OPERATING_MODE,
+    PAUSE,
+    Readout,
+)
+
+_READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT = 1, 2, 3, 4
+_WRITE_COILS, _WRITE_HOLDING = (5, 15), (6, 16)
+_BITS = 16  # coils live in registers of 16
+
+
+class Link(Protocol):
+    """What the PLC may do; each raises DriverError for what is refused."""
+
+    def readout(self) -> Readout | None:
+        """Present outputs; None while the controller is off the network."""
+
+    def coils(self) -> list[bool]:
+        """Levels of the coils as they are now, without the heartbeat."""
+
+    def write_coil(self, name: str, level: bool) -> None:
+        """Set the level of one coil."""
+
+    def operating_mode(self) -> int:
+        """Position of the mode switch."""
+
+    def write_operating_mode(self, mode: int) -> None:
+        """Turn the mode switch."""
+
+    def write_pause(self, seconds: int) -> None:
+        """Start a pause, or end it with 0."""
+
+    def heartbeat(self) -> None:
+        """The PLC is alive."""
+
+
+class ModbusServer:
+    """Serves `link` on host:port until it is closed. Raises OSError when the port can't be had."""
+
+    def __init__(self, host: str, port: int, link: Link) -> None:
+        self._link = link
+        self._address = (host, port)
+        self._ready = threading.Event()
+        self._failure: OSError | None = None
+        self._loop = asyncio.new_event_loop()
+        self._server: Any = None
+        self._pause = 0
+        self._thread = threading.Thread(target=self._run, name="modbus", daemon=True)
+        self._thread.start()
+        self._ready.wait()
+        if self._failure is not None:
+            self._thread.join()
+            raise self._failure
+
+    @property
+    def port(self) -> int:
+        """TCP port it listens on."""
+        return int(self._server.transport.sockets[0].getsockname()[1])
+
+    def close(self) -> None:
+        """Stop serving."""
+        if self._thread.is_alive():
+            asyncio.run_coroutine_threadsafe(self._server.shutdown(), self._loop).result(5.0)
+            self._thread.join(5.0)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._serve())
+        finally:
+            self._ready.set()
+            self._loop.close()
+
+    async def _serve(self) -> None:
+        identity = ModbusDeviceIdentification(info_name={"ProductName": "KR C4, simulated"})
+        self._server = ModbusTcpServer(self._device(), identity=identity, address=self._address)
+        try:
+            await self._server.serve_forever(background=True)
+        except RuntimeError as error:
+            host, port = self._address
+            self._failure = OSError(f"TCP {host}:{port} can't be opened ({error})")
+            return
+        self._ready.set()
+        await self._server.serving
+
+    def _device(self) -> SimDevice:
+        bits = [SimData(0, values=[False] * _BITS, datatype=DataType.BITS)]
+        return SimDevice(
+            id=0,
+            simdata=(
+                bits,
+                [SimData(0, values=[False] * _BITS, datatype=DataType.BITS)],
+                [SimData(0, values=[0] * HOLDING_REGISTERS, datatype=DataType.REGISTERS)],
+                [SimData(0, values=[0] * INPUT_REGISTERS, datatype=DataType.REGISTERS)],
+            ),
+            action=self._answer,
+        )
+
+    async def _answer(
+        self,
+        function: int,
+        start: int,
+        address: int,
+        count: int,
+        registers: list[int],
+        values: list[int] | list[bool] | None,
+    ) -> ExcCodes | None:
+        """Bring the registers up to date before they are read, or act on what is written."""
+        readout = self._link.readout()
+        if readout is None:
+            return ExcCodes.DEVICE_FAILURE
+        try:
+            if function in _WRITE_COILS:
+                return self._write_coils(address, values or [])
+            if function in _WRITE_HOLDING:
+                return self._write_holding(address, values or [])
+        except DriverError:
+            return ExcCodes.ILLEGAL_VALUE
+        if function == _READ_COILS:
+            registers[0] = _packed([*self._link.coils(), False])
+        elif function == _READ_DISCRETE:
+            registers[0] = _packed(readout.discrete_inputs())
+            if address >= len(DISCRETE_INPUTS):
+                return ExcCodes.ILLEGAL_ADDRESS
+        elif function == _READ_HOLDING:
+            registers[OPERATING_MODE] = self._link.operating_mode()
+            registers[PAUSE] = self._pause
+        elif function == _READ_INPUT:
+            registers[:] = readout.input_registers()
+        else:
+            return ExcCodes.ILLEGAL_FUNCTION
+        return None
+
+    def _write_coils(self, address: int, values: list[Any]) -> ExcCodes | None:
+        if address + len(values) > len(COILS):
+            return ExcCodes.ILLEGAL_ADDRESS
+        for k, level in enumerate(values, start=address):
+            if k == HEARTBEAT:
+                self._link.heartbeat()
+            else:
+                self._link.write_coil(COILS[k], bool(level))
+        return None
+
+    def _write_holding(self, address: int, values: list[Any]) -> ExcCodes | None:
+        for k, value in enumerate(values, start=address):
+            if k == OPERATING_MODE:
+                self._link.write_operating_mode(int(value))
+            else:
+                self._link.write_pause(int(value))
+                self._pause = int(value)
+        return None
+
+
+def _packed(levels: list[bool]) -> int:
+    return sum(1 << k for k, level in enumerate(levels) if level)

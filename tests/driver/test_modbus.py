@@ -1,0 +1,201 @@
+"""The PLC's side by Modbus TCP, over a real socket; the plant is ticked by the test."""
+
+from __future__ import annotations
+
+import socket
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ir_msgs_py.power import Mode
+from ir_sim_driver.driver import Driver
+from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.modbus import ModbusServer
+from ir_sim_driver.modbus_map import COILS, DISCRETE_INPUTS, HEARTBEAT, INPUT_REGISTERS, OPERATING_MODE, PAUSE
+from ir_sim_driver.plc_link import PlcLink
+from ir_sim_driver.simulation_settings import ControllerSettings
+from pymodbus.client import ModbusTcpClient
+
+PERIOD = 2_000_000
+WATCHDOG = 0.5
+
+
+@pytest.fixture
+def serve():
+    """A served simulation: serve(simulation) gives driver, client and port."""
+    opened = []
+
+    def serve_one(simulation):
+        driver = Driver(simulation)
+        server = ModbusServer("127.0.0.1", 0, PlcLink(driver, WATCHDOG))
+        client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=10)
+        assert client.connect()
+        opened.append((client, server, driver))
+        return driver, client, server.port
+
+    yield serve_one
+    for client, server, driver in opened:
+        client.close()
+        server.close()
+        driver.close()
+
+
+def run(driver, seconds):
+    for k in range(round(seconds / 0.002)):
+        driver.tick((k + 1) * PERIOD)
+
+
+def coil(name):
+    return COILS.index(name)
+
+
+def test_a_plc_switches_the_bus_off_and_on_and_reads_what_it_costs(make, serve):
+    driver, client, _ = serve(make())
+    client.write_coil(coil("ab"), True)
+    run(driver, 3.1)
+    registers = client.read_input_registers(0, count=INPUT_REGISTERS).registers
+    assert registers[0] == Mode.BUS_POWER_OFF
+    run(driver, 0.5)
+    registers = client.read_input_registers(0, count=INPUT_REGISTERS).registers
+    run(driver, 0.5)
+    registers = client.read_input_registers(0, count=INPUT_REGISTERS).registers
+    assert (registers[3] << 16) + registers[4] == 205  # W, Table II
+    assert client.read_discrete_inputs(0, count=6).bits[DISCRETE_INPUTS.index("ab")]
+    client.write_coil(coil("ab"), False)
+    run(driver, 22.0)
+    assert client.read_input_registers(0, count=1).registers[0] == Mode.STAND_ON_MOTORS
+    assert client.read_discrete_inputs(0, count=6).bits[DISCRETE_INPUTS.index("drives_ready")]
+
+
+def test_pause_and_operating_mode_are_registers(make, serve):
+    driver, client, _ = serve(make())
+    client.write_register(PAUSE, 30)
+    run(driver, 0.5)
+    assert client.read_input_registers(0, count=1).registers[0] == Mode.STAND_ON_BRAKES
+    client.write_register(PAUSE, 0)
+    run(driver, 2.0)
+    assert client.read_input_registers(0, count=1).registers[0] == Mode.STAND_ON_MOTORS
+    client.write_register(OPERATING_MODE, 1)
+    assert client.read_holding_registers(0, count=2).registers == [1, 0]
+    refused = client.write_register(OPERATING_MODE, 9)
+    assert (refused.isError(), refused.exception_code) == (True, 3)
+    refused = client.write_register(PAUSE, 60)  # not in T1
+    assert refused.exception_code == 3
+
+
+def test_coils_read_back_what_topic_or_service_have_set(make, serve):
+    driver, client, _ = serve(make())
+    with driver.locked() as simulation:
+        simulation.plc.set_bit("drives_off", True)
+    levels = client.read_coils(0, count=len(COILS)).bits[: len(COILS)]
+    assert [name for name, level in zip(COILS, levels, strict=True) if level] == ["drives_off", "move_enable"]
+
+
+@pytest.mark.parametrize(
+    ("request_", "code"),
+    [
+        (lambda c: c.read_coils(100, count=1), 2),
+        (lambda c: c.write_coil(len(COILS), True), 2),
+        (lambda c: c.write_coils(5, [True] * 10), 2),
+        (lambda c: c.read_input_registers(INPUT_REGISTERS, count=1), 2),
+        (lambda c: c.write_register(2, 1), 2),
+        (lambda c: c.read_discrete_inputs(40, count=4), 2),
+    ],
+)
+def test_addresses_that_aren_t_there_are_exception_02(make, serve, request_, code):
+    _, client, _ = serve(make())
+    answer = request_(client)
+    assert (answer.isError(), answer.exception_code) == (True, code)
+    assert not client.read_coils(0, count=9).isError()
+
+
+def exchange(port, pdu, length=None):
+    """Send a raw request and return the PDU of the answer, b"" when there is none."""
+    frame = struct.pack(">HHHB", 7, 0, (len(pdu) + 1) if length is None else length, 1) + pdu
+    with socket.create_connection(("127.0.0.1", port), timeout=2.0) as link:
+        link.sendall(frame)
+        link.settimeout(0.2)
+        try:
+            return link.recv(300)[7:]
+        except (TimeoutError, ConnectionError):
+            return b""
+
+
+def test_an_unknown_function_is_exception_01_and_a_bad_count_03(make, serve):
+    _, client, port = serve(make())
+    answer = exchange(port, bytes([0x63, 0, 0, 0, 1]))
+    assert answer[0] & 0x80  # pymodbus leaves the function's number out of it
+    assert answer[1] == 1
+    assert exchange(port, struct.pack(">BHH", 1, 0, 0)) == bytes([0x81, 3])
+    assert not client.read_coils(0, count=1).isError()
+
+
+def test_half_open_and_silent_sockets_disturb_nobody(make, serve):
+    _, client, port = serve(make())
+    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(20)]
+    idle[0].sendall(b"\x00\x07\x00")
+    assert not client.read_coils(0, count=1).isError()
+    for link in idle:
+        link.close()
+
+
+def test_while_hibernating_the_controller_does_not_answer_for_itself(make, serve):
+    _, client, _ = serve(make(controller=ControllerSettings(start_mode="HIBERNATION")))
+    assert client.read_input_registers(0, count=1).exception_code == 4
+    assert client.write_coil(coil("hib"), False).exception_code == 4
+
+
+def test_a_taken_port_is_an_error_with_its_number(make, serve):
+    driver, _, port = serve(make())
+    with pytest.raises(OSError, match=str(port)):
+        ModbusServer("127.0.0.1", port, PlcLink(driver, WATCHDOG))
+
+
+def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, plan, start, cell):
+    simulation = make()
+    driver, client, _ = serve(simulation)
+    home = np.array(cell.machine_home)
+    client.write_coil(HEARTBEAT, True)
+    with driver.locked():
+        start(simulation, plan(4.0, home, home + 0.3))
+    run(driver, 0.4)
+    client.write_coil(HEARTBEAT, False)
+    run(driver, 0.4)
+    assert simulation.executor.active
+    run(driver, 1.0)
+    assert not simulation.executor.active
+    assert simulation.modes.mode is Mode.STAND_ON_MOTORS  # the power mode stays
+    with pytest.raises(TrajectoryRefusedError, match="heartbeat"):
+        start(simulation, plan([1.5], home))
+    client.write_coil(HEARTBEAT, True)
+    start(simulation, plan([1.5], home))
+
+
+def test_a_plc_without_a_heartbeat_is_not_watched(make, serve):
+    simulation = make()
+    driver, client, _ = serve(simulation)
+    client.write_coil(coil("move_enable"), True)
+    run(driver, 3.0)
+    assert simulation.watch.lost == ""
+
+
+@pytest.fixture(scope="module")
+def endangered(make):
+    driver = Driver(make(load="none"))
+    server = ModbusServer("127.0.0.1", 0, PlcLink(driver, WATCHDOG))
+    yield driver, server.port
+    server.close()
+    driver.close()
+
+
+@settings(max_examples=60, deadline=None)
+@given(frames=st.lists(st.binary(min_size=0, max_size=40), min_size=1, max_size=4), framed=st.booleans())
+def test_no_bytes_bring_the_server_down(endangered, frames, framed):
+    driver, port = endangered
+    with socket.create_connection(("127.0.0.1", port), timeout=2.0) as link:
+        for body in frames:
+            link.sendall(struct.pack(">HHHB", 1, 0, len(body) + 1, 1) + body if framed else body)
+    run(driver, 0.01)
+    assert exchange(port, struct.pack(">BHH", 1, 0, 1))[0] in (0x01, 0x81)
