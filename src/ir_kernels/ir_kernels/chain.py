@@ -59,7 +59,7 @@ class Chain:
     def link_poses(self, q: ArrayLike) -> FloatArray:
         """(N, n + 1, 4, 4): poses of the links 0..n in the world at q (N, n)."""
         q = self.checked(q)
-        if not hasattr(compiled.MODULE, "link_poses"):
+        if compiled.MODULE is None:
             return reference.link_poses(self.joint_origin, self.joint_axis, self.base_pose, q)
         poses: FloatArray = compiled.MODULE.link_poses(self.joint_origin, self.joint_axis, self.base_pose, q)
         return poses
@@ -74,7 +74,7 @@ class Chain:
         (N, n).
         """
         q = self.checked(q)
-        if not hasattr(compiled.MODULE, "link_poses"):
+        if compiled.MODULE is None:
             return reference.jacobian(self.joint_axis, self.link_poses(q), self.tcp)
         result: FloatArray = compiled.MODULE.jacobian(
             self.joint_origin, self.joint_axis, self.base_pose, self.tcp, q

@@ -178,7 +178,7 @@ class CollisionModel:
 
 def _core(geometry: Geometry) -> Any:
     """The compiled model, or the one in NumPy."""
-    if not hasattr(compiled.MODULE, "Model"):
+    if compiled.MODULE is None:
         return Model(geometry)
     chain, capsules, scene = geometry.chain, geometry.capsules, geometry.scene
     return compiled.MODULE.Model(
