@@ -80,6 +80,12 @@ class NodeProcesses:
                 last = self._log(name).read_text(errors="replace").splitlines()[-12:]
                 raise ProcessError(f"{name} ended with exit code {code}:\n  " + "\n  ".join(last))
 
+    def end(self) -> None:
+        """Stop all nodes; raise ProcessError when one of them did not end well."""
+        bad = [f"{name} ended with exit code {code}" for name, code in self.stop().items() if code != 0]
+        if bad:
+            raise ProcessError(f"{'; '.join(bad)}; their output is in {self._log_folder}")
+
     def stop(self) -> dict[str, int]:
         """Interrupt all nodes, wait for them, kill what does not end; return the exit codes."""
         for process in self._running.values():

@@ -57,15 +57,17 @@ class Demonstration:
         progress = self._progress
         progress.say(f"Demonstration of cell {self._cell.name}: real nodes over DDS, real time")
         nodes = NodeProcesses(self._out / "log", {})
-        facts = [f"{name}={seconds:g} s" for name, seconds in TRANSITIONS.items()]
+        facts = ["shortened=pauses and the transitions of the power modes; the clock is not scaled"]
+        facts += [f"{name}={seconds:g} s" for name, seconds in TRANSITIONS.items()]
+        transitions = {f"transitions.{name}": seconds for name, seconds in TRANSITIONS.items()}
         facts.append(f"longest pause={LONGEST_PAUSE:g} s")
         with nodes, Client(timeout=START_SECONDS, node_name="ir_demo") as client:
             progress.begin("start planner, driver, runner, recorder")
             nodes.start(
                 cell_nodes(
                     str(cell_file.resolve()),
-                    planner={f"pauses.{name}": seconds for name, seconds in TRANSITIONS.items()},
-                    driver={f"transitions.{name}": seconds for name, seconds in TRANSITIONS.items()},
+                    planner=transitions,
+                    driver=transitions,
                     recorder={"facts": facts},
                 )
             )
@@ -77,6 +79,7 @@ class Demonstration:
             self._drive(client, plan)
             nodes.check()
             client.ask("/" + names.STOP_RECORDING, StopRecording.Request())
+            nodes.end()
         progress.begin("read the recording, write report and picture")
         outcome = examine(recording, self._out / "report.html", self._out / "demo.png", len(self._loads))
         progress.end(f"{self._out / 'report.html'}, {self._out / 'demo.png'}")

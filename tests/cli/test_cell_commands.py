@@ -1,0 +1,39 @@
+"""`ir cell`: what is wrong with a cell file is said in one sentence, with the line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ir_cli.main import main
+
+from ir_description import bundled_cells, cell_to_yaml, load_cell
+
+
+@pytest.mark.parametrize("name", bundled_cells())
+def test_a_bundled_cell_passes_the_check(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["cell", "check", name]) == 0
+    assert capsys.readouterr().out.startswith(f"cell {name}: robot kr210_r2700_extra")
+
+
+def test_a_broken_cell_file_is_refused_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = cell_to_yaml(load_cell("demo"))
+    line = next(k for k, row in enumerate(text.splitlines(), 1) if row.startswith("robot:"))
+    path = tmp_path / "broken.yaml"
+    path.write_text(text.replace("robot: kr210_r2700_extra", "robot: kr211"))
+    assert main(["cell", "check", str(path)]) == 1
+    error = capsys.readouterr().err
+    assert f"broken.yaml:{line}:" in error
+    assert "kr210_r2700_extra" in error
+
+
+def test_an_unknown_cell_lists_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["cell", "check", "nowhere"]) == 1
+    assert "deep_box" in capsys.readouterr().err
+
+
+def test_list_prints_every_bundled_cell(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["cell", "list"]) == 0
+    assert set(capsys.readouterr().out.split()) == set(bundled_cells())

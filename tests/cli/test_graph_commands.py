@@ -1,0 +1,71 @@
+"""`ir call`, `ir echo` and `ir list` against a real node, in the syntax of ros2cli."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from ir_cli.main import main
+from ir_msgs.msg import Signal
+from ir_msgs.srv import SetPlcInput
+from ir_msgs_py.ros.background import BackgroundExecutor
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+SERVICE = "/machine/set"
+TOPIC = "/machine/signal"
+
+
+@pytest.fixture
+def machine(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
+    """A node with a service that says yes to "ab" and a latched topic, in the domain of the commands."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
+    node = Node("machine", context=ros_context)
+
+    def answer(request: SetPlcInput.Request, response: SetPlcInput.Response) -> SetPlcInput.Response:
+        known = request.name == "ab"
+        response.status.code = 1 if known else -19
+        response.status.message = "" if known else f"input {request.name} is unknown: known are ab"
+        response.inputs.ab = request.value
+        return response
+
+    node.create_service(SetPlcInput, SERVICE, answer)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_publisher(Signal, TOPIC, latched).publish(Signal(name="door_open", value=True))
+    with BackgroundExecutor(ros_context) as executor:
+        executor.add_node(node)
+        yield node
+
+
+@pytest.mark.parametrize("typed", [[], ["ir_msgs/srv/SetPlcInput"]])
+def test_call_prints_the_response_with_or_without_the_type(
+    machine: Node, typed: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["call", SERVICE, *typed, "{name: ab, value: true}"]) == 0
+    assert "  ab: true" in capsys.readouterr().out
+
+
+def test_call_ends_with_1_when_the_status_is_no_success(
+    machine: Node, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["call", SERVICE, "{name: door}"]) == 1
+    assert "input door is unknown" in capsys.readouterr().out
+
+
+def test_call_refuses_an_unknown_field_and_lists_the_known_ones(
+    machine: Node, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["call", SERVICE, "{bit: ab}"]) == 1
+    assert 'unknown field "bit": known are name, value' in capsys.readouterr().err
+
+
+def test_echo_prints_the_latched_message(machine: Node, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["echo", TOPIC, "--once"]) == 0
+    output = capsys.readouterr().out
+    assert "name: door_open\nvalue: true\n---" in output
+
+
+def test_list_shows_names_with_types(machine: Node, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "topics"]) == 0
+    assert f"{TOPIC} [ir_msgs/msg/Signal]\n" in capsys.readouterr().out

@@ -1,0 +1,80 @@
+"""What the README tells people to type works, in the order in which it stands there."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+IR = [sys.executable, "-m", "ir_cli.main"]
+START = ".venv/bin/ir up &"
+READY = "Ctrl-C ends them"
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def commands() -> list[str]:
+    """Lines of the shell blocks without comments."""
+    lines = [line.split(" #")[0].strip() for block in blocks("bash") for line in block.splitlines()]
+    return [line for line in lines if line]
+
+
+@pytest.fixture(scope="module")
+def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """`ir up`, as the README starts it."""
+    logs = tmp_path_factory.mktemp("log")
+    process = subprocess.Popen([*IR, "up", "--logs", str(logs)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert READY in process.stdout.readline()
+    yield
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(30) == 130
+
+
+def shell(line: str) -> subprocess.CompletedProcess[str]:
+    assert line.startswith(".venv/bin/ir ")
+    command = subprocess.list2cmdline(IR) + line.removeprefix(".venv/bin/ir")
+    return subprocess.run(
+        command, shell=True, capture_output=True, text=True, timeout=120, env=dict(os.environ), check=False
+    )
+
+
+def test_the_readme_names_the_two_commands_and_starts_the_nodes_first() -> None:
+    assert "make demo" in README
+    assert "make test" in README
+    assert commands()[0] == START
+    assert len(commands()) >= 10
+
+
+@pytest.mark.usefixtures("nodes")
+def test_every_line_of_the_readme_runs() -> None:
+    service_calls, plc = blocks("bash")[:2]
+    for line in commands()[1 : len(service_calls.splitlines())]:
+        done = shell(line)
+        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+    for script in [blocks("python")[0], (ROOT / "examples" / "plan_and_drive.py").read_text()]:
+        ran = subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False
+        )
+        assert ran.returncode == 0, ran.stdout + ran.stderr
+        assert "proved" in ran.stdout
+    for line in plc.splitlines():
+        done = shell(line)
+        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+
+
+def test_links_lead_somewhere() -> None:
+    targets = re.findall(r"\]\((?!http)([^)#]+)", README)
+    assert len(targets) > 10
+    missing = [target for target in targets if not (ROOT / target).exists()]
+    assert not missing
