@@ -66,6 +66,20 @@ def test_trees_find_the_way_out_where_detours_do_not(
     assert clearance_along(plan.trajectory, scene) > 0.02 - PROOF_TOLERANCE
 
 
+def test_a_tunnel_is_left_the_way_the_tool_points(
+    scene_of: SceneOf, budget: Budget, options: PlanOptions
+) -> None:
+    scene = scene_of("deep_box")
+    asked = scene.cell.task("tun->bin")
+    plan = plan_regional(np.array(asked.start), np.array(asked.goal), scene, options, budget)
+    assert plan.status.ok, plan.status.message
+    assert plan.info.planner_id == "retreat"
+    assert [stage.name for stage in plan.info.stages] == ["direct", "detours", "retreat"]
+    assert plan.report.certified
+    assert plan.trajectory is not None
+    assert clearance_along(plan.trajectory, scene) > 0.02 - PROOF_TOLERANCE
+
+
 def test_the_same_request_gives_the_same_bytes_and_the_seed_is_echoed(
     scene_of: SceneOf, options: PlanOptions
 ) -> None:

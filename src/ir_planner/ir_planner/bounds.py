@@ -8,7 +8,7 @@ from ir_msgs_py.status import StatusCode
 
 from ir_planner.errors import RequestError
 
-PLANNERS = ("", "direct", "detours", "tree")
+PLANNERS = ("", "direct", "detours", "retreat", "tree")
 SAFETY_DISTANCE_MAX = 1.0  # m
 DURATION_MAX = 3600.0  # s
 TIME_VALUE_MAX = 1e6  # W

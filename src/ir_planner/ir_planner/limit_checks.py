@@ -101,8 +101,8 @@ def jump_violation(trajectory: JointTrajectory, joint_names: tuple[str, ...]) ->
         if len(beyond):
             k, j = (int(i) for i in beyond[0])
             sentence = (
-                f"{what} of {joint_names[j]} jumps by {jump[k, j]:.4g} {unit} at waypoint {k + 1}: it must be "
-                "continuous"
+                f"{what} of {joint_names[j]} jumps by {jump[k, j]:.4g} {unit} at waypoint {k + 1}: "
+                "it must be continuous"
             )
             return Violation(float(trajectory.times[k + 1]), k + 1, what, float(jump[k, j]), sentence)
     return None

@@ -72,7 +72,9 @@ def timed_movement(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
         fastest, note = _fastest(waypoints, scene, options, limits, budget, station)
+        budget.check()
         trajectory = stretched_to_wish(fastest, scene, options)
+        budget.check()
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
         if violation is None or violation.what != "torque":

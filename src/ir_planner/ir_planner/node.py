@@ -93,6 +93,7 @@ class PlannerNode(Node):
         once = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, once)
         self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+        self._cell_markers: list[Marker] = []
         self._quick = MutuallyExclusiveCallbackGroup()
         self._long = MutuallyExclusiveCallbackGroup()
         self._offer()
@@ -180,17 +181,19 @@ class PlannerNode(Node):
         self._show_cell()
 
     def _show_cell(self) -> None:
-        self._publish_shapes(cell_shapes(self.planner.cell), Marker.DELETEALL)
+        self._cell_markers = [_marker(shape, k) for k, shape in enumerate(cell_shapes(self.planner.cell))]
+        self._publish_markers(())
 
     def _show_movement(self, trajectory: JointTrajectory) -> None:
         self._trajectories.publish(trajectory_to_msg(trajectory))
-        shapes = (*cell_shapes(self.planner.cell), *movement_shapes(trajectory, self.planner.scene()))
-        self._publish_shapes(shapes, Marker.DELETEALL)
+        self._publish_markers(movement_shapes(trajectory, self.planner.scene()))
 
-    def _publish_shapes(self, shapes: Sequence[Shape], first: int) -> None:
-        array = MarkerArray(markers=[Marker(action=first)])
-        array.markers.extend(_marker(shape, k) for k, shape in enumerate(shapes))
-        self._markers.publish(array)
+    def _publish_markers(self, shapes: Sequence[Shape]) -> None:
+        """Everything in one message: a late listener gets the last one only."""
+        moving = [_marker(shape, k) for k, shape in enumerate(shapes)]
+        self._markers.publish(
+            MarkerArray(markers=[Marker(action=Marker.DELETEALL), *self._cell_markers, *moving])
+        )
 
     def _diagnose(self) -> None:
         cell = self.planner.cell.name if self.planner.has_cell else ""

@@ -6,7 +6,8 @@ decides among them. Nothing found is an answer too: which pair is in the way, wh
 was tried.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from ir_kernels.collision import FREE
@@ -26,10 +27,12 @@ from ir_planner.movement import TimedMovement, timed_movement
 from ir_planner.movement_cost import path_cost
 from ir_planner.objective import objective_value
 from ir_planner.polish import fewest_corners, pulled
+from ir_planner.retreat import retreating_paths
 from ir_planner.scene import PlanningScene
 from ir_planner.tree import connect
 
 FloatArray = NDArray[np.float64]
+Search = Callable[[FloatArray, FloatArray, FreeSpace, int], list[FloatArray]]
 _SCATTERED = 160
 _REFINED = 3  # ways round that are polished, timed and compared
 _DIFFERENT = 0.15  # rad: ways whose vias are nearer are one way
@@ -85,8 +88,13 @@ def search_regional(
     return _blocked_status(start, goal, space, options, journal), None
 
 
-def _searches(planner_id: str):  # type: ignore[no-untyped-def]
-    known = (("direct", direct), ("detours", detours), ("tree", tree))
+def _searches(planner_id: str) -> tuple[tuple[str, Search], ...]:
+    known: tuple[tuple[str, Search], ...] = (
+        ("direct", direct),
+        ("detours", detours),
+        ("retreat", retreat),
+        ("tree", tree),
+    )
     return tuple(entry for entry in known if planner_id in ("", entry[0]))
 
 
@@ -109,6 +117,13 @@ def detours(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) ->
     candidates = [np.clip(path, space.low, space.high) for path in candidates]
     free = space.paths_free(candidates)
     ways = [path for path, is_free in zip(candidates, free, strict=True) if is_free]
+    return _polished(_different(sorted(ways, key=lambda path: path_cost(weights, path))), space)
+
+
+def retreat(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
+    """Free ways that first draw the tool back: the cheapest few that are different, polished."""
+    weights = space.scene.weights
+    ways = retreating_paths(start, goal, space, np.random.default_rng(seed))
     return _polished(_different(sorted(ways, key=lambda path: path_cost(weights, path))), space)
 
 
@@ -217,8 +232,3 @@ def _blocked_status(
         f"{needed * 1e3:.1f} mm they must keep; "
         f"tried: {tried}; another start or goal configuration, or a smaller safety distance, may help",
     )
-
-
-def with_duration_free(options: PlanOptions) -> PlanOptions:
-    """The options without a wished duration, for the movements inside a program."""
-    return replace(options, duration=0.0)

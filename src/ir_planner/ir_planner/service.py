@@ -122,8 +122,10 @@ def timed_service(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
         fastest = time_spline(points, names, limits, scene.dynamics)
+        budget.check()
         factor = best_stretch(fastest, scene, options.objective, options.time_value)
         trajectory = stretched(fastest, factor)
+        budget.check()
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
         if violation is None:
