@@ -29,6 +29,8 @@ from ir_sim_driver.modbus_map import (
 
 _READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT = 1, 2, 3, 4
 _WRITE_COILS, _WRITE_HOLDING = (5, 15), (6, 16)
+_FUNCTIONS = (_READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT, *_WRITE_COILS, *_WRITE_HOLDING)
+_FUNCTION, _REFUSAL = 7, 0x80  # place of the function in a frame, mark of a refusal
 _BITS = 16  # coils live in registers of 16
 
 
@@ -96,7 +98,9 @@ class ModbusServer:
 
     async def _serve(self) -> None:
         identity = ModbusDeviceIdentification(info_name={"ProductName": "KR C4, simulated"})
-        self._server = ModbusTcpServer(self._device(), identity=identity, address=self._address)
+        self._server = ModbusTcpServer(
+            self._device(), identity=identity, address=self._address, trace_packet=_Mender().mend
+        )
         try:
             await self._server.serve_forever(background=True)
         except RuntimeError as error:
@@ -172,6 +176,26 @@ class ModbusServer:
                 self._link.write_pause(int(value))
                 self._pause = int(value)
         return None
+
+
+class _Mender:
+    """Names the function in refusals of requests that pymodbus could not read: it answers all with 80 01.
+
+    Such an answer is sent while its request is being received, so the last packet is the one that is meant.
+    """
+
+    def __init__(self) -> None:
+        self._function = 0
+
+    def mend(self, sending: bool, packet: bytes) -> bytes:
+        """Return the packet as it goes on."""
+        if not sending:
+            self._function = packet[_FUNCTION] if len(packet) > _FUNCTION else 0
+        elif len(packet) == _FUNCTION + 2 and packet[_FUNCTION] == _REFUSAL:
+            known = self._function in _FUNCTIONS
+            reason = ExcCodes.ILLEGAL_VALUE if known else ExcCodes.ILLEGAL_FUNCTION
+            return packet[:_FUNCTION] + bytes((_REFUSAL | self._function, reason))
+        return packet
 
 
 def _packed(levels: list[bool]) -> int:

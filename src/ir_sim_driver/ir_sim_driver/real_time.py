@@ -33,7 +33,7 @@ class GridThread:
     ) -> None:
         self._period, self._clock, self._tick = period_ns, clock, tick
         self._on_jump, self._on_failure = on_jump, on_failure
-        self._max_lag = int(max_lag * _NS)
+        self._max_lag = max_lag * _NS
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plant", daemon=True)
         self.worst_lag = 0.0
