@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ir_kernels.reference.interval import Dual, interval, power, sine_cosine
 from ir_kernels.reference.limits import derivative, evaluate
@@ -40,11 +40,14 @@ def sampled(model: DynamicsModel, c: Array, T: Array, count: int) -> Array:
     return worst
 
 
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])  # a module, the same for all examples
 @given(st.integers(0, 10**6), st.integers(0, 4), st.integers(1, 6))
-def test_nothing_between_the_samples_is_beyond_the_extremes(seed: int, order: int, terms: int) -> None:
+def test_nothing_between_the_samples_is_beyond_the_extremes(
+    core: Any, seed: int, order: int, terms: int
+) -> None:
     rng = np.random.default_rng(seed)
     c, T = rng.normal(size=(3, 2, terms)) * 10.0 ** rng.integers(-3, 3), rng.uniform(0.01, 5.0, 3)
-    extrema = polynomial_extrema(c, T, order)
+    extrema = polynomial_extrema(c, T, order, core=core)
     p = c
     for _ in range(order):
         p = derivative(p) if p.shape[2] > 1 else 0.0 * p
@@ -57,9 +60,9 @@ def test_nothing_between_the_samples_is_beyond_the_extremes(seed: int, order: in
     assert at_maximum == pytest.approx(extrema.maximum, abs=1e-10 * size)  # and they are taken
 
 
-def test_double_roots_of_the_derivative_are_found() -> None:
+def test_double_roots_of_the_derivative_are_found(core: Any) -> None:
     c = np.array([[[0.0, 1.0, -2.0, 4.0 / 3.0, 0.0, 0.0]]])  # derivative (1 - 2 t)^2
-    extrema = polynomial_extrema(c, np.array([1.0]), 1)
+    extrema = polynomial_extrema(c, np.array([1.0]), 1, core=core)
     assert extrema.minimum[0, 0] == pytest.approx(0.0, abs=1e-15)
     assert extrema.time_of_minimum[0, 0] == pytest.approx(0.5, abs=1e-7)
 

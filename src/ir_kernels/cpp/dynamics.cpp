@@ -6,6 +6,7 @@
 
 #include "bindings.hpp"
 #include "dynamics_bounds.hpp"
+#include "dynamics_extrema.hpp"
 #include "dynamics_kernels.hpp"
 
 namespace py = pybind11;
@@ -179,6 +180,21 @@ py::tuple dc_bus(const Array& power, const Array& dt, double capacity, const std
   return py::make_tuple(mains, burnt, level);
 }
 
+py::tuple polynomial_extrema(const Array& coefficients, const Array& durations) {
+  if (coefficients.ndim() != 3 || durations.ndim() != 1 || durations.shape(0) != coefficients.shape(0) ||
+      coefficients.shape(2) < 1 || coefficients.shape(2) > core::kMaxDegree + 1)
+    throw std::invalid_argument("coefficients have to be (S, n, 1..16) and durations (S,)");
+  const py::ssize_t S = coefficients.shape(0), n = coefficients.shape(1);
+  Array low({S, n}), high({S, n}), when_low({S, n}), when_high({S, n});
+  double *l = low.mutable_data(), *h = high.mutable_data(), *wl = when_low.mutable_data(), *wh = when_high.mutable_data();
+  {
+    py::gil_scoped_release released;
+    core::polynomial_extrema(coefficients.data(), durations.data(), S * n, static_cast<int>(n),
+                             static_cast<int>(coefficients.shape(2)), l, h, wl, wh);
+  }
+  return py::make_tuple(low, high, when_low, when_high);
+}
+
 }  // namespace
 
 void bind_dynamics(py::module_& m) {
@@ -196,4 +212,5 @@ void bind_dynamics(py::module_& m) {
       .def("torque_gradients", &Dynamics::torque_gradients)
       .def("torque_bounds", &Dynamics::torque_bounds);
   m.def("dc_bus", &dc_bus);
+  m.def("polynomial_extrema", &polynomial_extrema);
 }

@@ -3,14 +3,17 @@ well.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import data
+from ir_kernels import compiled, data
 from ir_kernels.arguments import Array, checked
 from ir_kernels.errors import InputError
 from ir_kernels.reference import limits as reference
+
+COMPILED_TERMS = 16  # of a polynomial, beyond them the reference works
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,9 @@ def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[Array, Arra
     return c, T
 
 
-def polynomial_extrema(coefficients: ArrayLike, durations: ArrayLike, derivative: int = 0) -> Extrema:
+def polynomial_extrema(
+    coefficients: ArrayLike, durations: ArrayLike, derivative: int = 0, *, core: Any = compiled.MODULE
+) -> Extrema:
     """Extremes of the `derivative`-th derivative of q(t) = sum_k c_k t^k, t in [0, duration], to rounding.
 
     coefficients (S,n,d+1), durations (S,) s. Raises InputError.
@@ -63,7 +68,10 @@ def polynomial_extrema(coefficients: ArrayLike, durations: ArrayLike, derivative
         raise InputError(f"derivative is {derivative}: it has to be 0 or more")
     for _ in range(derivative):
         c = reference.derivative(c) if c.shape[2] > 1 else 0.0 * c
-    result = reference.polynomial_extrema(c, T)
+    if core is None or not hasattr(core, "polynomial_extrema") or c.shape[2] > COMPILED_TERMS:
+        result = reference.polynomial_extrema(c, T)
+    else:
+        result = core.polynomial_extrema(c, T)
     return Extrema(*(data.read_only(array) for array in result))
 
 
