@@ -37,7 +37,7 @@ sanitize: setup   ## the compiled core under the address and undefined-behaviour
 
 bench: setup      ## every benchmark, its claims at the end; JSON in out/bench
 	@mkdir -p out/bench; for script in benchmarks/[!_]*.py; do \
-	  name=$$(basename "$$script" .py); echo "== $$name"; \
+	  [ -e "$$script" ] || continue; name=$$(basename "$$script" .py); echo "== $$name"; \
 	  $(BIN)/python "$$script" --json "out/bench/$$name.json" $(ARGS) || exit 1; \
 	done
 
