@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ir_planner.movement import timed_movement
 from ir_planner.reporting import evaluate_trajectory
 from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_planner.verification import verify
+from ir_planner.zones import polynomials_between
 
 from ir_description import load_cell, load_power_data
 
@@ -117,3 +119,37 @@ def test_a_report_of_one_point_is_a_state(demo_scene: PlanningScene) -> None:
     assert (report.duration, report.energy, report.path_length) == (0.0, 0.0, 0.0)
     assert report.certified
     assert report.min_clearance > 0.02
+
+
+def test_allowed_contacts_hold_only_while_the_tcp_is_in_the_zone(
+    planner: Any, demo_scene: PlanningScene
+) -> None:
+    """With a zone that ends below the pick, the fingers may not come near the blank at all."""
+    plan = planner.plan_program(("infeed_pick",), 0.0, PlanOptions(planning_time=60.0), HOME)
+    assert plan.status.ok, plan.status.message
+    entry = next(m.trajectory for m in plan.movements if m.kind == "service_entry")
+    assert verify(entry, demo_scene, 0.02, "infeed_pick").certified
+    assert not verify(entry, demo_scene, 0.02).certified
+    cell = demo_scene.cell
+    infeed = cell.machine("infeed")
+    low = replace(infeed.zone_in_equipment, size=np.array([0.8, 1.2, 0.2]))
+    machines = tuple(replace(m, zone_in_equipment=low) if m.name == "infeed" else m for m in cell.equipment)
+    shrunk = replace(demo_scene, cell=replace(cell, equipment=machines))
+    violation = verify(entry, shrunk, 0.02, "infeed_pick").violation
+    assert violation is not None
+    assert violation.what == "clearance"
+    assert "gear_lying" in violation.sentence
+
+
+def test_a_cut_trajectory_is_the_same_motion(demo_scene: PlanningScene, budget: Budget) -> None:
+    path = np.stack([HOME, HOME + np.radians([40, 10, -10, 0, 20, 0])])
+    trajectory = timed_movement(path, demo_scene, PlanOptions(safety_distance=0.0), budget).trajectory
+    begin, end = 0.21 * trajectory.duration, 0.77 * trajectory.duration
+    coefficients, durations = polynomials_between(trajectory, begin, end)
+    assert durations.sum() == pytest.approx(end - begin)
+    at = begin
+    for c, T in zip(coefficients, durations, strict=True):
+        t = np.linspace(0.0, T, 7)
+        q = (c[None] * t[:, None, None] ** np.arange(6)).sum(axis=2)
+        assert q == pytest.approx(trajectory.sample(at + t).q, abs=1e-9)
+        at += T

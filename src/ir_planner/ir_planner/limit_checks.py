@@ -31,6 +31,12 @@ class Violation:
     pair: DistancePair | None = None
 
 
+def segment_at(trajectory: JointTrajectory, time: float) -> int:
+    """Index of the segment at an instant [s], which is that of the waypoint before it."""
+    last = max(len(trajectory.times_ns) - 2, 0)
+    return int(np.clip(np.searchsorted(trajectory.times, time, side="right") - 1, 0, last))
+
+
 def position_violation(
     trajectory: JointTrajectory, largest: Extremes, scene: PlanningScene
 ) -> Violation | None:

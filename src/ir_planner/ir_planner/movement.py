@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ir_planner.asynchronous import own_laws
 from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, stretched
 from ir_planner.budget import Budget
+from ir_planner.clearance_checks import clearance_violation
 from ir_planner.errors import RequestError
 from ir_planner.limit_checks import Violation
 from ir_planner.objective import best_stretch
@@ -27,7 +28,6 @@ from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene
 from ir_planner.time_law import GRID_S, StepLaws
 from ir_planner.timing import STILL, MotionLimits, fastest_law, torque_per_segment
-from ir_planner.verification import clearance_violation
 
 FloatArray = NDArray[np.float64]
 _TORQUE_SHARES = (0.98, 0.95, 0.9, 0.8)

@@ -14,7 +14,7 @@ from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from numpy.typing import NDArray
 
-from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station
+from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station, Zone
 from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.movement_cost import movement_weights
@@ -122,6 +122,10 @@ class PlanningScene:
 
     def _contacts(self, station: str) -> tuple[AllowedContact, ...]:
         return self.station(station).allowed_contacts if station else ()
+
+    def zone_of(self, station: str) -> Zone:
+        """The forbidden zone of a station's machine, in the world."""
+        return self.cell.machine(self.station(station).equipment).zone
 
     def station(self, name: str) -> Station:
         """The station of that name; UnknownNameError lists the known."""

@@ -6,22 +6,22 @@ place, limit and excess.
 from dataclasses import dataclass
 
 import numpy as np
-from ir_kernels.collision import FREE
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
-from ir_planner.clearance import pair_value
+from ir_planner.clearance_checks import clearance_violation
 from ir_planner.limit_checks import (
     SLACK,
     Violation,
     jump_violation,
     position_violation,
     rest_violation,
+    segment_at,
     share_violation,
 )
 from ir_planner.polynomials import extremes
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.scene import PlanningScene
 from ir_planner.timing import torque_use
 
 FloatArray = NDArray[np.float64]
@@ -92,45 +92,10 @@ def _torque(trajectory: JointTrajectory, scene: PlanningScene) -> tuple[FloatArr
         return upper, None
     j = int(np.argmax(upper))
     time = float(trajectory.times[0]) + float(bounds.time[j])
-    k = _segment(trajectory, time)
+    k = segment_at(trajectory, time)
     sentence = (
         f"{scene.cell.robot.joint_names[j]} needs {bounds.sampled[j]:.3f} (at most {upper[j]:.3f}) times its "
         f"torque limit after waypoint {k} at {time:.3f} s: it must be at most 1 "
         f"(excess {100.0 * (upper[j] - 1.0):.1f} %)"
     )
     return upper, Violation(time, k, "torque", float(upper[j] - 1.0), sentence)
-
-
-def clearance_violation(
-    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
-) -> Violation | None:
-    """The first instant at which a pair is too near, or not proved to be far enough; None: proved."""
-    threshold = scene.thresholds(safety_distance, station) - PROOF_TOLERANCE
-    coefficients, durations = trajectory.coefficients()
-    if len(durations) == 0:
-        free = bool(scene.collision.is_free(trajectory.positions, threshold).all())
-        near = scene.collision.min_distance(trajectory.positions, threshold)
-        verdict, begin, end, z = (FREE if free else 1), 0.0, 0.0, int(near.pair[0])
-    else:
-        certificate = scene.collision.certify_trajectory(coefficients, durations, threshold)
-        verdict, (begin, end), z = certificate.verdict, certificate.interval, certificate.pair
-    if verdict == FREE:
-        return None
-    start = float(trajectory.times[0])
-    time = start + end
-    q = trajectory.sample([time]).q
-    pair = pair_value(scene, q[0], z, bool(scene.allowed(station)[z]))
-    allowed = float(threshold[z]) + PROOF_TOLERANCE
-    k = _segment(trajectory, time)
-    excess = allowed - pair.distance
-    sentence = (
-        f"{pair.body_a} and {pair.body_b} ({pair.kind}) come to {pair.distance * 1e3:.1f} mm "
-        f"after waypoint {k} at "
-        f"{time:.3f} s: they must stay {allowed * 1e3:.1f} mm apart (excess {excess * 1e3:.1f} mm)"
-    )
-    return Violation(start + begin, k, "clearance", excess, sentence, pair)
-
-
-def _segment(trajectory: JointTrajectory, time: float) -> int:
-    last = max(len(trajectory.times_ns) - 2, 0)
-    return int(np.clip(np.searchsorted(trajectory.times, time, side="right") - 1, 0, last))
