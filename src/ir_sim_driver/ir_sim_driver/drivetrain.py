@@ -7,6 +7,7 @@ One robot at a time and in plain floats where that is faster: this runs every mi
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from typing import Any
 
 import numpy as np
@@ -48,9 +49,9 @@ class Drivetrain:
                 )
             )
         )
-        self._speeds: Array = np.array(robot.envelope_speed)
-        self._torques: Array = np.array(robot.envelope_torque)
-        self._least: Array = self._torques[:, -1].copy()
+        self._speeds: list[list[float]] = np.array(robot.envelope_speed).tolist()
+        self._torques: list[list[float]] = np.array(robot.envelope_torque).tolist()
+        self._least: Array = np.array(robot.envelope_torque)[:, -1]
 
     def resistance(self, q: Array, qd: Array) -> Array:
         """Friction less counterbalance (n,) [Nm]: what the motor has to add to H qdd + h."""
@@ -74,19 +75,26 @@ class Drivetrain:
     def limited(self, torque: Array, qd: Array) -> tuple[Array, bool]:
         """Torque (n,) within the envelope at the speeds qd, and whether anything was cut off."""
         size = np.abs(torque)
-        if (size <= self._least).all():
+        critical = (size > self._least).nonzero()[0].tolist()
+        if not critical:
             return torque, False
-        limit = self.limit(qd)
-        if (size <= limit).all():
-            return torque, False
-        return np.clip(torque, -limit, limit), True
+        result = torque
+        for j in critical:
+            limit = self._limit_of(j, abs(float(qd[j])))
+            if size[j] > limit:
+                if result is torque:
+                    result = torque.copy()
+                result[j] = limit if torque[j] > 0.0 else -limit
+        return result, result is not torque
 
     def limit(self, qd: Array) -> Array:
         """Torque (n,) [Nm] available at the speeds |qd|."""
-        limits = np.empty(len(qd))
-        for j, speed in enumerate(np.abs(qd).tolist()):
-            if speed < self._speeds[j, 0]:
-                limits[j] = self._torques[j, 0]
-            else:
-                limits[j] = np.interp(speed, self._speeds[j], self._torques[j, 1:])
-        return limits
+        return np.array([self._limit_of(j, speed) for j, speed in enumerate(np.abs(qd).tolist())])
+
+    def _limit_of(self, j: int, speed: float) -> float:
+        speeds, torques = self._speeds[j], self._torques[j]
+        k = bisect_right(speeds, speed)
+        if k == 0 or k == len(speeds):
+            return torques[k]
+        share = (speed - speeds[k - 1]) / (speeds[k] - speeds[k - 1])
+        return torques[k] + share * (torques[k + 1] - torques[k])

@@ -212,8 +212,8 @@ class Executor:
     def supervise(self, robot: Backend) -> None:
         """Compare the robot with the command after the step: tube, tolerances, end."""
         q = robot.q
-        error = self.command - q
-        bound = self._tool.bound(error)
+        error = self._still if q is self.command else self.command - q
+        bound = 0.0 if q is self.command else self._tool.bound(error)
         self.deviation = bound if bound <= EXACT_FROM else self._tool.deviation(self.command, q)
         run = self._run
         if run is None:

@@ -65,7 +65,7 @@ class Plc:
         self._stuck: frozenset[str] = frozenset()
         self._uptime = 0.0
         self._greeted = False
-        self._judged: tuple[object, ...] = ()
+        self._judged: tuple[object, bool] = (None, False)
 
     def set_all(self, inputs: PlcInputs) -> None:
         """Take all levels at once, as the topic and the field bus do."""
@@ -96,16 +96,17 @@ class Plc:
         self.levels = replace(self.raw, ab=False, hib=False, ks=False)
         self.rest = None
 
-    def step(self, dt: float, pause_active: bool = False) -> None:
-        """Let dt [s] pass; pause_active: a PROFIenergy pause is on."""
+    def step(self, dt: float, pause_active: bool = False) -> bool:
+        """Let dt [s] pass; pause_active: a PROFIenergy pause is on. Returns whether anything is new."""
         self._uptime += dt
         self.drives_on = self.confirm = self.restart = False
         if self._ages:
             self._debounce(dt)
-        judged = (self.levels, pause_active)
-        if judged != self._judged:
-            self._judged = judged
-            self._judge(pause_active)
+        if self.levels is self._judged[0] and pause_active is self._judged[1]:
+            return False
+        self._judged = (self.levels, pause_active)
+        self._judge(pause_active)
+        return True
 
     def _set(self, bit: str, level: bool) -> None:
         if level == getattr(self.raw, bit):

@@ -172,6 +172,8 @@ class PowerModes:
         self.mode: Mode = start
         self.source: Mode = start
         self.elapsed = 0.0
+        self.motors_on = start is Mode.STAND_ON_MOTORS
+        self.level: Mode = start
         self._wake = False
 
     @property
@@ -189,21 +191,6 @@ class PowerModes:
         if rest is None:
             return 0.0
         return max(0.0, (rest.enter if self.mode is rest.entering else rest.leave) - self.elapsed)
-
-    @property
-    def motors_on(self) -> bool:
-        """Whether the motors follow commands."""
-        return self.mode in (Mode.STAND_ON_MOTORS, Mode.MOVING)
-
-    @property
-    def level(self) -> Mode:
-        """The rest, or STAND_ON_MOTORS, whose power the controller draws now (see docs/driver.md)."""
-        rest = self._by_transition.get(self.mode)
-        if rest is not None:
-            return self.source if self.mode is rest.entering else Mode.STAND_ON_MOTORS
-        if self.mode is Mode.EMERGENCY_STOP:
-            return Mode.STAND_ON_BRAKES
-        return Mode.STAND_ON_MOTORS if self.mode is Mode.MOVING else self.mode
 
     def time_to_ready(self) -> float:
         """Seconds until motors are on when everything else agrees and the rest is left at once."""
@@ -289,3 +276,13 @@ class PowerModes:
             self._wake = False
         self.mode = mode
         self.elapsed = 0.0
+        self.motors_on = mode in (Mode.STAND_ON_MOTORS, Mode.MOVING)
+        self.level = self._level_of(mode)
+
+    def _level_of(self, mode: Mode) -> Mode:
+        rest = self._by_transition.get(mode)
+        if rest is not None:
+            return self.source if mode is rest.entering else Mode.STAND_ON_MOTORS
+        if mode is Mode.EMERGENCY_STOP:
+            return Mode.STAND_ON_BRAKES
+        return Mode.STAND_ON_MOTORS if mode is Mode.MOVING else mode

@@ -73,7 +73,7 @@ class PyBulletBackend:
     @property
     def standing(self) -> bool:
         """Whether the robot stands."""
-        return bool(np.abs(self.qd).max() < STANDING)
+        return all(-STANDING < x < STANDING for x in self.qd.tolist())
 
     def reset(self, q: Array) -> None:
         """Stand still at q; starts the physics server again when it is gone."""
@@ -218,13 +218,14 @@ class PyBulletBackend:
         call(bullet.stepSimulation)
         states = call(bullet.getJointStates, self._body, self._joints)
         before = self._speed
-        q = np.array([state[0] for state in states])
-        speed = np.array([state[1] for state in states])
-        if not np.abs(speed).max() < SPEED_GUARD:  # NaN does not pass either
+        speeds = [state[1] for state in states]
+        if not all(-SPEED_GUARD < x < SPEED_GUARD for x in speeds):  # NaN does not pass either
             raise BackendError(f"the physics has diverged: a joint moves faster than {SPEED_GUARD:g} rad/s")
-        self.q, self._speed = q, speed
-        self.qd = speed + 0.5 * (speed - before)
-        self._speeds.append(0.5 * (before + speed))
+        speed = np.array(speeds)
+        self.q, self._speed = np.array([state[0] for state in states]), speed
+        half = 0.5 * (speed - before)
+        self.qd = speed + half
+        self._speeds.append(before + half)
         self._torques.append(self.torque)
         if len(self._speeds) > _CHUNK:  # nobody reads the work: keep the memory bounded
             del self._speeds[:_CHUNK], self._torques[:_CHUNK]

@@ -239,8 +239,8 @@ class Simulation:
     def step(self) -> None:
         """Let dt pass."""
         dt = self.settings.dt
-        self.plc.step(dt, self.pauses.rest is not None)
-        self._react_to_plc()
+        if self.plc.step(dt, self.pauses.rest is not None):
+            self._react_to_plc()
         if self.watch.step(self.time):
             self.notices.add(Level.WARN, f"{self.watch.lost}; stopped on the path until it is back")
             self.abort(f"{self.watch.lost}; stopped on the path")
