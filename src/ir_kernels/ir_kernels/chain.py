@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 from ir_kernels import compiled, data
 from ir_kernels.data import ChainLike, FloatArray
 from ir_kernels.errors import InputError
-from ir_kernels.reference import chain as reference
 
 AXIS_TOLERANCE = 1e-6
 
@@ -60,6 +59,8 @@ class Chain:
         """(N, n + 1, 4, 4): poses of the links 0..n in the world at q (N, n)."""
         q = self.checked(q)
         if compiled.MODULE is None:
+            from ir_kernels.reference import chain as reference
+
             return reference.link_poses(self.joint_origin, self.joint_axis, self.base_pose, q)
         poses: FloatArray = compiled.MODULE.link_poses(self.joint_origin, self.joint_axis, self.base_pose, q)
         return poses
@@ -75,6 +76,8 @@ class Chain:
         """
         q = self.checked(q)
         if compiled.MODULE is None:
+            from ir_kernels.reference import chain as reference
+
             return reference.jacobian(self.joint_axis, self.link_poses(q), self.tcp)
         result: FloatArray = compiled.MODULE.jacobian(
             self.joint_origin, self.joint_axis, self.base_pose, self.tcp, q

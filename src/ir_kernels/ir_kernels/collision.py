@@ -16,8 +16,7 @@ from ir_kernels.chain import Chain
 from ir_kernels.data import BodyLike, BoolArray, CapsuleLike, FloatArray, IntArray
 from ir_kernels.errors import InputError
 from ir_kernels.geometry import Geometry, Pair, geometry
-from ir_kernels.reference.certify import COLLIDES, FREE, UNDECIDED
-from ir_kernels.reference.model import Model
+from ir_kernels.verdicts import COLLIDES, FREE, UNDECIDED
 
 __all__ = [
     "COLLIDES",
@@ -179,6 +178,8 @@ class CollisionModel:
 def _core(geometry: Geometry) -> Any:
     """The compiled model, or the one in NumPy."""
     if compiled.MODULE is None:
+        from ir_kernels.reference.model import Model  # half of the import time, for those who need it
+
         return Model(geometry)
     chain, capsules, scene = geometry.chain, geometry.capsules, geometry.scene
     return compiled.MODULE.Model(

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ir_kernels.data import FloatArray, IntArray
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import chain, collision
+from ir_kernels.verdicts import COLLIDES, FREE, UNDECIDED
 
-FREE, COLLIDES, UNDECIDED = 0, 1, 2
 MARGIN = 1e-9  # [m] more than double precision loses on lengths of some ten metres
 RESOLUTION = 1e-6  # [m] an interval whose bodies move less than this isn't halved any more
 FRONT = 16  # intervals of a motion that are looked at together, the earliest first

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ir_kernels.data import BoolArray, FloatArray, IntArray
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import certify, collision
+from ir_kernels.verdicts import FREE
 
 NearestPairs = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]
 Verdicts = tuple[NDArray[np.uint8], FloatArray, FloatArray, IntArray]
@@ -62,10 +63,10 @@ class Model:
     ) -> tuple[int, float, float, int, float]:
         """Verdict, interval from the start, pair, proven bound."""
         found = certify.certify(self.geometry, certify.Polynomials(coefficients, durations), threshold)
-        unsafe = np.flatnonzero(found.verdict != certify.FREE)
+        unsafe = np.flatnonzero(found.verdict != FREE)
         if not len(unsafe):
             total = float(durations.sum())
-            return certify.FREE, total, total, -1, float(found.bound.min(initial=np.inf))
+            return FREE, total, total, -1, float(found.bound.min(initial=np.inf))
         k = int(unsafe[0])
         begin = float(durations[:k].sum())
         t0, t1 = begin + float(found.t0[k]), begin + float(found.t1[k])
