@@ -145,10 +145,9 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(
         context=ros_context,
     )
     ros_executor.add_node(node)
-    joints = ros_node.create_publisher(JointState, "/joint_states", 10)
+    latched = ros_node.create_publisher(String, "/robot_description", LATCHED)
+    latched.publish(String(data="<robot/>"))
     start(call, tmp_path / "full.mcap")
-    wait_for(joints.get_subscription_count)
-    joints.publish(JointState())
     wait_for(lambda: node.failure)
     answer = stop(call)
     assert answer.status.code == StatusCode.FAILURE

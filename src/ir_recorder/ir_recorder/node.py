@@ -12,8 +12,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from functools import partial
-from importlib import import_module
 from typing import Any
 
 import rclpy
@@ -21,24 +19,23 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.status import StatusCode
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ir_msgs_py import names
 from ir_recorder.cell_files import cell_files
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
+from ir_recorder.listen.node import Listener
 from ir_recorder.parameters import declared_settings
-from ir_recorder.qos import QosOffer, request_for
+from ir_recorder.qos import QosOffer
 from ir_recorder.session import CellFiles, RecordingSession
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.topics import TopicSelection, single_type
 from ir_recorder.writer import RecordingWriter
 
-_LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
+POLL_PERIOD = 0.02  # s
 OpenWriter = Callable[[str, bool], RecordingWriter]
 
 
@@ -58,17 +55,16 @@ class RecorderNode(Node):
         self._open_writer = writer
         self._session: RecordingSession | None = None
         self._selection = TopicSelection()
-        self._recorded: dict[str, Any] = {}
+        self._listener = Listener(self, self._settings.depth)
         self._passed_over: set[str] = set()
-        self._lost = 0
         self._failure = ""
         self._cell_answer: Any = None
         self._get_cell = self.create_client(GetCell, names.GET_CELL)
-        self._events = SubscriptionEventCallbacks(message_lost=self._on_lost, use_default_callbacks=False)
         self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
         self.create_service(StartRecording, "~/start", self._on_start)
         self.create_service(StopRecording, "~/stop", self._on_stop)
         self.create_timer(self._settings.discovery_period, self._discover)
+        self.create_timer(POLL_PERIOD, self._collect)
         self.create_timer(1.0, self._each_second)
         if self._settings.path:
             self.start(self._settings.path, self._settings.overwrite)
@@ -100,7 +96,7 @@ class RecorderNode(Node):
             tuple(t for t in topics if t) or self._settings.wanted_topics, self.get_namespace()
         )
         self._passed_over.clear()
-        self._lost, self._failure = 0, ""
+        self._listener.lost, self._failure = 0, ""
         if files is not None:
             self._attach(files)
         self._discover()
@@ -109,15 +105,15 @@ class RecorderNode(Node):
 
     def finish(self) -> Any:
         """Ends the recording and returns its summary, or None when there was none."""
+        self._collect()
         session, self._session = self._session, None
-        for subscription in self._recorded.values():
-            self.destroy_subscription(subscription)
-        self._recorded.clear()
+        self._listener.close()
         if session is None:
             return None
         summary = session.finish()
         self.get_logger().info(
-            f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, {self._lost} lost"
+            f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, "
+            f"{self._listener.lost} lost"
         )
         return summary
 
@@ -156,69 +152,49 @@ class RecorderNode(Node):
         if self._session is None:
             return
         for topic, types in self.get_topic_names_and_types():
-            if topic in self._recorded or topic in self._passed_over or topic not in self._selection:
+            if topic in self._listener or topic in self._passed_over or topic not in self._selection:
                 continue
             type_name = single_type(topic, types)
-            publishers = self.get_publishers_info_by_topic(topic)
+            offers = self._listener.offers(topic)
             if type_name is None:
                 self._pass_over(topic, f"types {', '.join(types)} can't be recorded")
-            elif publishers:
-                self._subscribe(topic, type_name, [_offer(publisher) for publisher in publishers])
+            elif offers:
+                self._listen(topic, type_name, offers)
 
-    def _subscribe(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
+    def _listen(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
         if self._session is None:
             return
         try:
-            message_type = _message_type(type_name)
             self._session.open_topic(topic, type_name, offers)
-        except (SchemaError, ImportError, AttributeError) as error:
+            self._listener.open(topic, type_name, offers)
+        except SchemaError as error:
             self._pass_over(topic, str(error))
-            return
         except WriteError as error:
             self._abandon(error)
+
+    def _collect(self) -> None:
+        """Writes what has arrived since the last time."""
+        if self._session is None:
             return
-        request = request_for(offers)
-        profile = QoSProfile(
-            depth=self._settings.depth,
-            reliability=ReliabilityPolicy.RELIABLE if request.reliable else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL
-            if request.transient_local
-            else DurabilityPolicy.VOLATILE,
-        )
-        self._recorded[topic] = self.create_subscription(
-            message_type,
-            topic,
-            partial(self._on_message, topic),
-            profile,
-            raw=True,
-            event_callbacks=SubscriptionEventCallbacks(
-                message_lost=self._on_lost, use_default_callbacks=False
-            ),
-        )
-
-    def _on_message(self, topic: str, data: bytes) -> None:
-        if self._session is not None:
-            try:
-                self._session.message(topic, data, self._now())
-            except WriteError as error:
-                self._abandon(error)
-
-    def _on_lost(self, event: Any) -> None:
-        self._lost += event.total_count_change
+        try:
+            for arrival in self._listener.take():
+                self._session.message(arrival.topic, arrival.data, arrival.time)
+        except WriteError as error:
+            self._abandon(error)
 
     def _each_second(self) -> None:
         self._ask_for_cell()
         status = DiagnosticStatus(name=self.get_name(), hardware_id="")
         status.level = DiagnosticStatus.ERROR if self._failure else DiagnosticStatus.OK
-        if self._lost and not self._failure:
+        if self._listener.lost and not self._failure:
             status.level = DiagnosticStatus.WARN
         session = self._session
         status.message = self._failure or ("recording" if session is not None else "idle")
         status.values = [
             KeyValue(key="path", value=session.path if session else ""),
             KeyValue(key="messages", value=str(session.messages if session else 0)),
-            KeyValue(key="topics", value=str(len(self._recorded))),
-            KeyValue(key="lost", value=str(self._lost)),
+            KeyValue(key="topics", value=str(len(self._listener))),
+            KeyValue(key="lost", value=str(self._listener.lost)),
         ]
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
@@ -249,6 +225,7 @@ class RecorderNode(Node):
     def _abandon(self, error: WriteError) -> None:
         self._failure = str(error)
         self._session = None
+        self._listener.close()
         self.get_logger().error(self._failure)
 
     def _pass_over(self, topic: str, reason: str) -> None:
@@ -257,20 +234,6 @@ class RecorderNode(Node):
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)
-
-
-def _offer(publisher: Any) -> QosOffer:
-    profile = publisher.qos_profile
-    return QosOffer(
-        reliable=profile.reliability == ReliabilityPolicy.RELIABLE,
-        transient_local=profile.durability == _LATCHED,
-        depth=int(profile.depth),
-    )
-
-
-def _message_type(name: str) -> Any:
-    package, kind, own = name.split("/")
-    return getattr(import_module(f"{package}.{kind}"), own)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

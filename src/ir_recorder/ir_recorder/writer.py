@@ -81,7 +81,10 @@ class RecordingWriter:
         return channel
 
     def write(self, channel: int, log_time: int, data: bytes, publish_time: int | None = None) -> None:
-        """Appends one message's CDR bytes."""
+        """Appends one message's CDR bytes. Times that run back are set to the latest: players read in file
+        order.
+        """
+        log_time = max(log_time, self._last)
         with self._storage():
             self._writer.add_message(
                 channel,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.report import MovementKind, PlannedMovement
 
 from ir_recorder.recording import ControllerSeries, ProgramEvent, Recording
 
@@ -36,13 +36,16 @@ class ExecutedStep:
 
     @property
     def label(self) -> str:
-        """In a few words: "infeed → lathe", "pause at lathe (BUS_POWER_OFF)"."""
+        """In a few words: "infeed → lathe", "into lathe", "pause at lathe (BUS_POWER_OFF)"."""
         movement = self.movement
         if movement.is_pause:
             place = movement.to_station or movement.from_station
             where = f" at {place}" if place else ""
             mode = f" ({movement.power_mode})" if movement.power_mode else ""
             return f"pause{where}{mode}"
+        if movement.from_station == movement.to_station != "":
+            way = {MovementKind.SERVICE_ENTRY: "into", MovementKind.SERVICE_EXIT: "out of"}
+            return f"{way.get(MovementKind(movement.kind), 'at')} {movement.to_station}"
         return f"{movement.from_station or 'start'} → {movement.to_station or 'goal'}"
 
 

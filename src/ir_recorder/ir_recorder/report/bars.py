@@ -1,4 +1,8 @@
-"""Stacked bars of joules per movement and joint, as SVG."""
+"""Stacked bars of joules per movement and joint, as SVG.
+
+What goes in is stacked to the right; what braking axes give back leads from its end to the left, so that
+the thin bar ends at what the mains gave (but for what stays in the capacitors).
+"""
 
 from __future__ import annotations
 
@@ -10,10 +14,11 @@ from ir_recorder.analysis import StepResult
 from ir_recorder.report.words import joules, text
 
 WIDTH = 1080
-LABEL = 230
+LABEL = 262
 VALUE = 120
 ROW = 34
-BAR = 20
+BAR = 21
+BACK = 6  # height of what is given back
 TOP = 26
 
 
@@ -26,13 +31,11 @@ def joule_bars(results: Sequence[StepResult]) -> str:
     pieces = [_pieces(result) for result in results]
     planned = [result.step.movement.report.energy for result in results]
     high = max(max(sum(v for _, _, v in own if v > 0) for own in pieces), max(planned), 1.0)
-    low = min(min(sum(v for _, _, v in own if v < 0) for own in pieces), 0.0)
-    scale = (WIDTH - LABEL - VALUE) / (high - low)
-    zero = LABEL - low * scale
+    scale = (WIDTH - LABEL - VALUE) / high
     height = TOP + ROW * len(results) + 8
-    rows = [_axis(low, high, zero, scale, height)]
+    rows = [_axis(high, scale, height)]
     for k, (result, own, plan) in enumerate(zip(results, pieces, planned, strict=True)):
-        rows.append(_row(result, own, plan, TOP + k * ROW, zero, scale))
+        rows.append(_row(result, own, plan, TOP + k * ROW, scale))
     return (
         f'<svg class="bars" viewBox="0 0 {WIDTH} {height}" role="img" '
         f'aria-label="Joules per movement and joint">{"".join(rows)}</svg>'
@@ -47,47 +50,45 @@ def _pieces(result: StepResult) -> list[tuple[str, str, float]]:
     return [piece for piece in own if np.isfinite(piece[2])]
 
 
-def _row(
-    result: StepResult, own: list[tuple[str, str, float]], plan: float, y: float, zero: float, scale: float
-) -> str:
+def _row(result: StepResult, own: list[tuple[str, str, float]], plan: float, y: float, scale: float) -> str:
     label = f"{result.step.index + 1}  {result.step.label}"
-    out = [
-        f'<text class="label" x="{LABEL - 12}" y="{y + BAR * 0.72:.1f}">'
-        f"{text(label if len(label) <= 34 else label[:33] + '…')}</text>"
-    ]
-    right, left = zero, zero
-    for kind, what, value in own:
-        width = abs(value) * scale
-        if width < 0.05:
-            continue
-        x = right if value > 0 else left - width
-        right, left = (right + width, left) if value > 0 else (right, left - width)
-        out.append(
-            f'<rect class="piece {kind}" x="{x:.2f}" y="{y}" width="{width:.2f}" height="{BAR}">'
-            f"<title>{text(label)}: {text(what)} {text(joules(value))}</title></rect>"
-        )
-    mark = zero + plan * scale
+    shown = label if len(label) <= 38 else label[:37] + "…"
+    out = [f'<text class="label" x="{LABEL - 12}" y="{y + BAR * 0.72:.1f}">{text(shown)}</text>']
+    x = float(LABEL)
+    tall = BAR - BACK - 1 if any(value < 0 for _, _, value in own) else BAR
+    for kind, what, value in [piece for piece in own if piece[2] > 0]:
+        out.append(_piece(kind, f"{label}: {what} {joules(value)}", x, y, value * scale, tall))
+        x += value * scale
+    end = x
+    for kind, what, value in [piece for piece in own if piece[2] < 0]:
+        x += value * scale
+        words = f"{label}: {what} gives back {joules(-value)}"
+        out.append(_piece(kind, words, x, y + BAR - BACK, -value * scale, BACK))
+    mark = LABEL + plan * scale
     out.append(
         f'<line class="plan" x1="{mark:.2f}" x2="{mark:.2f}" y1="{y - 4}" y2="{y + BAR + 4}">'
         f"<title>planned {text(joules(plan))}</title></line>"
     )
-    end = max(right, mark) + 8
-    out.append(
-        f'<text class="value" x="{end:.1f}" y="{y + BAR * 0.72:.1f}">{text(joules(result.energy))}</text>'
-    )
+    total = text(joules(result.energy))
+    out.append(f'<text class="value" x="{max(end, mark) + 8:.1f}" y="{y + BAR * 0.72:.1f}">{total}</text>')
     return "".join(out)
 
 
-def _axis(low: float, high: float, zero: float, scale: float, height: float) -> str:
-    step = _tick_step(high - low)
+def _piece(kind: str, words: str, x: float, y: float, width: float, height: float) -> str:
+    return (
+        f'<rect class="piece {kind}" x="{x:.2f}" y="{y:.1f}" width="{max(width, 0.1):.2f}" height="{height}">'
+        f"<title>{text(words)}</title></rect>"
+    )
+
+
+def _axis(high: float, scale: float, height: float) -> str:
+    step = _tick_step(high)
     out = []
-    for k in range(int(np.floor(low / step)), int(np.ceil(high / step)) + 1):
-        value = k * step
-        if low <= value <= high:
-            x = zero + value * scale
-            kind = "zero" if k == 0 else "grid"
-            out.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP - 8}" y2="{height - 4}"/>')
-            out.append(f'<text class="tick" x="{x:.1f}" y="{TOP - 13}">{text(joules(value))}</text>')
+    for k in range(int(high / step) + 1):
+        x = LABEL + k * step * scale
+        kind = "grid" if k else "zero"
+        out.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP - 8}" y2="{height - 4}"/>')
+        out.append(f'<text class="tick" x="{x:.1f}" y="{TOP - 13}">{text(joules(k * step))}</text>')
     return "".join(out)
 
 

@@ -32,19 +32,8 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -
 
 def step_table(results: Sequence[StepResult]) -> str:
     """Every step: planned against measured."""
-    heads = (
-        "#",
-        "step",
-        "load",
-        ">time",
-        ">planned",
-        ">measured",
-        ">deviation",
-        ">from torque",
-        ">mean",
-        ">peak",
-    )
-    return table((*heads, ">clearance", ">tool off by"), (_step(result) for result in results))
+    heads = ("#", "step", "load", ">time", ">planned", ">measured", ">deviation", ">mean", ">clearance")
+    return table((*heads, ">tool off by"), (_step(result) for result in results))
 
 
 def _step(result: StepResult) -> tuple[str, ...]:
@@ -59,11 +48,9 @@ def _step(result: StepResult) -> tuple[str, ...]:
         text(step.movement.load or DASH),
         f"{result.seconds:.2f} s",
         joules(plan) if plan else DASH,
-        joules(result.energy),
+        joules(result.energy) + _small("torque says", joules(result.indirect_energy)),
         percent(result.energy / plan - 1.0) if plan and not step.movement.is_pause else DASH,
-        joules(result.indirect_energy),
-        watts(result.mean_power),
-        watts(result.peak_power),
+        watts(result.mean_power) + _small("peak", watts(result.peak_power)),
         f"{millimetres(near.least)}<small>{text(near.least_pair)}</small>" if near else DASH,
         millimetres(result.tool_deviation),
     )
@@ -163,6 +150,10 @@ def problem_list(problems: Sequence[str]) -> str:
 
 def _cells(heads: Sequence[str], row: Sequence[str]) -> str:
     return "".join(f"<td{_number(head)}>{cell}</td>" for head, cell in zip(heads, row, strict=True))
+
+
+def _small(name: str, value: str) -> str:
+    return "" if value == DASH else f"<small>{name} {value}</small>"
 
 
 def _share(share: Share) -> str:

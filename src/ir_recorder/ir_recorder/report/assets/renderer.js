@@ -64,7 +64,7 @@ function lineQuads(points, tints, strip) {
   const count = strip ? points.length / 3 - 1 : points.length / 6, out = new Float32Array(Math.max(count, 0) * 60);
   for (let s = 0; s < count; s++) {
     const i = strip ? s : 2 * s;
-    [[i, i + 1, 1], [i, i + 1, -1], [i + 1, i, -1], [i + 1, i, -1], [i + 1, i, 1], [i, i + 1, 1]].forEach(([a, b, side], k) => {
+    [[i, i + 1, 1], [i, i + 1, -1], [i + 1, i, -1], [i + 1, i, -1], [i + 1, i, 1], [i, i + 1, -1]].forEach(([a, b, side], k) => {
       const at = s * 60 + k * 10;
       for (let d = 0; d < 3; d++) { out[at + d] = points[3 * a + d]; out[at + 3 + d] = points[3 * b + d]; out[at + 6 + d] = tints[3 * a + d]; }
       out[at + 9] = side;
@@ -75,7 +75,7 @@ function lineQuads(points, tints, strip) {
 
 class GlRenderer {
   static create(canvas) {
-    const gl = canvas.getContext("webgl", { antialias: true, stencil: true, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl", { alpha: false, antialias: true, stencil: true, preserveDrawingBuffer: true });
     return gl ? new GlRenderer(canvas, gl) : null;
   }
   constructor(canvas, gl) {

@@ -1,0 +1,1 @@
+"""Subscriptions to many topics at once."""

@@ -1,0 +1,142 @@
+"""Listens to topics as raw bytes, with the quality of service that is offered, and without waking for every
+message.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from operator import attrgetter
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from ir_recorder.errors import SchemaError
+from ir_recorder.qos import QosOffer, request_for
+
+_LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """A message's CDR bytes, and when they arrived [ns of the node's clock]."""
+
+    time: int
+    topic: str
+    data: bytes
+
+
+class PolledGroup(CallbackGroup):
+    """Entities that the executor never waits for.
+
+    Waking it for every message of a 500 Hz topic takes a third of a core, and a busy machine then falls
+    behind; taking what has arrived 50 times a second takes little. The middleware notes the times of arrival.
+    """
+
+    def can_execute(self, entity: Any) -> bool:
+        """Never."""
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        """Nothing began."""
+
+
+class Listener:
+    """Subscriptions of a node by topic; `lost` counts messages of single publishers that never arrived."""
+
+    def __init__(self, node: Node, depth: int) -> None:
+        self._node = node
+        self._depth = depth
+        self._group = PolledGroup()
+        self._subscriptions: dict[str, Any] = {}
+        self._numbers: dict[str, int | None] = {}  # of the last message; None where publishers mix theirs
+        self.lost = 0
+
+    def __contains__(self, topic: str) -> bool:
+        return topic in self._subscriptions
+
+    def __len__(self) -> int:
+        return len(self._subscriptions)
+
+    def offers(self, topic: str) -> tuple[QosOffer, ...]:
+        """What the topic's publishers offer now."""
+        return tuple(_offer(publisher) for publisher in self._node.get_publishers_info_by_topic(topic))
+
+    def open(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
+        """Subscribes to a topic; SchemaError when its type isn't installed."""
+        request = request_for(offers)
+        profile = QoSProfile(
+            depth=self._depth,
+            reliability=ReliabilityPolicy.RELIABLE if request.reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=_LATCHED if request.transient_local else DurabilityPolicy.VOLATILE,
+        )
+        subscription = self._node.create_subscription(
+            _message_type(type_name),
+            topic,
+            _nobody,
+            profile,
+            raw=True,
+            callback_group=self._group,
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
+        self._subscriptions[topic] = subscription
+        self._numbers[topic] = 0 if len(offers) == 1 else None
+
+    def take(self) -> list[Arrival]:
+        """All that has arrived since the last time, in the order of arrival."""
+        clock = self._node.get_clock()
+        arrived = []
+        for topic, subscription in self._subscriptions.items():
+            with subscription.handle:
+                for _ in range(self._depth):
+                    taken = subscription.handle.take_message(subscription.msg_type, True)
+                    if taken is None:
+                        break
+                    data, info = taken
+                    received = info["received_timestamp"] if not clock.ros_time_is_active else 0
+                    self._count(topic, info["publication_sequence_number"])
+                    arrived.append(Arrival(received or clock.now().nanoseconds, topic, data))
+        return sorted(arrived, key=attrgetter("time"))
+
+    def close(self) -> None:
+        """Ends all subscriptions."""
+        for subscription in self._subscriptions.values():
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
+    def _count(self, topic: str, number: int | None) -> None:
+        """A publisher numbers its messages: numbers that are left out are messages that didn't arrive."""
+        last = self._numbers[topic]
+        if last is not None and number is not None:
+            if 0 < last < number:
+                self.lost += number - last - 1
+            self._numbers[topic] = number
+
+
+def _nobody(data: bytes) -> None:
+    """Messages are taken by `Listener.take`."""
+
+
+def _offer(publisher: Any) -> QosOffer:
+    profile = publisher.qos_profile
+    return QosOffer(
+        reliable=profile.reliability == ReliabilityPolicy.RELIABLE,
+        transient_local=profile.durability == _LATCHED,
+        depth=int(profile.depth),
+    )
+
+
+def _message_type(name: str) -> Any:
+    package, kind, own = name.split("/")
+    try:
+        return getattr(import_module(f"{package}.{kind}"), own)
+    except (ImportError, AttributeError) as error:
+        raise SchemaError(f"type {name[:200]} isn't installed for Python: {error}") from error
