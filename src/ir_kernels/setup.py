@@ -17,7 +17,13 @@ X86 = platform.machine().lower() in ("x86_64", "amd64")
 WARNINGS = ["-Wall", "-Wextra", "-Wno-psabi", "-Wno-uninitialized", "-Wno-maybe-uninitialized"]
 # No -ffast-math: NaN checks and the order of additions are part of what is promised.
 OPTIMISE = ["-O3", "-std=c++17", "-fvisibility=hidden", "-g0", "-fno-math-errno", "-fno-trapping-math"]
-SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-omit-frame-pointer"]
+SANITIZE = [
+    "-O1",
+    "-g1",
+    "-fsanitize=address,undefined",
+    "-fno-sanitize-recover=undefined",
+    "-fno-omit-frame-pointer",
+]
 # What GCC may use on its own under -march=native, as preprocessor name -> name of __builtin_cpu_supports.
 FEATURES = {
     "__POPCNT__": "popcnt", "__SSE3__": "sse3", "__SSSE3__": "ssse3", "__SSE4_1__": "sse4.1",
@@ -88,8 +94,9 @@ class BuildBothVariants(build_ext):
         if os.environ.get("IR_KERNELS_SANITIZE"):
             ext.extra_compile_args += SANITIZE
             ext.extra_link_args += SANITIZE
+        elif sys.platform == "linux":
+            ext.extra_link_args += ["-Wl,--strip-all"]
         ext.define_macros = [*ext.define_macros, ("IR_NATIVE_FEATURES", f'"{",".join(features)}"')]
-        ext.extra_link_args += ["-Wl,--strip-all"] if sys.platform == "linux" else []
         own = copy.copy(self)  # its own folder for objects: both variants compile the same files
         own.build_temp = os.path.join(self.build_temp, ext.name)
         super(BuildBothVariants, own).build_extension(ext)

@@ -82,7 +82,7 @@ class CollisionModel:
 
     Pairs: every capsule with every body (capsule by capsule), but those of link 0 (nothing of them moves) and
     those in `ignored_pairs`; then `self_pairs` of capsules. All by name. Immutable: build another one when a
-    door opens or a load is attached (some 50 us). Raises InputError for data that make no sense.
+    door opens or a load is attached (about a millisecond). Raises InputError for data that make no sense.
     """
 
     def __init__(

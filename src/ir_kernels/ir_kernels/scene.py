@@ -80,6 +80,15 @@ def _size(body: BodyLike, name: str) -> FloatArray:
     return size
 
 
+def _poses(bodies: Sequence[BodyLike]) -> FloatArray:
+    """(B, 4, 4), checked together; one by one only to name the body that is wrong."""
+    stacked = np.array([body.pose for body in bodies], dtype=np.float64).reshape(-1, 4, 4)
+    try:
+        return data.poses(stacked, "bodies") if len(bodies) else stacked
+    except InputError:
+        return np.array([data.pose(body.pose, f"body {body.name!r}.pose") for body in bodies])
+
+
 def scene(bodies: Sequence[BodyLike]) -> Scene:
     """The bodies as arrays, checked: InputError names the body and what is wrong with it."""
     names = data.unique_names(bodies, "bodies")
@@ -95,9 +104,7 @@ def scene(bodies: Sequence[BodyLike]) -> Scene:
     return Scene(
         names=names,
         kind=np.array([KINDS.index(body.kind) for body in bodies], dtype=np.int64),
-        pose=np.array([data.pose(body.pose, f"body {body.name!r}.pose") for body in bodies]).reshape(
-            count, 4, 4
-        ),
+        pose=_poses(bodies),
         size=np.array([_size(body, f"body {body.name!r}") for body in bodies]).reshape(count, 3),
         hulls=tuple(hulls),
     )

@@ -1,0 +1,243 @@
+"""Geometry half of `benchmarks/kernels.py`: distances, checks and proofs of motion, per cell and beside the
+peers.
+
+Path-like batches: straight edges of 0.8 rad (largest joint) between configurations drawn within the limits,
+40 configurations each. Random batches: every configuration drawn anew.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from kernels_dynamics import Claim, Row, best
+from kernels_peers import Bullet, Coal
+from numpy.typing import NDArray
+
+from ir_description import Cell, load_cell
+from ir_kernels import FREE, UNDECIDED, Chain, CollisionModel
+
+Array = NDArray[np.float64]
+SAMPLES = 1600  # configurations per batch: a path, not a day's work
+REPETITIONS = 60
+EDGE, SAFETY, ROOM = 0.8, 0.02, 0.005  # rad, m, m
+EDGES, FINE = 2500, 0.0005  # per cell; rad
+AGREEMENT = 25_000  # configurations per cell compared with Coal
+COAL_SAMPLES, BULLET_SAMPLES = 200, 40
+NS = "ns per configuration"
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body of the scene of 1,000 boxes."""
+
+    name: str
+    kind: str
+    pose: Array
+    size: Array
+    vertices: Array
+
+
+def model_of(cell: Cell, bodies: Sequence[Any] | None = None) -> tuple[CollisionModel, list[Any], list[Any]]:
+    """The cell's collision model, its capsules and its bodies."""
+    robot, tool = cell.robot, cell.tool
+    held = list(tool.capsules) if tool else []
+    capsules = [*robot.capsules, *held]
+    own = [*robot.self_pairs, *((c.name, other) for c in held for other in robot.load_self_capsules)]
+    scene = list(cell.bodies() if bodies is None else bodies)
+    return CollisionModel(Chain(robot, cell.base_pose, cell.tcp), capsules, scene, own), capsules, scene
+
+
+def uniform(cell: Cell, rng: np.random.Generator, count: int) -> Array:
+    return rng.uniform(cell.robot.position_min, cell.robot.position_max, (count, cell.robot.n))
+
+
+def edges(cell: Cell, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    start = uniform(cell, rng, count)
+    step = rng.uniform(-1.0, 1.0, start.shape)
+    goal = start + EDGE * step / np.abs(step).max(axis=1, keepdims=True)
+    return start, np.clip(goal, cell.robot.position_min, cell.robot.position_max)
+
+
+def path_like(cell: Cell, rng: np.random.Generator, count: int = SAMPLES) -> Array:
+    q0, q1 = edges(cell, rng, count // 40)
+    t = np.linspace(0.0, 1.0, 40)[None, :, None]
+    return np.ascontiguousarray((q0[:, None] + t * (q1 - q0)[:, None]).reshape(-1, q0.shape[1]))
+
+
+def threaded(model: CollisionModel, q: Array) -> float:
+    """Seconds per configuration with two threads, each with its half."""
+    halves = np.ascontiguousarray(q[: len(q) // 2]), np.ascontiguousarray(q[len(q) // 2 :])
+    with ThreadPoolExecutor(2) as pool:
+        return best(lambda: list(pool.map(model.min_distance, halves)), len(q), REPETITIONS)
+
+
+def _speed(name: str, cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
+    model, capsules, bodies = model_of(cell)
+    path, random = path_like(cell, rng), uniform(cell, rng, SAMPLES)
+    coal, bullet = Coal(model, capsules, bodies), Bullet(cell, model, bodies)
+    ours = best(lambda: model.min_distance(path), SAMPLES, REPETITIONS)
+    theirs = best(lambda: [coal.compute(q) for q in path[:COAL_SAMPLES]], COAL_SAMPLES, 5)
+    pybullet = best(lambda: [bullet.compute(q) for q in path[:BULLET_SAMPLES]], BULLET_SAMPLES, 2)
+    others = {
+        "minimum distance, random": best(lambda: model.min_distance(random), SAMPLES, REPETITIONS),
+        "minimum distance, path, two threads": threaded(model, path),
+        "check against 20 mm, path": best(lambda: model.is_free(path, SAFETY), SAMPLES, REPETITIONS),
+        "check against 20 mm, random": best(lambda: model.is_free(random, SAFETY), SAMPLES, REPETITIONS),
+        f"all {len(model.pairs)} distances": best(lambda: model.distances(path), SAMPLES, 10),
+        "link poses": best(lambda: model.chain.link_poses(path), SAMPLES, REPETITIONS),
+    }
+    rows = [
+        Row(f"{name}: minimum distance, path", "", ours * 1e9, NS),
+        *(Row(f"{name}: {what}", "", seconds * 1e9, NS) for what, seconds in others.items()),
+        Row(f"{name}: minimum distance, path", "Coal through Pinocchio", theirs * 1e9, NS),
+        Row(f"{name}: minimum distance, path", "PyBullet", pybullet * 1e9, NS),
+        Row(f"{name}: against Coal through Pinocchio", "", theirs / ours, "times faster"),
+        Row(f"{name}: against PyBullet", "", pybullet / ours, "times faster"),
+    ]
+    bound = 100.0 if name == "open" else 150.0
+    claims = [
+        Claim(f"{name}: minimum distance, path-like", ours * 1e9, NS, bound, ours * 1e9 <= bound),
+        Claim(
+            f"{name}: against Coal through Pinocchio",
+            theirs / ours,
+            "times faster",
+            300.0,
+            theirs >= 300.0 * ours,
+        ),
+    ]
+    return rows, claims
+
+
+def _agreement(name: str, cell: Cell, rng: np.random.Generator) -> list[Claim]:
+    """Least distances beside Coal's."""
+    model, capsules, bodies = model_of(cell)
+    coal = Coal(model, capsules, bodies)
+    coal.precise()
+    q = uniform(cell, rng, AGREEMENT)
+    ours = model.min_distance(q).distance
+    theirs = np.array([coal.distances(row).min() for row in q])
+    apart = theirs > 0.0
+    worst = float(np.abs(ours - theirs)[apart].max())
+    signs = int(((ours > 1e-6) & (theirs < -1e-6)).sum() + ((ours < -1e-6) & (theirs > 1e-6)).sum())
+    return [
+        Claim(
+            f"{name}: difference from Coal where apart",
+            worst,
+            f"m of {int(apart.sum())}",
+            1e-6,
+            worst <= 1e-6,
+        ),
+        Claim(f"{name}: other sign than Coal", float(signs), f"of {AGREEMENT}", 0.0, signs == 0),
+    ]
+
+
+def _roomy(model: CollisionModel, q0: Array, q1: Array) -> NDArray[np.bool_]:
+    """Edges whose 81 samples all keep the safety distance and ROOM."""
+    free = np.ones(len(q0), bool)
+    for t in np.linspace(0.0, 1.0, 81):
+        free &= model.is_free(np.ascontiguousarray(q0 + t * (q1 - q0)), SAFETY + ROOM)
+    return free
+
+
+def _refuted(model: CollisionModel, q0: Array, q1: Array) -> int:
+    """Edges among those called free with a sample, every FINE rad, that isn't."""
+    count = 0
+    for a, b in zip(q0, q1, strict=True):
+        t = np.linspace(0.0, 1.0, int(np.ceil(np.abs(b - a).max() / FINE)) + 1)
+        count += not model.is_free(a + t[:, None] * (b - a), SAFETY - 1e-6).all()
+    return count
+
+
+def _edges(name: str, cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
+    model, _, _ = model_of(cell)
+    q0, q1 = edges(cell, rng, 12 * EDGES)
+    roomy = _roomy(model, q0, q1)
+    a, b = q0[roomy][:EDGES], q1[roomy][:EDGES]
+    few = [(a[k : k + 50], b[k : k + 50]) for k in range(0, len(a) - 49, 50)]
+    per_edge = [best(partial(model.certify_edges, *pair, SAFETY), 50, 5) for pair in few]
+    alone = [best(partial(model.certify_edges, a[k : k + 1], b[k : k + 1], SAFETY), 1, 3) for k in range(200)]
+    t = np.linspace(0.0, 1.0, 40)[None, :, None]
+    samples = (a[:200, None] + t * (b - a)[:200, None]).reshape(-1, a.shape[1])
+    sampled = best(lambda: model.is_free(samples, SAFETY), 200, 10)
+    found = model.certify_edges(a, b, SAFETY)
+    undecided = 100.0 * float((found.verdict == UNDECIDED).mean())
+    everything = model.certify_edges(q0[:EDGES], q1[:EDGES], SAFETY)
+    free = everything.verdict == FREE
+    refuted = _refuted(model, q0[:EDGES][free], q1[:EDGES][free])
+    refuted += _refuted(model, a[found.verdict == FREE], b[found.verdict == FREE])
+    checked = int(free.sum() + (found.verdict == FREE).sum())
+    median = float(np.median(per_edge)) * 1e6
+    rows = [
+        Row(f"{name}: certified edge, in batches of 50, median", "", median, "us"),
+        Row(
+            f"{name}: certified edge, one per call from Python, median",
+            "",
+            float(np.median(alone)) * 1e6,
+            "us",
+        ),
+        Row(f"{name}: sampled edge, 40 configurations, in a batch", "", sampled * 1e6, "us"),
+    ]
+    claims = [
+        Claim(f"{name}: certified edge, in batches of 50, median", median, "us", 10.0, median <= 10.0),
+        Claim(f"{name}: undecided edges", undecided, "%", 1.0, undecided < 1.0),
+        Claim(
+            f"{name}: edges called free with a colliding sample", refuted, f"of {checked}", 0, refuted == 0
+        ),
+    ]
+    return rows, claims
+
+
+def _boxes(cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
+    """A thousand boxes around the robot, in any orientation, 5 to 30 cm long."""
+    bodies: list[Any] = []
+    while len(bodies) < 1000:
+        pose = np.eye(4)
+        rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        pose[:3, :3], pose[:3, 3] = rotation * np.linalg.det(rotation), rng.uniform(-2.5, 2.5, 3)
+        if np.linalg.norm(pose[:2, 3]) > 1.0 and pose[2, 3] > 0.0:
+            size = rng.uniform(0.05, 0.3, 3)
+            bodies.append(Body(f"box {len(bodies)}", "box", pose, size, np.zeros((0, 3))))
+    model, _, _ = model_of(cell, bodies)
+    path, random = path_like(cell, rng), uniform(cell, rng, 400)
+    ours = best(lambda: model.min_distance(path), len(path), 20) * 1e6
+    us = "us per configuration"
+    rows = [
+        Row("1,000 boxes: minimum distance, path", "", ours, us),
+        Row(
+            "1,000 boxes: minimum distance, random",
+            "",
+            best(lambda: model.min_distance(random), 400, 10) * 1e6,
+            us,
+        ),
+    ]
+    return rows, [Claim("1,000 boxes: minimum distance, path-like", ours, us, 1.5, ours <= 1.5)]
+
+
+def _construction(cell: Cell) -> Row:
+    """What a door that opens costs."""
+    begin = time.perf_counter()
+    for _ in range(20):
+        model_of(cell)
+    return Row(f"{cell.name}: a new collision model", "", (time.perf_counter() - begin) / 20 * 1e6, "us")
+
+
+def measure(cells: Sequence[str], seed: int = 0) -> tuple[list[Row], list[Claim]]:
+    """All rows and claims of this half over the cells."""
+    rng = np.random.default_rng(seed)
+    rows: list[Row] = []
+    claims: list[Claim] = []
+    for name in cells:
+        cell = load_cell(name)
+        for part in (_speed(cell.name, cell, rng), _edges(cell.name, cell, rng)):
+            rows += part[0]
+            claims += part[1]
+        claims += _agreement(cell.name, cell, rng)
+        rows.append(_construction(cell))
+    part = _boxes(load_cell(cells[0]), rng)
+    return rows + part[0], claims + part[1]
