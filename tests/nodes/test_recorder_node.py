@@ -60,13 +60,13 @@ def test_latched_and_volatile_messages_arrive_byte_by_byte(
     description = ros_node.create_publisher(String, "/robot_description", LATCHED)
     description.publish(String(data="<robot/>"))
     joints = ros_node.create_publisher(JointState, "/joint_states", 100)
-    started = start(call, tmp_path / "a.mcap")
+    started = start(call, tmp_path / "a.mcap", topics=["/robot_description", "joint_states"])
     assert started.status.code == StatusCode.SUCCESS
     wait_for(lambda: joints.get_subscription_count() and description.get_subscription_count())
     for k in range(500):
         message = JointState(name=["joint_a1"], position=[float(k)])
         joints.publish(message)
-    wait_for(lambda: recorder.messages >= 501)
+    wait_for(lambda: recorder.messages == 501)
     stopped = stop(call)
     assert stopped.status.code == StatusCode.SUCCESS
     assert stopped.path == str(tmp_path / "a.mcap")
