@@ -86,6 +86,7 @@ def _violation(
     come = "come to" if verdict == COLLIDES else "can't be proved to stay apart, they are at"
     sentence = (
         f"{pair.body_a} and {pair.body_b} ({pair.kind}) {come} {pair.distance * 1e3:.1f} mm "
-        f"after waypoint {k} at {interval[1]:.3f} s: they must stay {kept * 1e3:.1f} mm apart (excess {excess * 1e3:.1f} mm)"
+        f"after waypoint {k} at {interval[1]:.3f} s: they must stay {kept * 1e3:.1f} mm apart "
+        f"(excess {excess * 1e3:.1f} mm)"
     )
     return Violation(interval[0], k, "clearance", excess, sentence, pair)

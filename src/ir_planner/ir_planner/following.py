@@ -20,13 +20,13 @@ from ir_planner.errors import RequestError, TimingError
 from ir_planner.free_space import FreeSpace
 from ir_planner.goals import within_limits
 from ir_planner.journal import Journal
+from ir_planner.level_timing import fastest
 from ir_planner.movement import distinct, stretched_to_wish, timed_movement
 from ir_planner.regional import MovementPlan, end_in_collision
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene
 from ir_planner.spline_timing import time_spline
 from ir_planner.time_law import StepLaws
-from ir_planner.timing import fastest_law
 
 FloatArray = NDArray[np.float64]
 POINTS_MAX = 1000
@@ -101,10 +101,10 @@ def _followed(
     with journal.stage("stops") as notes:
         journal.planner_id = "stops"
         laws = tuple(
-            StepLaws((fastest_law(a, b, limits, scene.dynamics),)) for a, b in itertools.pairwise(points)
+            StepLaws((fastest(a, b, limits, scene.dynamics),)) for a, b in itertools.pairwise(points)
         )
-        fastest = blended(TimedPath(points, laws, (0,) * (len(laws) - 1)), names)
-        stopping = stretched_to_wish(fastest, scene, options)
+        quickest = blended(TimedPath(points, laws, (0,) * (len(laws) - 1)), names)
+        stopping = stretched_to_wish(quickest, scene, options)
         straight = evaluate_trajectory(stopping, scene, options.safety_distance)
         notes.append("straight between the points, stopping at each")
     return stopping, straight
@@ -123,9 +123,9 @@ def _spline(
         limits = scene.limits.scaled(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
-        fastest = time_spline(points, names, limits, scene.dynamics, given)
+        quickest = time_spline(points, names, limits, scene.dynamics, given)
         wished = given is not None and options.duration == 0.0
-        trajectory = stretched(fastest, 1.0) if wished else stretched_to_wish(fastest, scene, options)
+        trajectory = stretched(quickest, 1.0) if wished else stretched_to_wish(quickest, scene, options)
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance)
         violation = evaluation.verification.violation
         if violation is None or violation.what != "torque":

@@ -21,13 +21,14 @@ from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, 
 from ir_planner.budget import Budget
 from ir_planner.clearance_checks import clearance_violation
 from ir_planner.errors import RequestError
+from ir_planner.level_timing import fastest
 from ir_planner.limit_checks import Violation
 from ir_planner.objective import best_stretch
 from ir_planner.polynomials import extremes
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene
 from ir_planner.time_law import GRID_S, StepLaws
-from ir_planner.timing import STILL, MotionLimits, fastest_law, torque_per_segment
+from ir_planner.timing import STILL, MotionLimits, torque_per_segment
 
 FloatArray = NDArray[np.float64]
 _TORQUE_SHARES = (0.98, 0.95, 0.9, 0.8)
@@ -71,9 +72,9 @@ def timed_movement(
         limits = scene.limits.scaled(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
-        fastest, note = _fastest(waypoints, scene, options, limits, budget, station)
+        quickest, note = _fastest(waypoints, scene, options, limits, budget, station)
         budget.check()
-        trajectory = stretched_to_wish(fastest, scene, options)
+        trajectory = stretched_to_wish(quickest, scene, options)
         budget.check()
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
@@ -112,7 +113,7 @@ def _fastest(
         if blocked is None:
             return trajectory, note
         note = f"asynchronous timing is not free ({blocked.sentence}), so the timing is synchronous"
-    laws = tuple(StepLaws((fastest_law(a, b, limits, dynamics),)) for a, b in steps)
+    laws = tuple(StepLaws((fastest(a, b, limits, dynamics),)) for a, b in steps)
     return _cut_corners(waypoints, laws, scene, options, limits, budget, station), note
 
 
@@ -180,18 +181,18 @@ def _guilty_corners(
 
 
 def stretched_to_wish(
-    fastest: JointTrajectory, scene: PlanningScene, options: PlanOptions
+    quickest: JointTrajectory, scene: PlanningScene, options: PlanOptions
 ) -> JointTrajectory:
     """The fastest trajectory at the wished duration, or at the one the objective likes best.
 
     Raises RequestError when the wished duration is shorter than the fastest.
     """
     if options.duration > 0.0:
-        if options.duration < fastest.duration * (1.0 - _DURATION_SLACK):
+        if options.duration < quickest.duration * (1.0 - _DURATION_SLACK):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"duration is {options.duration:g} s: the shortest within the limits is "
-                f"{fastest.duration:.4g} s",
+                f"{quickest.duration:.4g} s",
             )
-        return stretched(fastest, max(options.duration / fastest.duration, 1.0))
-    return stretched(fastest, best_stretch(fastest, scene, options.objective, options.time_value))
+        return stretched(quickest, max(options.duration / quickest.duration, 1.0))
+    return stretched(quickest, best_stretch(quickest, scene, options.objective, options.time_value))

@@ -9,6 +9,7 @@ never breaks a limit.
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,11 +163,33 @@ class TimeLaw:
         return s, v0 + tau * (a0 + j * tau / 2), a0 + j * tau
 
 
+class Law(Protocol):
+    """What blending needs of a law, in grid steps."""
+
+    @property
+    def total(self) -> int:
+        """Duration."""
+
+    @property
+    def ramp_up(self) -> int:
+        """Until the speed is constant."""
+
+    @property
+    def ramp_down(self) -> int:
+        """Of braking."""
+
+    def switches(self) -> IntArray:
+        """Where a phase starts or ends, (M,)."""
+
+    def at(self, steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """s, sd, sdd (M,)."""
+
+
 @dataclass(frozen=True)
 class StepLaws:
     """Laws of one straight step: one for all joints (synchronous), or one for each (asynchronous)."""
 
-    laws: tuple[TimeLaw, ...]
+    laws: tuple[Law, ...]
 
     @property
     def total(self) -> int:

@@ -98,6 +98,12 @@ def path_limits(delta: FloatArray, limits: MotionLimits) -> tuple[float, float, 
     return tuple(float(np.min(bound / size)) for bound in (limits.velocity, limits.acceleration, limits.jerk))  # type: ignore[return-value]
 
 
+def free_law(bounds: tuple[float, float, float]) -> TimeLaw:
+    """The fastest law within bounds of the speed of s and its derivatives alone, whatever the torque."""
+    v, a, j = (np.array([bound]) for bound in bounds)
+    return TimeLaw(tuple(int(k) for k in phase_steps(LawLimits(v, a, a, j))[0]))
+
+
 def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics: Dynamics) -> TimeLaw:
     """Law of the shortest synchronous movement from `start` to `goal` (n,).
 
@@ -107,11 +113,11 @@ def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynam
     if np.max(np.abs(delta)) < STILL:
         return TimeLaw((1, 0, 1, 0, 1, 0, 1))
     v, a, j = path_limits(delta, limits)
-    free = phase_steps(_limits(np.array([v]), np.array([a]), np.array([a]), j))
-    use = _torque_of_laws(dynamics, start, delta, free)
+    free = free_law((v, a, j))
+    use = _torque_of_laws(dynamics, start, delta, np.array([free.steps]))
     if use.max() <= limits.torque_share:
-        return TimeLaw(tuple(int(k) for k in free[0]))
-    top = float(law_states(free).sd[0, 3])
+        return free
+    top = float(law_states(np.array([free.steps])).sd[0, 3])
     slower: FloatArray = top * 0.5 ** np.arange(3.0, 9.0)
     best = _best_law(start, delta, top * _SPEEDS, (a, j), limits.torque_share, dynamics)
     if best is None:

@@ -18,7 +18,7 @@ _HALVINGS = 30
 
 
 def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float) -> BoolArray:
-    """Whether the tcp at q (N, n) is in the zone of the station's machine, or within `margin` m of its box."""
+    """Whether the tcp at q (N, n) is in the zone of the station's machine, or within `margin` m of it."""
     zone = scene.zone_of(station)
     tcp = scene.chain.tcp_poses(q)[:, :3, 3]
     local = (tcp - zone.pose[:3, 3]) @ zone.pose[:3, :3]
