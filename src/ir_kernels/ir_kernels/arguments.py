@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ir_kernels.errors import InputError
 
 Array = NDArray[np.float64]
+FLOAT64 = np.dtype(np.float64)
 
 
 def shaped(name: str, value: Any, *shape: int | None) -> Array:
@@ -19,6 +20,10 @@ def shaped(name: str, value: Any, *shape: int | None) -> Array:
     Lists and integers are converted. An array that is not contiguous is refused rather than copied behind the
     caller's back.
     """
+    if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.c_contiguous and value.size:
+        got = value.shape  # the usual case first: a driver comes here a thousand times a second
+        if len(got) == len(shape) and all(w is None or w == g for w, g in zip(shape, got, strict=True)):
+            return value
     if isinstance(value, np.ndarray) and not value.flags.c_contiguous:
         raise InputError(
             f"{name} is not C-contiguous (strides {value.strides}): pass np.ascontiguousarray of it"

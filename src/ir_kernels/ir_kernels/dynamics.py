@@ -55,25 +55,18 @@ class DynamicsModel:
         self.n = self.data.n
         self._core = None if core is None or not hasattr(core, "Dynamics") else core.Dynamics(self.data)
 
-    def _batches(self, **values: ArrayLike) -> list[Array]:
-        arrays = {name: shaped(name, value, None, self.n) for name, value in values.items()}
-        same_length(**arrays)
-        return list(arrays.values())
-
     def _run(self, function: str, **values: ArrayLike) -> Any:
-        """Call the kernel; only when something in its answer is not finite are the arguments searched for
-        it.
-        """
-        arrays = self._batches(**values)
-        if self._core is None:
-            for name, array in zip(values, arrays, strict=True):
-                finite(name, array)
-            return getattr(reference, function)(self.data, *arrays)
-        result, all_finite = getattr(self._core, function)(*arrays)
-        if not all_finite:
-            for name, array in zip(values, arrays, strict=True):
-                finite(name, array)
-        return result
+        """Call the kernel; only when something it read is not finite are the arguments searched for it."""
+        arrays = [shaped(name, value, None, self.n) for name, value in values.items()]
+        if any(len(array) != len(arrays[0]) for array in arrays):
+            same_length(**dict(zip(values, arrays, strict=True)))
+        if self._core is not None:
+            result, all_finite = getattr(self._core, function)(*arrays)
+            if all_finite:
+                return result
+        for name, array in zip(values, arrays, strict=True):
+            finite(name, array)
+        return result if self._core is not None else getattr(reference, function)(self.data, *arrays)
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Motor torque (N,n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
