@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
 
+from ir_description import load_power_data
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.errors import PathError
 from ir_recorder.report.bars import joule_bars
@@ -59,6 +60,7 @@ def report_html(analysis: Analysis, checks: Sequence[Finding], tolerances: Toler
         "tiles": _tiles(analysis, checks),
         "bars": joule_bars(analysis.movements),
         "steps": step_table(analysis.steps),
+        "capacity": text(joules(load_power_data().dc_link_capacity_energy)),
         "stations": station_table(analysis),
         "modes": mode_table(analysis),
         "table2": table_2(analysis),

@@ -58,21 +58,19 @@ def _step(result: StepResult) -> tuple[str, ...]:
 
 def station_table(analysis: Analysis) -> str:
     """Time and energy of every station."""
-    most = max((use.energy for use in analysis.stations), default=0.0)
     rows = [
         (
             text(use.station),
             *(_share(share) for share in (use.travel, use.service, use.rest)),
             f"{use.seconds:.1f} s",
             f"<b>{joules(use.energy)}</b>",
-            _bar(use.energy, most, "station"),
         )
         for use in analysis.stations
     ]
     other = analysis.elsewhere
     if math.isfinite(other.energy):
-        rows.append((text(other.name), DASH, DASH, DASH, f"{other.seconds:.1f} s", joules(other.energy), ""))
-    return table(("station", ">the way there", ">in and out", ">resting", ">time", ">energy", ""), rows)
+        rows.append((text(other.name), DASH, DASH, DASH, f"{other.seconds:.1f} s", joules(other.energy)))
+    return table(("station", ">the way there", ">in and out", ">resting", ">time", ">energy"), rows)
 
 
 def mode_table(analysis: Analysis) -> str:

@@ -65,11 +65,15 @@ class Motion {
     }
     return path;
   }
-  /* An eye that sees robot and machines. */
+  /* An eye that sees the tool's path and the machines. */
   overview() {
-    let reach = 1.5;
-    for (const body of this.bodies) reach = Math.max(reach, Math.min(Math.hypot(body.pose[12], body.pose[13]), 4));
-    return { turn: -0.85, tilt: 0.5, distance: 2.35 * reach + 1.6, target: [0.1, 0, 0.85] };
+    const low = [-0.5, -0.5, 0], high = [0.5, 0.5, 1.8];
+    const take = (p) => p.forEach((v, i) => { low[i] = Math.min(low[i], Math.max(v, -5)); high[i] = Math.max(high[i], Math.min(v, 5)); });
+    for (let i = 0; i < this.path.length; i += 3) take([...this.path.subarray(i, i + 3)]);
+    for (const { point } of this.scene.labels) take(point);
+    const target = low.map((v, i) => (v + high[i]) / 2), radius = Math.hypot(...low.map((v, i) => (high[i] - v) / 2));
+    target[2] *= 0.82;
+    return { turn: -0.85, tilt: 0.42, distance: Math.max(2.75 * radius, 4), target };
   }
   look(name) {
     const views = { iso: this.home, top: { ...this.home, turn: -Math.PI / 2, tilt: 1.5533 }, side: { ...this.home, turn: -Math.PI / 2, tilt: 0.06 } };
