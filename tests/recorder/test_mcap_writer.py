@@ -90,6 +90,15 @@ def test_cdr_bytes_are_kept_as_they_came(tmp_path: Path) -> None:
     assert read_raw(summary.path).channel("/joint_states").messages == (data,) * 3
 
 
+def test_times_never_run_back_but_for_a_clock_that_was_set_back(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.mcap")
+    channel = writer.register("/joint_states", JOINT_STATE)
+    for time in (5_000_000_000, 4_999_000_000, 6_000_000_000, 1_000_000_000, 1_100_000_000):
+        writer.write(channel, time, b"\0\1\0\0")
+    times = read_raw(writer.finish().path).channel("/joint_states").log_time.tolist()
+    assert times == [5_000_000_000, 5_000_000_000, 6_000_000_000, 1_000_000_000, 1_100_000_000]
+
+
 def test_an_existing_file_is_kept_unless_told_otherwise(tmp_path: Path) -> None:
     path = tmp_path / "mine.mcap"
     path.write_text("mine")

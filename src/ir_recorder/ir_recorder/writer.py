@@ -21,6 +21,7 @@ from ir_recorder.qos import QosOffer, offers_to_yaml
 from ir_recorder.schemas import SchemaLibrary
 
 CHUNK_SIZE = 256 * 1024  # bytes: about 1.5 s of a cell; what a power cut may cost
+REORDERED = 1_000_000_000  # ns
 _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 
 
@@ -51,6 +52,7 @@ class RecordingWriter:
         self._sequence: dict[int, int] = {}
         self._first: int | None = None
         self._last = 0
+        self._newest = 0
         self._messages = 0
         self._failure: WriteError | None = None
         self._finished = False
@@ -81,10 +83,14 @@ class RecordingWriter:
         return channel
 
     def write(self, channel: int, log_time: int, data: bytes, publish_time: int | None = None) -> None:
-        """Appends one message's CDR bytes. Times that run back are set to the latest: players read in file
-        order.
+        """Appends one message's CDR bytes.
+
+        Players read in file order, so a time that runs back by less than REORDERED is set to the newest;
+        more is a clock that was set back, and kept.
         """
-        log_time = max(log_time, self._last)
+        if 0 < self._newest - log_time < REORDERED:
+            log_time = self._newest
+        self._newest = log_time
         with self._storage():
             self._writer.add_message(
                 channel,

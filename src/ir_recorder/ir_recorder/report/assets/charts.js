@@ -178,9 +178,22 @@ class PowerChart extends TimeChart {
   draw() {
     const g = this.begin();
     this.timeAxis(g);
+    this.drawBands(g);
     this.drawLanes(g);
     if (this.power) this.drawPower(g);
     this.cursor(g);
+  }
+  /* The modes as a tint behind the power curve. */
+  drawBands(g) {
+    const lane = this.lanes.find((l) => l.label === "mode");
+    this.plot(g);
+    g.globalAlpha = 0.11;
+    for (const [from, to, , style] of lane ? lane.spans : []) {
+      if (to < this.timeline.from || from > this.timeline.to) continue;
+      g.fillStyle = spanColour(style);
+      g.fillRect(this.x(from), this.top, this.x(to) - this.x(from), this.height - this.bottom - this.top);
+    }
+    g.restore();
   }
   drawLanes(g) {
     let y = 2;
