@@ -30,6 +30,7 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.ros.conversions import configuration_from_msg, pose_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from rclpy.action import ActionServer, CancelResponse
@@ -38,7 +39,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallb
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from visualization_msgs.msg import Marker, MarkerArray
@@ -78,7 +79,7 @@ class PlannerNode(Node):
         parameters = PlannerParameters(self, self._change_settings, self._change_pauses)
         make = make_planner or (lambda settings, pauses: Planner(time.monotonic, settings, pauses))
         self.planner = make(parameters.planner, parameters.pauses)
-        self._last_state = LastState()
+        self._last_state = LastState(look=self._look)
         self._requests = Requests(
             self.planner,
             self._last_state,
@@ -97,10 +98,7 @@ class PlannerNode(Node):
         self._quick = MutuallyExclusiveCallbackGroup()
         self._long = MutuallyExclusiveCallbackGroup()
         self._offer()
-        newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self.create_subscription(
-            JointState, names.JOINT_STATES, self._take_state, newest, callback_group=self._quick
-        )
+        self._states = LatestMessage(self, JointState, names.JOINT_STATES)
         self.create_timer(1.0, self._diagnose, callback_group=self._quick)
         self._load_first_cell(parameters.planner.cell)
 
@@ -153,16 +151,17 @@ class PlannerNode(Node):
             goal.abort()
         return result
 
-    def _take_state(self, msg: JointState) -> None:
+    def _look(self) -> None:
         """Remember where the robot is; a message about another robot's joints is none."""
-        if not self.planner.has_cell:
+        received = self._states.take() if self.planner.has_cell else None
+        if received is None:
             return
         try:
-            q = configuration_from_msg(msg, self.planner.cell.robot.joint_names)
+            q = configuration_from_msg(received.message, self.planner.cell.robot.joint_names)
         except InvalidValueError as error:
             self._last_state.problem = str(error)
             return
-        self._last_state.take(q, time.monotonic())
+        self._last_state.take(q, time.monotonic() - received.age)
 
     def _change_settings(self, settings: PlannerSettings) -> None:
         self.planner.settings = settings
@@ -196,6 +195,7 @@ class PlannerNode(Node):
         )
 
     def _diagnose(self) -> None:
+        self._look()
         cell = self.planner.cell.name if self.planner.has_cell else ""
         slow = compiled.NAME == "reference"
         status = DiagnosticStatus(

@@ -1,5 +1,6 @@
 """What requests say, as values: states, goals, poses, options, trajectories. Nothing here is planned."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
@@ -33,9 +34,10 @@ FloatArray = NDArray[np.float64]
 @dataclass
 class LastState:
     """The last joint_states, and when it came [s on the node's clock]; written and read by different
-    threads.
+    threads. look: takes what has come since the last look.
     """
 
+    look: Callable[[], None] = lambda: None
     q: FloatArray | None = None
     came: float = 0.0
     problem: str = ""
@@ -48,13 +50,14 @@ class LastState:
 
     def fresh(self, now: float, max_age: float) -> FloatArray:
         """The state (n,). Raises RequestError when there is none, or an old one."""
+        self.look()
         with self._lock:
-            q, age = self.q, now - self.came
+            q, age = self.q, max(0.0, now - self.came)
         if q is None:
             raise RequestError(
                 StatusCode.ROBOT_STATE_STALE, "no joint_states have come yet: give the state in the request"
             )
-        if not 0.0 <= age <= max_age:
+        if age > max_age:
             raise RequestError(
                 StatusCode.ROBOT_STATE_STALE,
                 f"the last joint_states came {age:.1f} s ago: it must be at most {max_age:g} s; "
