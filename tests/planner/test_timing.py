@@ -16,8 +16,11 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.asynchronous import own_laws
 from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, stretched
 from ir_planner.budget import Budget
+from ir_planner.energy import movement_energy
 from ir_planner.errors import RequestError
+from ir_planner.level_timing import fastest
 from ir_planner.movement import timed_movement
+from ir_planner.objective import best_stretch
 from ir_planner.scene import PlanningScene
 from ir_planner.spline_timing import time_spline
 from ir_planner.time_law import StepLaws, TimeLaw
@@ -205,3 +208,20 @@ def test_limits_scale_with_the_request() -> None:
     one = np.ones(2)
     scaled = MotionLimits(one, 2 * one, 3 * one).scaled(0.5, 0.25)
     assert (scaled.velocity[0], scaled.acceleration[0], scaled.jerk[0]) == (0.5, 0.5, 0.75)
+
+
+@pytest.mark.parametrize(("start", "goal"), MOVES[:3])
+def test_where_joules_count_the_best_shape_is_taken(
+    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+) -> None:
+    """The fastest law stretched is one of the candidates: never worse than it."""
+    path = np.stack([degrees(*start), degrees(*goal)])
+    options = PlanOptions(safety_distance=0.0)
+    report = timed_movement(path, demo_scene, options, budget).evaluation.report
+    law = fastest(path[0], path[1], demo_scene.limits, demo_scene.dynamics)
+    quickest = blended(TimedPath(path, (StepLaws((law,)),), ()), NAMES)
+    factor = best_stretch(quickest, demo_scene, "time_and_energy", options.time_value)
+    alone = stretched(quickest, factor)
+    value = report.energy + options.time_value * report.duration
+    other = movement_energy(alone, demo_scene).total + options.time_value * alone.duration
+    assert value <= other * 1.002, "coarse sampling of the candidates may cost a trifle, no more"

@@ -8,6 +8,7 @@ interpolated.
 """
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,15 +24,18 @@ from ir_planner.clearance_checks import clearance_violation
 from ir_planner.errors import RequestError
 from ir_planner.level_timing import fastest
 from ir_planner.limit_checks import Violation
-from ir_planner.objective import best_stretch
+from ir_planner.objective import best_stretch, pace_value
 from ir_planner.polynomials import extremes
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene
-from ir_planner.time_law import GRID_S, StepLaws
-from ir_planner.timing import STILL, MotionLimits, torque_per_segment
+from ir_planner.time_law import GRID_S, Law, StepLaws
+from ir_planner.timing import STILL, Dynamics, MotionLimits, fastest_law, torque_per_segment
 
 FloatArray = NDArray[np.float64]
 _TORQUE_SHARES = (0.98, 0.95, 0.9, 0.8)
+MakeLaw = Callable[[FloatArray, FloatArray, MotionLimits, Dynamics], Law]
+# how steps are timed, and the share of the acceleration they may use; the fastest first
+_SHAPES: tuple[tuple[MakeLaw, float], ...] = ((fastest, 1.0), (fastest_law, 1.0), (fastest_law, 0.6))
 _CUTS = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.0)
 _DURATION_SLACK = 1e-6
 
@@ -72,9 +76,7 @@ def timed_movement(
         limits = scene.limits.scaled(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
-        quickest, note = _fastest(waypoints, scene, options, limits, budget, station)
-        budget.check()
-        trajectory = stretched_to_wish(quickest, scene, options)
+        trajectory, note = _paced(waypoints, scene, options, limits, budget, station)
         budget.check()
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
@@ -95,6 +97,39 @@ def distinct(waypoints: FloatArray) -> FloatArray:
     return result
 
 
+def _paced(
+    waypoints: FloatArray,
+    scene: PlanningScene,
+    options: PlanOptions,
+    limits: MotionLimits,
+    budget: Budget,
+    station: str,
+) -> tuple[JointTrajectory, str]:
+    """The trajectory in the shape and at the duration that the objective likes best.
+
+    The fastest shape is not always the one that costs the least joules once it is stretched.
+    """
+    best: tuple[float, JointTrajectory, str] | None = None
+    for law, share in _SHAPES if _joules_count(options) else _SHAPES[:1]:
+        budget.check()
+        gentle = limits.scaled(1.0, share)
+        quickest, note = _fastest(waypoints, scene, options, gentle, budget, station, law)
+        if best is not None and 0.0 < options.duration < quickest.duration:
+            continue
+        trajectory = stretched_to_wish(quickest, scene, options)
+        if not _joules_count(options):
+            return trajectory, note
+        value = pace_value(trajectory, scene, options.objective, options.time_value)
+        if best is None or value < best[0]:
+            best = (value, trajectory, note)
+    assert best is not None  # the first shape is taken or refused
+    return best[1], best[2]
+
+
+def _joules_count(options: PlanOptions) -> bool:
+    return options.duration > 0.0 or options.objective in ("energy", "time_and_energy")
+
+
 def _fastest(
     waypoints: FloatArray,
     scene: PlanningScene,
@@ -102,6 +137,7 @@ def _fastest(
     limits: MotionLimits,
     budget: Budget,
     station: str,
+    law: MakeLaw,
 ) -> tuple[JointTrajectory, str]:
     names, dynamics = scene.cell.robot.joint_names, scene.dynamics
     steps = list(itertools.pairwise(waypoints))
@@ -113,7 +149,7 @@ def _fastest(
         if blocked is None:
             return trajectory, note
         note = f"asynchronous timing is not free ({blocked.sentence}), so the timing is synchronous"
-    laws = tuple(StepLaws((fastest(a, b, limits, dynamics),)) for a, b in steps)
+    laws = tuple(StepLaws((law(a, b, limits, dynamics),)) for a, b in steps)
     return _cut_corners(waypoints, laws, scene, options, limits, budget, station), note
 
 

@@ -29,15 +29,19 @@ def objective_value(report: TrajectoryReport, objective: str, time_value: float)
     return values[objective]
 
 
+def pace_value(trajectory: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
+    """J of a trajectory at the pace it has, or its joules where the objective is not J; sampled coarsely."""
+    joules = movement_energy(trajectory, scene, _COARSE_STEP).total
+    return joules + (time_value * trajectory.duration if objective == "time_and_energy" else 0.0)
+
+
 def best_stretch(fastest: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
     """Factor >= 1 on the duration of the fastest movement that minimises the objective."""
     if objective in ("time", "movement_cost"):
         return 1.0
-    value = 0.0 if objective == "energy" else time_value
 
     def cost(factor: float) -> float:
-        slower = stretched(fastest, factor)
-        return movement_energy(slower, scene, _COARSE_STEP).total + value * slower.duration
+        return pace_value(stretched(fastest, factor), scene, objective, time_value)
 
     costs = [cost(float(factor)) for factor in _FACTORS]
     k = int(np.argmin(costs))

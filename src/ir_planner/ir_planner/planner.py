@@ -269,7 +269,8 @@ class Planner:
             self.settings.regeneration,  # type: ignore[arg-type]
             self.pauses,
         )
-        plan = plan_program(request, self._budget(options, cancelled), progress)
+        movements = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
+        plan = plan_program(request, self._budget(options, cancelled, movements), progress)
         if plan.status.ok:
             for movement in plan.movements:
                 if movement.trajectory is not None:
@@ -282,9 +283,9 @@ class Planner:
             self.trajectories.add(plan.trajectory)
         return replace(plan, info=_noted(plan.info, note))
 
-    def _budget(self, options: PlanOptions, cancelled: Callable[[], bool]) -> Budget:
-        work = options.max_iterations or self.settings.max_iterations
-        return Budget(work, self.clock() + options.planning_time, self.clock, cancelled)
+    def _budget(self, options: PlanOptions, cancelled: Callable[[], bool], movements: int = 1) -> Budget:
+        work = (options.max_iterations or self.settings.max_iterations) * movements
+        return Budget(work, self.clock() + options.planning_time * movements, self.clock, cancelled)
 
 
 def _noted(info: PlanningInfo, note: str) -> PlanningInfo:
