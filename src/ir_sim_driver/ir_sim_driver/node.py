@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +57,11 @@ from ir_sim_driver.shapes import Shape, shapes_of
 from ir_sim_driver.simulation import Simulation
 from ir_sim_driver.wake_on_lan import WakeListener
 
+try:  # where a ROS installation has it
+    from control_msgs.action import FollowJointTrajectory
+except ImportError:
+    FollowJointTrajectory = None
+
 if TYPE_CHECKING:
     from ir_sim_driver.modbus import ModbusServer
 
@@ -84,6 +90,7 @@ class SimDriver(Node):
         steps = round(1.0 / (options.joint_state_rate * self._simulation.settings.dt))
         self._driver = Driver(self._simulation, steps)
         self._goals: dict[bytes, int] = {}
+        self._canceled: set[bytes] = set()
         self._frame: Frame | None = None
         self._open_topics()
         self._open_requests()
@@ -123,7 +130,8 @@ class SimDriver(Node):
         if self._modbus is not None:
             self._modbus.close()
         self._driver.close()
-        self._action.destroy()
+        for action in self._actions:
+            action.destroy()
         super().destroy_node()
 
     def _open_topics(self) -> None:
@@ -144,13 +152,9 @@ class SimDriver(Node):
         self._publish_description()
 
     def _open_requests(self) -> None:
-        self._action = ActionServer(
-            self,
-            ExecuteTrajectory,
-            names.EXECUTE_TRAJECTORY,
-            self._execute,
-            cancel_callback=self._cancel,
-        )
+        self._actions = [self._serve_action(ExecuteTrajectory, names.EXECUTE_TRAJECTORY)]
+        if FollowJointTrajectory is not None:
+            self._actions.append(self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY))
         answers = Services(
             self._driver, self.get_name(), self._configuration.node.mac, self._publish_description
         )
@@ -236,8 +240,14 @@ class SimDriver(Node):
 
     # the action
 
-    async def _execute(self, handle: Any) -> Any:
-        result = ExecuteTrajectory.Result()
+    def _serve_action(self, action_type: Any, name: str) -> ActionServer:
+        async def execute(handle: Any) -> Any:
+            return await self._execute(handle, action_type)
+
+        return ActionServer(self, action_type, name, execute, cancel_callback=self._cancel)
+
+    async def _execute(self, handle: Any, action_type: Any) -> Any:
+        result = action_type.Result()
         done = Future(executor=self.executor)
         key = bytes(handle.goal_id.uuid)
         limit = self._simulation.settings.execution.max_points
@@ -245,7 +255,7 @@ class SimDriver(Node):
 
         def started(goal_id: int) -> None:
             self._goals[key] = goal_id
-            if handle.is_cancel_requested:
+            if key in self._canceled:
                 self._simulation.cancel(goal_id)
 
         def ended(outcome: Outcome) -> None:
@@ -254,12 +264,14 @@ class SimDriver(Node):
                 self.executor.wake()
 
         self._driver.submit(lambda: goal_from_action(request, limit), started, ended)
-        feedback = self.create_timer(0.05, lambda: self._publish_feedback(handle, key))
+        feedback = self.create_timer(0.05, lambda: self._publish_feedback(handle, key, action_type))
         outcome: Outcome = await done
         self.destroy_timer(feedback)
         self._goals.pop(key, None)
+        self._canceled.discard(key)
         result.error_code, result.error_string = int(outcome.code), outcome.sentence
-        result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
+        if action_type is ExecuteTrajectory:
+            result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
         if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):
             handle.canceled()
         elif outcome.code is ErrorCode.SUCCESSFUL:
@@ -269,19 +281,21 @@ class SimDriver(Node):
         return result
 
     def _cancel(self, handle: Any) -> CancelResponse:
-        goal_id = self._goals.get(bytes(handle.goal_id.uuid))
+        key = bytes(handle.goal_id.uuid)
+        self._canceled.add(key)  # for a goal that is still being checked
+        goal_id = self._goals.get(key)
         if goal_id is not None:
             with self._driver.locked() as simulation:
                 simulation.cancel(goal_id)
         return CancelResponse.ACCEPT
 
-    def _publish_feedback(self, handle: Any, key: bytes) -> None:
+    def _publish_feedback(self, handle: Any, key: bytes, action_type: Any) -> None:
         with self._driver.locked() as simulation:
             if simulation.executor.goal_id is None or simulation.executor.goal_id != self._goals.get(key):
                 return
             backend = simulation.backend
             following = simulation.executor.following(backend.q, backend.qd)
-        feedback = ExecuteTrajectory.Feedback(joint_names=self._joint_names)
+        feedback = action_type.Feedback(joint_names=self._joint_names)
         feedback.header.stamp = self.get_clock().now().to_msg()
         fill_points(feedback.desired, feedback.actual, feedback.error, following)
         handle.publish_feedback(feedback)
@@ -372,6 +386,8 @@ def main() -> None:
     except (DriverError, DescriptionError, MsgsError) as error:
         sys.exit(f"ir_sim_driver: {error}")
     finally:
+        for number in (signal.SIGINT, signal.SIGTERM):  # a second one must not cut the clean-up short
+            signal.signal(number, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()

@@ -10,6 +10,7 @@ from ir_msgs_py.settings import check_settings, setting
 from rclpy.node import Node
 
 from ir_sim_driver.control import ControlSettings
+from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.plc import PlcSettings
 from ir_sim_driver.power_modes import TransitionSettings
@@ -78,7 +79,7 @@ class NodeSettings:
         check_settings(self)
         mac_bytes(self.mac)
         if 1000 % self.joint_state_rate:
-            raise ValueError(f"joint_state_rate is {self.joint_state_rate} Hz: it must divide 1000 Hz")
+            raise SettingsError(f"joint_state_rate is {self.joint_state_rate} Hz: it must divide 1000 Hz")
 
 
 class DriverParameters:

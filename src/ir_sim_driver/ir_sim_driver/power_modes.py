@@ -155,8 +155,9 @@ def rests_of(settings: TransitionSettings) -> tuple[Rest, ...]:
 class PowerModes:
     """The state machine; `step` advances it by dt [s].
 
-    mode: present mode. source: the rest (or STAND_ON_MOTORS) that a transition left: its power counts while
-    entering.
+    mode: present mode. source: the rest (or STAND_ON_MOTORS) that a transition left. level: the rest, or
+    STAND_ON_MOTORS, whose power the controller draws now; on the way into a rest that of the source.
+    motors_on: whether the motors follow commands.
     """
 
     def __init__(self, settings: TransitionSettings, start: Mode = Mode.STAND_ON_MOTORS) -> None:

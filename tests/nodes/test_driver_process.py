@@ -1,0 +1,71 @@
+"""The driver as a process: it says what is wrong with its parameters, and it ends when it is told to."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+import rclpy
+from ir_msgs.msg import PowerState
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from ir_msgs_py import names
+
+
+def command(**parameters):
+    words = [sys.executable, "-m", "ir_sim_driver.node", "--ros-args"]
+    for name, value in {"cell": "open", "backend": "ideal", "wake_port": 0, **parameters}.items():
+        words += ["-p", f"{name}:={value}"]
+    return words
+
+
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        ({"cell": "nowhere"}, "known are"),
+        ({"mac": "abc"}, "six hex bytes"),
+        ({"joint_state_rate": 300}, "must divide 1000 Hz"),
+        ({"backend": "ode"}, "known are pybullet, ideal"),
+        ({"load": "anvil"}, "anvil"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_ends_the_start_with_a_sentence(parameters, sentence):
+    answer = subprocess.run(command(**parameters), capture_output=True, text=True, timeout=60, check=False)
+    assert answer.returncode == 1
+    assert sentence in answer.stderr
+    assert "Traceback" not in answer.stderr
+
+
+@pytest.mark.parametrize(
+    "signals", [[signal.SIGINT], [signal.SIGTERM, signal.SIGTERM], [signal.SIGINT, signal.SIGTERM]]
+)
+def test_signals_end_it_cleanly_also_two(signals, wait_for):
+    """Wait for its meter, then signal: exit code 0."""
+    context = Context()
+    rclpy.init(context=context)
+    node = Node("listener", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    heard = []
+    node.create_subscription(PowerState, names.POWER_STATE, heard.append, 10)
+    process = subprocess.Popen(command(modbus="true", modbus_port=0), stderr=subprocess.PIPE, text=True)
+    try:
+
+        def power():
+            executor.spin_once(timeout_sec=0.1)
+            return heard
+
+        wait_for(power, timeout=60.0)
+        for number in signals:
+            process.send_signal(number)
+        assert process.wait(30.0) == 0
+        assert process.stderr is not None
+        assert "Traceback" not in process.stderr.read()
+    finally:
+        process.kill()
+        node.destroy_node()
+        context.try_shutdown()
