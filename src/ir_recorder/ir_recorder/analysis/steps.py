@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from ir_msgs_py.report import MovementKind, PlannedMovement
 
+from ir_recorder.cdr import Numbers
 from ir_recorder.recording import ControllerSeries, ProgramEvent, Recording
 
 STARTED = "started"
 OPEN = "open"  # no end was recorded
-_SLACK = 0.2  # s between an event of the runner and the executor's first state of that trajectory
+_FEWEST = 3  # states of the executor that tell when a trajectory began and ended
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +51,25 @@ class ExecutedStep:
 
 
 def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
-    """All steps that started, in the order of time."""
-    steps = []
+    """All steps that started, in the order of time.
+
+    The runner's events come later than the robot's stamps where the machine is busy. A pause is moved back by
+    what the end of the movement before it came late, and ends at the latest when the robot moves again.
+    """
+    steps: list[ExecutedStep] = []
+    runs, late = _Runs(recording.controller), 0.0
     for position, event in enumerate(recording.events):
         if event.event != STARTED:
             continue
         end = _end_of(event, recording.events[position + 1 :])
         last = end.time if end else max(recording.duration, event.time)
-        start, stop = _motion(recording.controller, event, last)
+        ran = runs.next_of(event.movement)
+        if ran is not None:
+            late = max(0.0, last - ran[1]) if end else 0.0
+            if steps and steps[-1].movement.is_pause:
+                pause = steps[-1]
+                steps[-1] = replace(pause, end=max(pause.start, min(pause.end, ran[0])))
+        start, stop = ran or (event.time - late, last - late)
         steps.append(
             ExecutedStep(
                 event.index, event.movement, start, stop, end.event if end else OPEN, end.note if end else ""
@@ -73,18 +85,40 @@ def _end_of(start: ProgramEvent, later: tuple[ProgramEvent, ...]) -> ProgramEven
     return None
 
 
-def _motion(controller: ControllerSeries | None, event: ProgramEvent, end: float) -> tuple[float, float]:
-    """The times at which path time 0 and the last path time of the step's trajectory were commanded."""
-    wanted = event.movement.trajectory_id
-    if controller is None or not wanted:
-        return event.time, end
-    own = np.array([trajectory_id == wanted for trajectory_id in controller.trajectory_id], dtype=bool)
-    own &= (controller.time >= event.time - _SLACK) & (controller.time <= end + _SLACK)
-    own &= controller.path_time > 0.0
-    if own.sum() < 2:
-        return event.time, end
-    time, path = controller.time[own], controller.path_time[own]
-    if np.allclose(controller.speed_scaling[own], 1.0):
-        start = float(np.median(time - path))
-        return start, start + (event.movement.report.duration or event.movement.duration or end - start)
-    return float(time[0] - path[0]), float(time[-1])
+class _Runs:
+    """When each trajectory was run, from the executor's path time: in the robot's own time."""
+
+    def __init__(self, controller: ControllerSeries | None) -> None:
+        self._runs: dict[str, list[tuple[Numbers, Numbers]]] = {}
+        if controller is None:
+            return
+        ids = np.array(controller.trajectory_id, dtype=object)
+        begins = (ids[1:] != ids[:-1]) | (np.diff(controller.path_time) < 0.0)
+        for run in np.split(np.arange(len(ids)), np.flatnonzero(begins) + 1):
+            moving = run[controller.path_time[run] > 0.0]
+            if len(moving) >= _FEWEST and ids[moving[0]]:
+                times = controller.time[moving], controller.path_time[moving]
+                self._runs.setdefault(ids[moving[0]], []).append(times)
+
+    def next_of(self, movement: PlannedMovement) -> tuple[float, float] | None:
+        """Start and end [s] of the movement's trajectory in its next run; None where it wasn't recorded.
+
+        Both are extrapolated at the speed seen at that end of the path to path time 0 and to the planned
+        duration; a run that stopped well before its end ends where it stopped.
+        """
+        runs = self._runs.get(movement.trajectory_id, [])
+        if not runs:
+            return None
+        time, path = runs.pop(0)
+        start = _extrapolated(time[:_FEWEST], path[:_FEWEST], 0.0)
+        last = time[-_FEWEST:], path[-_FEWEST:]
+        end = _extrapolated(*last, movement.report.duration or movement.duration)
+        return start, end if end - time[-1] <= 2.0 * (last[0][-1] - last[0][0]) else float(time[-1])
+
+
+def _extrapolated(time: Numbers, path: Numbers, at: float) -> float:
+    """Time [s] at which the path time reaches `at`, by the mean speed of these samples."""
+    moved = path[-1] - path[0]
+    if moved <= 0.0:
+        return float(time[-1])
+    return float(time[0] + (at - path[0]) * (time[-1] - time[0]) / moved)
