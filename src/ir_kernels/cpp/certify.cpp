@@ -89,19 +89,20 @@ template <class V> struct Proof {
   S margin;
   bool tight;            // the bound is wanted: nothing may be skipped that could lower it
   std::vector<V> moved;  // capsule x (n + 1): how far it moves, seen from each link up to its own
+  std::vector<Float16> far;
   V above, proved, doubtful_moved;
   Mask<V> nearest, doubtful;
 
   Proof(const Model& m, const S* threshold, S highest, S rounding, bool with_bound)
       : shift(threshold), highest_shift(highest), model(m), margin(rounding), tight(with_bound),
-        moved(m.capsules.size() * (m.chain.n + 1)) {}
+        moved(m.capsules.size() * (m.chain.n + 1)), far(m.capsules.size() / 16 + 1) {}
 
   IR_INLINE V outside(int c) const { return allowed(moved[c * (model.chain.n + 1)]); }
   IR_INLINE V own(std::size_t i) const {
     const SelfPair& pair = model.self_pairs[i];
     return allowed(moved[pair.outer * (model.chain.n + 1) + model.capsules[pair.inner].link]);
   }
-  IR_INLINE S farthest(int c) const { return highest<V>(outside(c)); }
+  IR_INLINE Float16 farthest(std::size_t first) const { return tight ? splat<Float16>(1e15f) : far[first / 16]; }
   IR_INLINE V allowed(V m) const { return m + margin + (tight ? max(proved, V{}) : V{}); }
   IR_INLINE bool done() const { return false; }
 
@@ -139,6 +140,7 @@ template <class V> struct Proof {
         m = m + spread[j] * (reach + m + margin);
         to[j] = m;
       }
+      far[c / 16][c % 16] = static_cast<float>(highest<V>(m)) * 1.00001f + static_cast<float>(margin + highest_shift);
     }
   }
 

@@ -1,5 +1,6 @@
 #include "chain.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ir {
@@ -72,7 +73,11 @@ void Chain::forward(const Double8* q, Frame<Double8>* frames) const {
   f.x = column(0), f.y = column(1), f.z = column(2);
   f.origin = Vec<Double8>{};
   frames[0] = f;
+  Double8 sines[most_at_once], cosines[most_at_once];
   for (int k = 0; k < n; ++k) {
+    if (k % most_at_once == 0) {  // ahead of the chain: they don't wait for each other
+      for (int j = k; j < std::min(n, k + most_at_once); ++j) sincos(q[j], sines[j - k], cosines[j - k]);
+    }
     const Joint& joint = joints[k];
     const Vec<Double8> columns[3] = {f.x, f.y, f.z}, origin = place(f, joint.shift);
     Vec<Double8> turned[3];
@@ -84,8 +89,7 @@ void Chain::forward(const Double8* q, Frame<Double8>* frames) const {
                     splat<Double8>(joint.turn[6 + j]) * f.z;
       }
     }
-    Double8 s, c;
-    sincos(q[k], s, c);
+    const Double8 s = sines[k % most_at_once], c = cosines[k % most_at_once];
     f.x = c * turned[0] + s * turned[1];
     f.y = c * turned[1] - s * turned[0];
     f.z = turned[2];

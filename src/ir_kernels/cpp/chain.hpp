@@ -34,6 +34,9 @@ struct Chain {
 
   // frames[0..n] at q[0..n-1]
   void forward(const Double8* q, Frame<Double8>* frames) const;
+
+ private:
+  static constexpr int most_at_once = 16;  // joints whose sines are computed ahead
 };
 
 template <class V> IR_INLINE Vec<V> place(const Frame<V>& f, const double p[3]) {

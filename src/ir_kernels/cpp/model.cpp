@@ -83,17 +83,19 @@ void Model::finish() {
   split(order, 0, static_cast<int>(order.size()), centre);
   const float infinity = std::numeric_limits<float>::infinity();
   for (std::size_t first = 0; first < order.size(); first += 16) {
-    Leaf leaf;
-    for (int i = 0; i < 3; ++i) leaf.low[i] = leaf.high[i] = splat<Float16>(infinity);
-    for (int lane = 0; lane < 16; ++lane) {
-      leaf.body[lane] = -1;
-      if (first + lane >= order.size()) continue;
-      const int k = leaf.body[lane] = order[first + lane];
+    Leaf leaf{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}, {}};
+    for (std::size_t at = first; at < std::min(first + 16, order.size()); ++at) {
+      const int k = order[at];
+      Box box{};
+      box.body = k;
       for (int i = 0; i < 3; ++i) {
         const double slack = 1e-6 * (1.0 + std::fabs(centre[k][i]) + radius[k][i]);
-        leaf.low[i][lane] = static_cast<float>(centre[k][i] - radius[k][i] - slack);
-        leaf.high[i][lane] = static_cast<float>(centre[k][i] + radius[k][i] + slack);
+        box.low[i] = static_cast<float>(centre[k][i] - radius[k][i] - slack);
+        box.high[i] = static_cast<float>(centre[k][i] + radius[k][i] + slack);
+        leaf.low[i] = std::min(leaf.low[i], box.low[i]);
+        leaf.high[i] = std::max(leaf.high[i], box.high[i]);
       }
+      leaf.boxes.push_back(box);
     }
     leaves.push_back(leaf);
   }
@@ -140,8 +142,10 @@ template <class V> IR_INLINE void narrow(const Vec<Double8>& low, const Vec<Doub
 template <class V> void Placement<V>::place(const double* const* rows, int count) {
   const int n = model_.chain.n;
   for (int part = 0; part < Lanes<V>::width / 8; ++part) {
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; k < 8; ++k) q_[j][k] = rows[std::min(8 * part + k, count - 1)][j];
+    for (int k = 0; k < 8; ++k) {
+      const double* row = rows[std::min(8 * part + k, count - 1)];
+      for (int j = 0; j < n; ++j) q_[j][k] = row[j];
+    }
     model_.chain.forward(q_.data(), exact[part].data());
   }
   const auto& high = exact[Lanes<V>::width / 8 - 1];

@@ -33,10 +33,14 @@ struct SelfPair {
   double around;     // sum of the radii and half lengths
 };
 
-// Sixteen bodies' boxes in the world (relative to the base's origin), for culling; unused places are at infinity.
+// Boxes along the world's axes (relative to the base's origin), for culling: of a body, and of up to sixteen neighbours.
+struct Box {
+  float low[3], high[3];
+  int body;
+};
 struct Leaf {
-  Float16 low[3], high[3];
-  std::int32_t body[16];
+  float low[3], high[3];
+  std::vector<Box> boxes;
 };
 
 class Model {

@@ -28,7 +28,9 @@ template <class V> struct Nearest {
 
   IR_INLINE V outside(int) const { return best + slack_of(V{}); }
   IR_INLINE V own(std::size_t) const { return best + slack_of(V{}); }
-  IR_INLINE S farthest(int) const { return limit + slack_of(V{}); }
+  IR_INLINE Float16 farthest(std::size_t) const {
+    return splat<Float16>(static_cast<float>(limit + highest_shift + slack_of(V{})));
+  }
   IR_INLINE bool done() const { return false; }
   IR_INLINE void take(int z, int, V distance) {
     const V excess = distance - shift[z];
@@ -51,7 +53,9 @@ template <class V> struct Above {
     return free ? V{} + slack_of(V{}) : V{} - std::numeric_limits<S>::infinity();
   }
   IR_INLINE V own(std::size_t) const { return outside(0); }
-  IR_INLINE S farthest(int) const { return slack_of(V{}); }
+  IR_INLINE Float16 farthest(std::size_t) const {
+    return splat<Float16>(static_cast<float>(highest_shift + slack_of(V{})));
+  }
   IR_INLINE bool done() const { return !any(free); }
   IR_INLINE void take(int z, int, V distance) { free = free & (distance > shift[z]); }
 };

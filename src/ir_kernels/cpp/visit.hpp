@@ -2,9 +2,13 @@
 //
 // A policy says how far is near enough: a pair z of capsule c may be skipped where its distance certainly exceeds
 // outside(c) + shift[z] (self pair i: own(i) + shift[z]) in every lane; else take(z, c or i, distance) gets the exact
-// values. farthest(c) is the highest lane of outside(c).
+// values. farthest(first) is the highest lane of outside(c) +
+// the highest shift, for sixteen capsules from `first`.
 // shift[z] = -inf: the pair doesn't count.
 #pragma once
+
+#include <algorithm>
+#include <limits>
 
 #include "model.hpp"
 
@@ -50,40 +54,69 @@ IR_INLINE void visit_body(const Model& model, const State<V>& s, int c, int body
 }
 
 template <class V, class Policy>
-IR_INLINE void visit_environment(const Model& model, const State<V>& s, int c, Policy& policy) {
+IR_INLINE void visit_planes(const Model& model, const State<V>& s, Policy& policy) {
   using S = Scalar<V>;
-  const Capsule& capsule = model.capsules[c];
-  const S radius = static_cast<S>(capsule.radius);
   for (const int body : model.planes) {
-    const std::int32_t z = model.pair_of[c * model.kind.size() + body];
-    if (z < 0 || policy.shift[z] == -std::numeric_limits<S>::infinity()) continue;
     const Body<S>& f = model.bodies<S>()[body];
     const auto height = [&](const Vec<V>& p) {
       return f.axis[2][0] * p.x + (f.axis[2][1] * p.y + (f.axis[2][2] * p.z - f.offset[2]));
     };
-    const V distance = min(height(s.a[c]), height(s.b[c])) - radius;
-    if (any_not_above<V>(distance, policy.outside(c) + policy.shift[z])) policy.take(z, c, distance);
+    for (int c = static_cast<int>(model.capsules.size()) - 1; c >= 0; --c) {
+      const std::int32_t z = model.pair_of[c * model.kind.size() + body];
+      if (z < 0 || policy.shift[z] == -std::numeric_limits<S>::infinity()) continue;
+      const V distance = min(height(s.a[c]), height(s.b[c])) - static_cast<S>(model.capsules[c].radius);
+      if (any_not_above<V>(distance, policy.outside(c) + policy.shift[z])) policy.take(z, c, distance);
+    }
   }
-  if (model.leaves.empty()) return;
-  // A ball about the capsule in all lanes: around the middle of one of them.
-  const Vec<V>& m = s.middle[c];
+}
+
+// Balls around sixteen capsules, each in all configurations of the group: around the capsule's middle in one of them.
+struct Balls {
+  Float16 x, y, z, radius;
+};
+
+template <class V> IR_INLINE Balls balls_around(const Model& model, const State<V>& s, std::size_t first) {
   constexpr int lane = Lanes<V>::width / 2;
-  const S x = m.x[lane], y = m.y[lane], z = m.z[lane];
-  const V dx = m.x - x, dy = m.y - y, dz = m.z - z;
-  const S spread = std::sqrt(highest<V>(dx * dx + dy * dy + dz * dz));
-  const S around = spread + S(capsule.half) + radius;
-  const Float16 zero{};
-  for (const Leaf& leaf : model.leaves) {
-    const float reach = static_cast<float>(around + policy.farthest(c) + policy.highest_shift) * 1.00001f + 1e-5f;
-    const Float16 px = splat<Float16>(float(x)), py = splat<Float16>(float(y)), pz = splat<Float16>(float(z));
-    const Float16 gx = max(max(leaf.low[0] - px, px - leaf.high[0]), zero);
-    const Float16 gy = max(max(leaf.low[1] - py, py - leaf.high[1]), zero);
-    const Float16 gz = max(max(leaf.low[2] - pz, pz - leaf.high[2]), zero);
-    const float limit = reach > 0.0f ? reach * reach : 0.0f;
-    std::uint32_t near = bits(gx * gx + gy * gy + gz * gz <= limit);
-    for (; near != 0; near &= near - 1) {
-      const int body = leaf.body[__builtin_ctz(near)];
-      if (body >= 0) visit_body(model, s, c, body, policy);
+  Balls b;
+  b.x = b.y = b.z = splat<Float16>(1e30f);  // link 0, and places without a capsule: nowhere
+  Float16 spread{}, own{};
+  const std::size_t count = std::min<std::size_t>(16, model.capsules.size() - first);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Capsule& capsule = model.capsules[first + k];
+    if (capsule.link == 0) continue;
+    const Vec<V>& m = s.middle[first + k];
+    const Scalar<V> x = m.x[lane], y = m.y[lane], z = m.z[lane];
+    const V dx = m.x - x, dy = m.y - y, dz = m.z - z;
+    spread[k] = static_cast<float>(highest<V>(dx * dx + dy * dy + dz * dz));
+    own[k] = static_cast<float>(capsule.half + capsule.radius);
+    b.x[k] = static_cast<float>(x);
+    b.y[k] = static_cast<float>(y);
+    b.z[k] = static_cast<float>(z);
+  }
+  b.radius = sqrt(spread) + own;
+  return b;
+}
+
+// Which balls come nearer than `reach` to a box along the world's axes.
+IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const float low[3], const float high[3]) {
+  const Float16 zero{}, limit = clamp(reach, zero, splat<Float16>(1e15f));  // finite: nowhere stays out
+  const Float16 x = max(max(low[0] - b.x, b.x - high[0]), zero);
+  const Float16 y = max(max(low[1] - b.y, b.y - high[1]), zero);
+  const Float16 z = max(max(low[2] - b.z, b.z - high[2]), zero);
+  return bits(x * x + y * y + z * z <= limit * limit);
+}
+
+template <class V, class Policy> IR_INLINE void visit_solids(const Model& model, const State<V>& s, Policy& policy) {
+  for (std::size_t first = 0; first < model.capsules.size(); first += 16) {
+    const Balls balls = balls_around(model, s, first);
+    const auto reach = [&] { return (balls.radius + policy.farthest(first)) * 1.00001f + 1e-5f; };
+    for (const Leaf& leaf : model.leaves) {
+      if (model.leaves.size() > 1 && near(balls, reach(), leaf.low, leaf.high) == 0) continue;
+      for (const Box& box : leaf.boxes) {
+        for (std::uint32_t left = near(balls, reach(), box.low, box.high); left != 0; left &= left - 1)
+          visit_body(model, s, static_cast<int>(first) + __builtin_ctz(left), box.body, policy);
+      }
+      if (policy.done()) return;
     }
   }
 }
@@ -101,13 +134,13 @@ template <class V, class Policy> IR_INLINE void visit_self(const Model& model, c
   }
 }
 
-// All pairs: the robot's own first, they are near in most configurations; then from the tool to the base.
+// All pairs: the robot's own first, they are near in most configurations.
 template <class V, class Policy> IR_INLINE void visit(const Model& model, const State<V>& s, Policy& policy) {
   visit_self(model, s, policy);
-  for (int c = static_cast<int>(model.capsules.size()) - 1; c >= 0; --c) {
-    if (policy.done()) return;
-    if (model.capsules[c].link > 0) visit_environment(model, s, c, policy);
-  }
+  if (policy.done()) return;
+  visit_planes(model, s, policy);
+  if (policy.done()) return;
+  visit_solids(model, s, policy);
 }
 
 }  // namespace ir
