@@ -6,6 +6,7 @@ the tree towards all of them and tries to join every new node with the other tre
 kernels. An edge that hits something is used as far as it is proved free.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,19 +48,33 @@ class Tree:
         return self.nodes[path[::-1]]
 
 
+Draw = Callable[[Tree, Tree, FreeSpace, np.random.Generator], FloatArray]
+
+
+def anywhere(here: Tree, there: Tree, space: FreeSpace, rng: np.random.Generator) -> FloatArray:
+    """Targets (B, n) all over the joint range, a quarter of them nodes of the other tree."""
+    targets = rng.uniform(space.low, space.high, (_BATCH, here.nodes.shape[1]))
+    targets[: _BATCH // 4] = there.nodes[rng.integers(0, len(there.nodes), _BATCH // 4)]
+    return targets
+
+
 def connect(
-    start: FloatArray, goal: FloatArray, space: FreeSpace, scale: FloatArray, rng: np.random.Generator
+    start: FloatArray,
+    goal: FloatArray,
+    space: FreeSpace,
+    scale: FloatArray,
+    rng: np.random.Generator,
+    draw: Draw = anywhere,
 ) -> FloatArray | None:
     """A free path (M, n) from start to goal, or None when the budget ended before one was found.
 
-    `scale` (n,): how much each joint counts in the distance of configurations.
+    `scale` (n,): how much each joint counts in the distance of configurations. `draw`: where trees grow to.
     """
     trees = (Tree(start[None].copy()), Tree(goal[None].copy()))
     side = 0
     while not space.budget.exhausted:
         here, there = trees[side], trees[1 - side]
-        targets = rng.uniform(space.low, space.high, (_BATCH, len(start)))
-        targets[: _BATCH // 4] = there.nodes[rng.integers(0, len(there.nodes), _BATCH // 4)]
+        targets = draw(here, there, space, rng)
         begin, new = len(here.nodes), _extend(here, targets, space, scale)
         if new:
             joined = _join(here, there, begin, space, scale)

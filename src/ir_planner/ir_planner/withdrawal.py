@@ -8,6 +8,7 @@ It goes on until D grows for every configuration and the zone is left. Every ste
 """
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,12 +16,13 @@ from ir_kernels.collision import FREE
 from numpy.typing import NDArray
 
 from ir_planner.free_space import FreeSpace
-from ir_planner.settings import WithdrawalSettings
+from ir_planner.service_settings import WithdrawalSettings
 from ir_planner.step_weights import step_weights
 from ir_planner.work_area import WorkArea
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 _DAMPING = 0.02  # of the retreat's least squares; m^2
 _ROTATION_LENGTH = 0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its way
 _SHARPEST = 0.25  # the spread shrinks at most to this share in one generation
@@ -30,7 +32,7 @@ _PER_PARENT = 3  # offspring of one configuration that may survive
 
 @dataclass(eq=False)
 class Walk:
-    """What a walk found: paths (M_k, n) from the work configuration to outside; how far it came where none did.
+    """What a walk found: paths (M_k, n) from the work configuration to outside, in the order they came.
 
     best: the configuration farthest out; rejected: dropped candidates by reason.
     """
@@ -44,7 +46,9 @@ class Walk:
 
 @dataclass(eq=False)
 class _Population:
-    """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, and their node's index."""
+    """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, index of their
+    node.
+    """
 
     q: FloatArray
     total: FloatArray
@@ -53,9 +57,7 @@ class _Population:
     node: IntArray
 
     def of(self, rows: IntArray) -> "_Population":
-        return _Population(
-            self.q[rows], self.total[rows], self.sigma[rows], self.step[rows], self.node[rows]
-        )
+        return _Population(self.q[rows], self.total[rows], self.sigma[rows], self.step[rows], self.node[rows])
 
     def __len__(self) -> int:
         return len(self.q)
@@ -65,17 +67,16 @@ def withdraw(
     work: FloatArray,
     area: WorkArea,
     inside: FreeSpace,
-    outside: FreeSpace,
+    is_out: Callable[[FloatArray], BoolArray],
     settings: WithdrawalSettings,
     rng: np.random.Generator,
     wanted: int,
 ) -> Walk:
-    """Walk from `work` (n,), free in `inside`, until `wanted` ways end outside the zone and free in `outside`.
+    """Walk from `work` (n,), free in `inside`, until `wanted` ways end where `is_out` (N, n) -> (N,) says so.
 
-    inside: with the station's allowed contacts; outside: without. Ends at the settings' generations or when
-    the budget is spent.
+    Ends at the settings' generations or when the budget is spent.
     """
-    return _Walker(work, area, inside, outside, settings, rng).run(wanted)
+    return _Walker(work, area, inside, is_out, settings, rng).run(wanted)
 
 
 class _Walker:
@@ -84,16 +85,17 @@ class _Walker:
         work: FloatArray,
         area: WorkArea,
         inside: FreeSpace,
-        outside: FreeSpace,
+        is_out: Callable[[FloatArray], BoolArray],
         settings: WithdrawalSettings,
         rng: np.random.Generator,
     ) -> None:
-        self.area, self.inside, self.outside = area, inside, outside
+        self.area, self.inside, self.is_out = area, inside, is_out
         self.settings, self.rng = settings, rng
         scene = inside.scene
         self.scene = scene
-        self.margin = settings.safety_distance
-        self.W = step_weights(scene.cell.robot.link_mass, sum(x.mass for x in scene.loads), settings.weighting)
+        self.W = step_weights(
+            scene.cell.robot.link_mass, sum(x.mass for x in scene.loads), settings.weighting
+        )
         self.nodes: list[FloatArray] = [work]
         self.parents: list[int] = [0]
         self.first_total = max(float(area.total_distance(work[None])[0]), 1e-3)
@@ -120,7 +122,9 @@ class _Walker:
         """One generation: perturb, drop, rank, certify, keep the best."""
         owner = np.repeat(np.arange(len(parents)), offspring)
         mean = self._mean(parents)
-        spread = parents.sigma[owner] * 10.0 ** self.rng.uniform(-self.settings.spread_decades, 0.0, len(owner))
+        spread = parents.sigma[owner] * 10.0 ** self.rng.uniform(
+            -self.settings.spread_decades, 0.0, len(owner)
+        )
         noise = spread[:, None] * self.rng.standard_normal((len(owner), parents.q.shape[1]))
         away = self.rng.random(len(owner))[:, None]  # part of the mean: short steps survive where it is tight
         q = parents.q[owner] + mean[owner] * away + self.W * noise
@@ -136,13 +140,17 @@ class _Walker:
         if len(stuck):  # all of its offspring collide: look 1 rad around it
             stay = parents.of(stuck)
             again = _Population(
-                stay.q, stay.total, np.full(len(stuck), self.settings.collision_spread), stay.step * 0.0, stay.node
+                stay.q,
+                stay.total,
+                np.full(len(stuck), self.settings.collision_spread),
+                stay.step * 0.0,
+                stay.node,
             )
             children = _joined(children, again)
         return children
 
     def _mean(self, parents: _Population) -> FloatArray:
-        """Mean steps (N, n): half where the last step went, half straight out along the tool; longer as D grows."""
+        """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
         grown = np.clip(parents.total / self.first_total, 0.25, _LARGEST_MEAN)
         out = self._retreat(parents.q) * self.settings.step
         length = np.linalg.norm(out, axis=1, keepdims=True)
@@ -162,7 +170,7 @@ class _Walker:
         rate: FloatArray = (J.transpose(0, 2, 1) @ np.linalg.solve(normal, target[:, :, None]))[:, :, 0]
         return rate
 
-    def _free(self, q: FloatArray, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:
+    def _free(self, q: FloatArray, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, BoolArray]:
         """Candidates within the limits and free; and which parents lost all of theirs to collisions."""
         low, high = self.inside.low, self.inside.high
         beyond = (q < low) | (q > high)
@@ -196,29 +204,36 @@ class _Walker:
         found = self.inside.certificates(parents.q[owner[rows]], q[rows])
         free = found.verdict == FREE
         self._count_pairs(found.pair[~free], "in between too near")
-        return rows[free]
+        certified: IntArray = rows[free]
+        return certified
 
-    def _children(self, parents: _Population, q: FloatArray, owner: IntArray, total: FloatArray) -> _Population:
+    def _children(
+        self, parents: _Population, q: FloatArray, owner: IntArray, total: FloatArray
+    ) -> _Population:
         """Survivors with their spread: it shrinks in proportion to the gain of D."""
         gain = (total - parents.total[owner]) / np.maximum(parents.total[owner], 1e-3)
         shrink = np.clip(1.0 - self.settings.shrink * gain, _SHARPEST, 1.3)
-        sigma = np.clip(parents.sigma[owner] * shrink, self.settings.spread_least, self.settings.collision_spread)
+        sigma = np.clip(
+            parents.sigma[owner] * shrink, self.settings.spread_least, self.settings.collision_spread
+        )
         node = np.arange(len(self.nodes), len(self.nodes) + len(q))
         self.nodes.extend(q)
         self.parents.extend(int(k) for k in parents.node[owner])
         return _Population(q, total, sigma, q - parents.q[owner], node)
 
     def _finished(self, children: _Population) -> _Population:
-        """Take those out of the population that have left the zone and are free without allowed contacts."""
+        """Take those out of the population that have left the zone; they count where D grew."""
         if len(children) == 0:
             return children
         zone = self.area.zone_distance(children.q)
         far = int(np.argmax(zone))
         if zone[far] > self.best_zone:
             self.best_zone, self.walk.best = float(zone[far]), children.q[far]
-        done = zone > self.margin
-        done[done] = self.outside.states_free(children.q[done])
-        for node in children.node[done]:
+        done = self.is_out(children.q)
+        grown = (children.total > self.first_total) | (self.area.pairs == 0)
+        if (done & ~grown).any():
+            self.walk.rejected["outside, but D did not grow"] += int((done & ~grown).sum())
+        for node in children.node[done & grown]:
             self.walk.paths.append(self._path(int(node)))
         return children.of(np.flatnonzero(~done))
 

@@ -62,7 +62,7 @@ class WorkArea:
         return np.asarray(self._machine.distances(q).sum(axis=1))
 
     def zone_distance(self, q: FloatArray) -> FloatArray:
-        """Distance (N,) [m] from the zone of the nearest capsule from link 3 to the tool; negative: inside."""
+        """Distance (N,) [m] from the zone of the nearest capsule of link 3 to tool; negative: inside."""
         if self._box is None:
             return np.full(len(q), np.inf)
         return np.asarray(self._box.min_distance(q).distance)
