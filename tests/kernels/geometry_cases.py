@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ir_kernels import Chain, CollisionModel
+
 FloatArray = NDArray[np.float64]
 
 
@@ -143,3 +145,12 @@ def every_kind(rng: np.random.Generator) -> tuple[Body, ...]:
         Body("a_plane", "plane", random_pose(rng), sizes[4]),
         Body("a_mesh", "mesh", random_pose(rng), np.zeros(3), vertices),
     )
+
+
+# A hand with one joint: its capsule stands where the body is to be tried.
+PROBE = Robot(np.eye(4)[None], np.array([[0.0, 0.0, 1.0]]), np.array([-3.0]), np.array([3.0]))
+AT_ZERO = np.zeros((1, 1))
+
+
+def probe(p0: FloatArray, p1: FloatArray, radius: float, body: Body) -> CollisionModel:
+    return CollisionModel(Chain(PROBE), [Capsule("probe", 1, p0, p1, radius)], [body], ())

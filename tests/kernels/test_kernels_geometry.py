@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from geometry_cases import (
+    AT_ZERO,
     CAPSULES,
     COLUMNS,
     FLOOR,
@@ -11,12 +12,12 @@ from geometry_cases import (
     SELF_PAIRS,
     TCP,
     Body,
-    Capsule,
     FloatArray,
     Robot,
     box,
     cylinder,
     every_kind,
+    probe,
     random_pose,
     sample,
     shift,
@@ -31,17 +32,10 @@ from ir_kernels import Chain, CollisionModel, compiled
 EXACT = 1e-9  # [m] double precision on lengths of some metres
 IN_FLOATS = 2e-6  # [m] where lanes of floats choose between pairs
 SCENES = [OPEN, COLUMNS, *(every_kind(np.random.default_rng(seed)) for seed in range(3))]
-# A hand with one joint: its capsule stands where the body is to be tried.
-PROBE = Robot(np.eye(4)[None], np.array([[0.0, 0.0, 1.0]]), np.array([-3.0]), np.array([3.0]))
-AT_ZERO = np.zeros((1, 1))
 
 
 def kr210(bodies: tuple[Body, ...]) -> CollisionModel:
     return CollisionModel(Chain(KR210, tcp=TCP), CAPSULES, bodies, SELF_PAIRS)
-
-
-def probe(p0: FloatArray, p1: FloatArray, radius: float, body: Body) -> CollisionModel:
-    return CollisionModel(Chain(PROBE), [Capsule("probe", 1, p0, p1, radius)], [body], ())
 
 
 @pytest.mark.parametrize("bodies", SCENES)
