@@ -8,6 +8,8 @@ unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX
 BIN := .venv/bin
 CORES := $(shell nproc 2>/dev/null || echo 2)
 PYTEST := $(BIN)/python -m pytest -n $(CORES) --dist worksteal
+# Real nodes in real time: alone on the machine, as a robot's controller would be.
+SYSTEM_TESTS := $(BIN)/python -m pytest tests/system
 # make demo ARGS='--cell my_cell.yaml'; make test ARGS='-k energy'; make bench ARGS='--seeds 3'
 ARGS ?=
 
@@ -21,11 +23,14 @@ setup:            ## make or complete .venv: ROS 2 Jazzy, interfaces, compiled c
 demo: setup       ## plan, drive, record and explain the demonstration cell
 	@$(BIN)/ir demo $(ARGS)
 
-test: setup       ## every test that takes seconds
-	@$(PYTEST) -m 'not long' $(ARGS)
+# Exit code 5 is pytest's "no test collected": ARGS may choose tests of one part only.
+test: setup       ## every test that takes seconds to a few minutes
+	@$(PYTEST) --ignore tests/system -m 'not long' $(ARGS) || [ $$? -eq 5 ]
+	@$(SYSTEM_TESTS) -m 'not long' $(ARGS) || [ $$? -eq 5 ]
 
 test-long: setup  ## every test, also those that run for minutes
-	@$(PYTEST) $(ARGS)
+	@$(PYTEST) --ignore tests/system $(ARGS) || [ $$? -eq 5 ]
+	@$(SYSTEM_TESTS) $(ARGS) || [ $$? -eq 5 ]
 
 check: setup      ## ruff and mypy --strict
 	@$(BIN)/ruff check .

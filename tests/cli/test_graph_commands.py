@@ -18,6 +18,12 @@ TOPIC = "/machine/signal"
 
 
 @pytest.fixture
+def ros_discovery_range() -> str:
+    """The commands have a participant of their own, which has to find the machine."""
+    return "LOCALHOST"
+
+
+@pytest.fixture
 def machine(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
     """A node with a service that says yes to "ab" and a latched topic, in the domain of the commands."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
