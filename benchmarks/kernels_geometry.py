@@ -23,7 +23,7 @@ from ir_description import Cell, load_cell
 from ir_kernels import FREE, UNDECIDED, Chain, CollisionModel
 
 Array = NDArray[np.float64]
-SAMPLES = 1600  # configurations per batch: a path, not a day's work
+SAMPLES = 4000  # configurations per batch: a hundred edges
 REPETITIONS = 60
 EDGE, SAFETY, ROOM = 0.8, 0.02, 0.005  # rad, m, m
 EDGES, FINE = 2500, 0.0005  # per cell; rad

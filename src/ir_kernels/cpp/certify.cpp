@@ -83,8 +83,7 @@ class Polynomials final : public Motions {
 
 template <class V> struct Proof {
   using S = Scalar<V>;
-  const S* shift;
-  S highest_shift;
+  const Shifts<S>& shift;
   const Model& model;
   S margin;
   bool tight;            // the bound is wanted: nothing may be skipped that could lower it
@@ -93,8 +92,8 @@ template <class V> struct Proof {
   V above, proved, doubtful_moved;
   Mask<V> nearest, doubtful;
 
-  Proof(const Model& m, const S* threshold, S highest, S rounding, bool with_bound)
-      : shift(threshold), highest_shift(highest), model(m), margin(rounding), tight(with_bound),
+  Proof(const Model& m, const Shifts<S>& threshold, S rounding, bool with_bound)
+      : shift(threshold), model(m), margin(rounding), tight(with_bound),
         moved(m.capsules.size() * (m.chain.n + 1)), far(m.capsules.size() / 16 + 1) {}
 
   IR_INLINE V outside(int c) const { return allowed(moved[c * (model.chain.n + 1)]); }
@@ -116,7 +115,7 @@ template <class V> struct Proof {
       movement = moved[pair.outer * (model.chain.n + 1) + model.capsules[pair.inner].link];
     }
     movement += margin;
-    const V over = distance - shift[z], left = over - movement;
+    const V over = distance - shift.of[z], left = over - movement;
     const Mask<V> number = Mask<V>{} + z;
     const Mask<V> nearer = over < above, worse = left < proved;
     above = nearer ? over : above;
@@ -140,7 +139,7 @@ template <class V> struct Proof {
         m = m + spread[j] * (reach + m + margin);
         to[j] = m;
       }
-      far[c / 16][c % 16] = static_cast<float>(highest<V>(m)) * 1.00001f + static_cast<float>(margin + highest_shift);
+      far[c / 16][c % 16] = static_cast<float>(highest<V>(m)) * 1.00001f + static_cast<float>(margin + shift.highest);
     }
   }
 
@@ -158,10 +157,8 @@ template <class V> class Examiner {
 
  public:
   Examiner(const Model& model, const double* threshold, bool with_bound)
-      : n_(model.chain.n), model_(model), threshold_(threshold, threshold + model.pairs()), placement_(model),
-        proof_(model, threshold_.data(),
-               threshold_.empty() ? S(0) : *std::max_element(threshold_.begin(), threshold_.end()),
-               static_cast<S>(width == 16 ? model.float_margin : double_margin), with_bound),
+      : n_(model.chain.n), model_(model), threshold_(model, threshold), placement_(model),
+        proof_(model, threshold_, static_cast<S>(width == 16 ? model.float_margin : double_margin), with_bound),
         q_(width * n_), spread_(n_), one_(n_) {}
 
   double margin() const { return proof_.margin; }
@@ -188,7 +185,7 @@ template <class V> class Examiner {
  private:
   int n_;
   const Model& model_;
-  std::vector<S> threshold_;
+  Shifts<S> threshold_;
   Placement<V> placement_;
   Proof<V> proof_;
   std::vector<double> q_;

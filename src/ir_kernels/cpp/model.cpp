@@ -150,6 +150,7 @@ template <class V> void Placement<V>::place(const double* const* rows, int count
   }
   const auto& high = exact[Lanes<V>::width / 8 - 1];
   for (int link = 0; link <= n; ++link) {
+    if (link == 0 && placed_) continue;  // never moves
     Frame<V>& f = state.frames[link];
     narrow(exact[0][link].x, high[link].x, f.x);
     narrow(exact[0][link].y, high[link].y, f.y);
@@ -159,12 +160,14 @@ template <class V> void Placement<V>::place(const double* const* rows, int count
   const V one_half = splat<V>(Scalar<V>(0.5));
   for (std::size_t c = 0; c < model_.capsules.size(); ++c) {
     const Capsule& capsule = model_.capsules[c];
+    if (capsule.link == 0 && placed_) continue;
     const Frame<V>& f = state.frames[capsule.link];
     const Vec<V> a = ir::place(f, capsule.p0), b = ir::place(f, capsule.p1);
     state.a[c] = a;
     state.b[c] = b;
     state.middle[c] = one_half * (a + b);
   }
+  placed_ = true;
 }
 
 template class Placement<Float16>;

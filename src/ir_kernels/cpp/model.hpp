@@ -89,6 +89,7 @@ template <class V> class Placement {
  private:
   const Model& model_;
   std::vector<Double8> q_;
+  bool placed_ = false;
 };
 
 template <class V> IR_INLINE Vec<V> to_local(const Body<Scalar<V>>& f, const Vec<V>& p) {

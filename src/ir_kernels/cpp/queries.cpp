@@ -11,17 +11,9 @@ namespace {
 constexpr float slack_of(Float16) { return 2e-5f; }
 constexpr double slack_of(Double8) { return 1e-8; }
 
-template <class S> std::vector<S> converted(const double* values, int count) {
-  return std::vector<S>(values, values + count);
-}
-template <class S> S highest_of(const std::vector<S>& values) {
-  return values.empty() ? S(0) : *std::max_element(values.begin(), values.end());
-}
-
 template <class V> struct Nearest {
   using S = Scalar<V>;
-  const S* shift;
-  S highest_shift;
+  const Shifts<S>& shift;
   V best;  // least distance - offset so far
   Mask<V> pair;
   S limit;  // the highest lane of best
@@ -29,11 +21,11 @@ template <class V> struct Nearest {
   IR_INLINE V outside(int) const { return best + slack_of(V{}); }
   IR_INLINE V own(std::size_t) const { return best + slack_of(V{}); }
   IR_INLINE Float16 farthest(std::size_t) const {
-    return splat<Float16>(static_cast<float>(limit + highest_shift + slack_of(V{})));
+    return splat<Float16>(static_cast<float>(limit + shift.highest + slack_of(V{})));
   }
   IR_INLINE bool done() const { return false; }
   IR_INLINE void take(int z, int, V distance) {
-    const V excess = distance - shift[z];
+    const V excess = distance - shift.of[z];
     const Mask<V> index = Mask<V>{} + z;
     // of equals the first pair, so that the order of visits leaves no trace
     const Mask<V> better = (excess < best) | ((excess == best) & (index < pair));
@@ -45,8 +37,7 @@ template <class V> struct Nearest {
 
 template <class V> struct Above {
   using S = Scalar<V>;
-  const S* shift;
-  S highest_shift;
+  const Shifts<S>& shift;
   Mask<V> free;
 
   IR_INLINE V outside(int) const {
@@ -54,10 +45,10 @@ template <class V> struct Above {
   }
   IR_INLINE V own(std::size_t) const { return outside(0); }
   IR_INLINE Float16 farthest(std::size_t) const {
-    return splat<Float16>(static_cast<float>(highest_shift + slack_of(V{})));
+    return splat<Float16>(static_cast<float>(shift.highest + slack_of(V{})));
   }
   IR_INLINE bool done() const { return !any(free); }
-  IR_INLINE void take(int z, int, V distance) { free = free & (distance > shift[z]); }
+  IR_INLINE void take(int z, int, V distance) { free = free & (distance > shift.of[z]); }
 };
 
 // The rows of a batch, a lane group at a time.
@@ -211,15 +202,20 @@ WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& fram
 
 void write(const Model& model, const WitnessLanes& w, int count, std::size_t first, const WitnessArrays& to) {
   const double* base = model.chain.base_origin;
+  const Double8 columns[9] = {w.point_a.x + base[0], w.point_a.y + base[1], w.point_a.z + base[2],
+                              w.point_b.x + base[0], w.point_b.y + base[1], w.point_b.z + base[2],
+                              w.normal.x,            w.normal.y,            w.normal.z};
+  double values[9][8], distance[8];
+  std::memcpy(values, columns, sizeof values);
+  std::memcpy(distance, &w.distance, sizeof distance);
   for (int k = 0; k < count; ++k) {
     const std::size_t row = first + k;
-    to.distance[row] = w.distance[k];
-    double* p = to.point_a + 3 * row;
-    p[0] = w.point_a.x[k] + base[0], p[1] = w.point_a.y[k] + base[1], p[2] = w.point_a.z[k] + base[2];
-    p = to.point_b + 3 * row;
-    p[0] = w.point_b.x[k] + base[0], p[1] = w.point_b.y[k] + base[1], p[2] = w.point_b.z[k] + base[2];
-    p = to.normal + 3 * row;
-    p[0] = w.normal.x[k], p[1] = w.normal.y[k], p[2] = w.normal.z[k];
+    to.distance[row] = distance[k];
+    for (int i = 0; i < 3; ++i) {
+      to.point_a[3 * row + i] = values[i][k];
+      to.point_b[3 * row + i] = values[3 + i][k];
+      to.normal[3 * row + i] = values[6 + i][k];
+    }
   }
 }
 
@@ -228,9 +224,9 @@ void min_distance_in(const Model& model, const double* q, std::size_t count, con
                      const WitnessArrays& result) {
   using S = Scalar<V>;
   constexpr int width = Lanes<V>::width;
-  const std::vector<S> shift = converted<S>(offset, model.pairs());
+  const Shifts<S> shift(model, offset);
   Placement<V> placement(model);
-  Nearest<V> policy{shift.data(), highest_of(shift), {}, {}, {}};
+  Nearest<V> policy{shift, {}, {}, {}};
   int hint = -1;
   for (std::size_t first = 0; first < count; first += width) {
     const Rows<width> rows(q, first, count, model.chain.n);
@@ -240,12 +236,10 @@ void min_distance_in(const Model& model, const double* q, std::size_t count, con
     policy.pair = Mask<V>{} + std::numeric_limits<std::int32_t>::max();
     if (hint >= 0) policy.take(hint, 0, pair_distance(model, placement.state, hint));
     visit(model, placement.state, policy);
+    const Mask<V> chosen = policy.best < std::numeric_limits<S>::infinity() ? policy.pair : Mask<V>{} - 1;
     int nearest[width];
-    for (int k = 0; k < rows.count; ++k) {
-      const bool some = policy.best[k] < std::numeric_limits<S>::infinity();
-      nearest[k] = some ? static_cast<int>(policy.pair[k]) : -1;
-      pair[first + k] = nearest[k];
-    }
+    for (int k = 0; k < width; ++k) nearest[k] = static_cast<int>(chosen[k]);
+    for (int k = 0; k < rows.count; ++k) pair[first + k] = nearest[k];
     if (nearest[0] < 0) {  // no pair that counts: the same for all
       for (int k = 0; k < rows.count; ++k) {
         result.distance[first + k] = std::numeric_limits<double>::infinity();
@@ -266,9 +260,9 @@ template <class V>
 void is_free_in(const Model& model, const double* q, std::size_t count, const double* threshold, bool* result) {
   using S = Scalar<V>;
   constexpr int width = Lanes<V>::width;
-  const std::vector<S> shift = converted<S>(threshold, model.pairs());
+  const Shifts<S> shift(model, threshold);
   Placement<V> placement(model);
-  Above<V> policy{shift.data(), highest_of(shift), {}};
+  Above<V> policy{shift, {}};
   for (std::size_t first = 0; first < count; first += width) {
     const Rows<width> rows(q, first, count, model.chain.n);
     placement.place(rows.row, rows.count);

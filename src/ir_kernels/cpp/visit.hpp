@@ -1,10 +1,10 @@
 // Visits the pairs that may matter: whole lane groups are skipped by cheap lower bounds of the distance.
 //
 // A policy says how far is near enough: a pair z of capsule c may be skipped where its distance certainly exceeds
-// outside(c) + shift[z] (self pair i: own(i) + shift[z]) in every lane; else take(z, c or i, distance) gets the exact
+// outside(c) + shift.of[z] (self pair i: own(i) + shift.of[z]) in every lane; else take(z, c or i, distance) gets the exact
 // values. farthest(first) is the highest lane of outside(c) +
 // the highest shift, for sixteen capsules from `first`.
-// shift[z] = -inf: the pair doesn't count.
+// shift.of[z] = -inf: the pair doesn't count.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +13,18 @@
 #include "model.hpp"
 
 namespace ir {
+
+// What is taken off each pair's distance, and with it how near the middles of a self pair have to be to matter.
+template <class S> struct Shifts {
+  std::vector<S> of, self_reach;
+  S highest = 0;
+
+  Shifts(const Model& model, const double* values) : of(values, values + model.pairs()) {
+    if (!of.empty()) highest = *std::max_element(of.begin(), of.end());
+    for (std::size_t i = 0; i < model.self_pairs.size(); ++i)
+      self_reach.push_back(of[model.environment.size() + i] + static_cast<S>(model.self_pairs[i].around));
+  }
+};
 
 template <class V> IR_INLINE V square_beyond(const Vec<V>& p, const Scalar<V> half[3]) {
   const V zero{};
@@ -41,7 +53,7 @@ IR_INLINE void visit_body(const Model& model, const State<V>& s, int c, int body
   using S = Scalar<V>;
   const std::int32_t z = model.pair_of[c * model.kind.size() + body];
   if (z < 0) return;
-  const S shift = policy.shift[z];
+  const S shift = policy.shift.of[z];
   if (shift == -std::numeric_limits<S>::infinity()) return;
   const Capsule& capsule = model.capsules[c];
   const S radius = static_cast<S>(capsule.radius);
@@ -63,9 +75,9 @@ IR_INLINE void visit_planes(const Model& model, const State<V>& s, Policy& polic
     };
     for (int c = static_cast<int>(model.capsules.size()) - 1; c >= 0; --c) {
       const std::int32_t z = model.pair_of[c * model.kind.size() + body];
-      if (z < 0 || policy.shift[z] == -std::numeric_limits<S>::infinity()) continue;
+      if (z < 0 || policy.shift.of[z] == -std::numeric_limits<S>::infinity()) continue;
       const V distance = min(height(s.a[c]), height(s.b[c])) - static_cast<S>(model.capsules[c].radius);
-      if (any_not_above<V>(distance, policy.outside(c) + policy.shift[z])) policy.take(z, c, distance);
+      if (any_not_above<V>(distance, policy.outside(c) + policy.shift.of[z])) policy.take(z, c, distance);
     }
   }
 }
@@ -125,11 +137,10 @@ template <class V, class Policy> IR_INLINE void visit_self(const Model& model, c
   using S = Scalar<V>;
   const std::size_t outside = model.environment.size();
   for (std::size_t i = 0; i < model.self_pairs.size(); ++i) {
-    const S shift = policy.shift[outside + i];
-    if (shift == -std::numeric_limits<S>::infinity()) continue;
     const SelfPair& pair = model.self_pairs[i];
     const Vec<V> gap = s.middle[pair.a] - s.middle[pair.b];
-    if (!may_matter<V>(dot(gap, gap), policy.own(i) + (shift + static_cast<S>(pair.around)))) continue;
+    if (!may_matter<V>(dot(gap, gap), policy.own(i) + policy.shift.self_reach[i])) continue;
+    if (policy.shift.of[outside + i] == -std::numeric_limits<S>::infinity()) continue;
     policy.take(static_cast<int>(outside + i), static_cast<int>(i), self_distance(model, s, pair));
   }
 }
