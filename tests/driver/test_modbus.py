@@ -15,6 +15,7 @@ from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.modbus import ModbusServer
 from ir_sim_driver.modbus_map import COILS, DISCRETE_INPUTS, HEARTBEAT, INPUT_REGISTERS, OPERATING_MODE, PAUSE
 from ir_sim_driver.plc_link import PlcLink
+from ir_sim_driver.power_modes import TransitionSettings
 from ir_sim_driver.simulation_settings import ControllerSettings
 from pymodbus.client import ModbusTcpClient
 
@@ -169,6 +170,16 @@ def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, p
         start(simulation, plan([1.5], home))
     client.write_coil(HEARTBEAT, True)
     start(simulation, plan([1.5], home))
+
+
+def test_a_sleeping_controller_hears_no_heartbeat_and_misses_none(make, serve):
+    simulation = make(transitions=TransitionSettings(hibernation_enter=0.1))
+    driver, client, _ = serve(simulation)
+    client.write_coil(HEARTBEAT, True)
+    client.write_coil(coil("hib"), True)
+    run(driver, 3.0)
+    assert simulation.modes.mode is Mode.HIBERNATION
+    assert simulation.watch.lost == ""
 
 
 def test_a_plc_without_a_heartbeat_is_not_watched(make, serve):

@@ -22,6 +22,7 @@ from ir_msgs_py.ros.conversions import (
     power_state_to_msg,
     time_to_msg,
 )
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -383,6 +384,11 @@ def main() -> None:
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except RCLError:
+        if (
+            rclpy.ok()
+        ):  # else a signal has shut the context down under the executor: that is an end like others
+            raise
     except (DriverError, DescriptionError, MsgsError) as error:
         sys.exit(f"ir_sim_driver: {error}")
     finally:

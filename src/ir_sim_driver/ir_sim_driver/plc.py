@@ -71,7 +71,7 @@ class Plc:
         """Take all levels at once, as the topic and the field bus do."""
         if not self._greeted and self._uptime < self._settings.startup_window:
             stuck = frozenset(bit for bit in POWER_BITS if getattr(inputs, bit))
-            self._stick(stuck)
+            self._stick(stuck, Level.WARN, "at the start")
         self._greeted = True
         for bit in BITS:
             self._set(bit, getattr(inputs, bit))
@@ -91,7 +91,8 @@ class Plc:
 
     def wake(self) -> None:
         """The controller starts again: power bits that are 1 now are ignored until they have been 0."""
-        self._stick(frozenset(bit for bit in POWER_BITS if getattr(self.raw, bit)))
+        still = frozenset(bit for bit in POWER_BITS if getattr(self.raw, bit))
+        self._stick(still, Level.OK, "when the controller wakes")
         self._ages.clear()
         self.levels = replace(self.raw, ab=False, hib=False, ks=False)
         self.rest = None
@@ -117,13 +118,11 @@ class Plc:
             return
         self._ages[bit] = 0.0
 
-    def _stick(self, bits: frozenset[str]) -> None:
+    def _stick(self, bits: frozenset[str], level: Level, when: str) -> None:
         self._stuck |= bits
         if bits:
             names = ", ".join(sorted(bit.upper() for bit in bits))
-            self._notices.add(
-                Level.WARN, f"PLC bit {names} is already 1 at the start: ignored until it has been 0"
-            )
+            self._notices.add(level, f"PLC bit {names} is already 1 {when}: ignored until it has been 0")
 
     def _debounce(self, dt: float) -> None:
         for bit in list(self._ages):

@@ -338,6 +338,7 @@ class Simulation:
             self.plc.wake()
             self._restart = False
         if now in OFF_THE_NETWORK:
+            self.watch.forget()
             self.pauses.rest = None
             self._restart = self._drives_off = False
         if now is not Mode.MOVING and before is not Mode.MOVING:

@@ -16,6 +16,10 @@ class Watchdog:
         self._deadline, self._timeout = now + timeout, timeout
         self.lost = ""
 
+    def forget(self) -> None:
+        """Nobody can be heard now; watching begins again with the next heartbeat."""
+        self._deadline, self.lost = float("inf"), ""
+
     def step(self, now: float) -> bool:
         """Look at the time; True in the step in which the link is lost."""
         if now <= self._deadline or self.lost:
