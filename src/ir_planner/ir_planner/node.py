@@ -23,6 +23,7 @@ from ir_msgs.srv import (
     GetTrajectory,
     PlanProgram,
     PlanRegionalMovement,
+    PlanServiceMovement,
     PlanStandby,
     PlanTrajectory,
     SetCell,
@@ -51,6 +52,9 @@ from ir_planner.node_inputs import LastState
 from ir_planner.node_requests import Requests
 from ir_planner.parameters import PlannerParameters
 from ir_planner.planner import Planner
+from ir_planner.service_movement import ServicePlan
+from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
+from ir_planner.service_shapes import service_shapes
 from ir_planner.settings import PauseSettings, PlannerSettings
 from ir_planner.shapes import Shape, cell_shapes, movement_shapes
 
@@ -76,9 +80,17 @@ class PlannerNode(Node):
         **options: Any,
     ) -> None:
         super().__init__(names.PLANNER, context=context, **options)
-        parameters = PlannerParameters(self, self._change_settings, self._change_pauses)
+        parameters = PlannerParameters(
+            self,
+            self._change_settings,
+            self._change_pauses,
+            self._change_interaction,
+            self._change_withdrawal,
+        )
         make = make_planner or (lambda settings, pauses: Planner(time.monotonic, settings, pauses))
         self.planner = make(parameters.planner, parameters.pauses)
+        self._change_interaction(parameters.interaction)
+        self._change_withdrawal(parameters.withdrawal)
         self._last_state = LastState(look=self._look)
         self._requests = Requests(
             self.planner,
@@ -88,6 +100,7 @@ class PlannerNode(Node):
             self._show_movement,
             lambda: random.SystemRandom().getrandbits(64),
             self.get_logger().error,
+            self._show_service,
         )
         latched = QoSProfile(depth=_SHOWN, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._trajectories = self.create_publisher(JointTrajectoryMsg, names.PLANNED_TRAJECTORY, latched)
@@ -115,6 +128,7 @@ class PlannerNode(Node):
             (GetProgram, names.GET_PROGRAM, ask.get_program, quick),
             (PlanStandby, names.PLAN_STANDBY, ask.plan_standby, quick),
             (EvaluateTrajectory, names.EVALUATE_TRAJECTORY, ask.evaluate_trajectory, long),
+            (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service, long),
             (PlanRegionalMovement, names.PLAN_REGIONAL_MOVEMENT, ask.plan_regional, long),
             (PlanTrajectory, names.PLAN_TRAJECTORY, ask.plan_trajectory, long),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
@@ -169,6 +183,12 @@ class PlannerNode(Node):
     def _change_pauses(self, pauses: PauseSettings) -> None:
         self.planner.pauses = pauses
 
+    def _change_interaction(self, settings: InteractionSettings) -> None:
+        self.planner.interaction = settings
+
+    def _change_withdrawal(self, settings: WithdrawalSettings) -> None:
+        self.planner.withdrawal = settings
+
     def _load_first_cell(self, cell: str) -> None:
         if not cell:
             return
@@ -186,6 +206,12 @@ class PlannerNode(Node):
     def _show_movement(self, trajectory: JointTrajectory) -> None:
         self._trajectories.publish(trajectory_to_msg(trajectory))
         self._publish_markers(movement_shapes(trajectory, self.planner.scene()))
+
+    def _show_service(self, station: str, plan: ServicePlan) -> None:
+        for candidate in plan.candidates:
+            if candidate.trajectory is not None:
+                self._trajectories.publish(trajectory_to_msg(candidate.trajectory))
+        self._publish_markers(service_shapes(plan.candidates, station, self.planner.scene()))
 
     def _publish_markers(self, shapes: Sequence[Shape]) -> None:
         """Everything in one message: a late listener gets the last one only."""

@@ -11,6 +11,7 @@ from ir_msgs_py.ros.conversions import (
     planning_info_to_msg,
     power_mode_to_msg,
     report_to_msg,
+    service_candidate_to_msg,
     station_to_msg,
     status_to_msg,
     trajectory_to_msg,
@@ -24,6 +25,7 @@ from ir_planner.planner import IkAnswer, StateCheck, StoredProgram
 from ir_planner.program import ProgramPlan
 from ir_planner.regional import MovementPlan
 from ir_planner.reporting import Evaluation
+from ir_planner.service_movement import ServicePlan
 from ir_planner.standby import Standby
 
 
@@ -68,6 +70,14 @@ def fill_movement(response: Any, plan: MovementPlan, include_points: bool) -> No
         response.trajectory_id = plan.trajectory.trajectory_id
         if include_points:
             response.trajectory = trajectory_to_msg(plan.trajectory)
+
+
+def fill_service(response: Any, plan: ServicePlan, include_points: bool) -> None:
+    """plan_service_movement."""
+    response.candidates = [
+        service_candidate_to_msg(candidate, include_points) for candidate in plan.candidates
+    ]
+    response.info = planning_info_to_msg(plan.info)
 
 
 def fill_program(response: Any, plan: ProgramPlan, include_points: bool) -> None:

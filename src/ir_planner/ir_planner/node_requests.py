@@ -23,6 +23,7 @@ from ir_planner.node_answers import (
     fill_ik,
     fill_movement,
     fill_program,
+    fill_service,
     fill_standby,
     fill_state_check,
     fill_status,
@@ -40,6 +41,7 @@ from ir_planner.node_inputs import (
 )
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan
+from ir_planner.service_movement import ServicePlan
 
 FloatArray = NDArray[np.float64]
 
@@ -65,7 +67,8 @@ class Requests:
     """Handlers of the planner's services.
 
     now: the node's clock [s]. cell_changed and planned: told after the cell changed or a trajectory was
-    planned. draw_seed: for random_seed. log: takes what nobody expected.
+    planned; service_planned: the same for the candidates at a station. draw_seed: for random_seed. log:
+    takes what nobody expected.
     """
 
     def __init__(
@@ -77,10 +80,12 @@ class Requests:
         planned: Callable[[JointTrajectory], None],
         draw_seed: Callable[[], int],
         log: Callable[[str], None],
+        service_planned: Callable[[str, ServicePlan], None] = lambda station, plan: None,
     ) -> None:
         self.planner, self.last_state, self.now = planner, last_state, now
         self.cell_changed, self.planned, self.log = cell_changed, planned, log
         self.draw_seed = draw_seed
+        self.service_planned = service_planned
 
     def guarded(self, handler: Callable[[Any, Any], Status]) -> Callable[[Any, Any], Any]:
         """The handler as a service callback: its status goes into the response, whatever happens."""
@@ -133,7 +138,9 @@ class Requests:
         if near is None:
             near = self._known_or_home()
         goal = goal_of(request, cell)
-        answer = self.planner.compute_ik(goal, request.method, request.safety_distance, near, request.load)
+        answer = self.planner.compute_ik(
+            goal, request.method, request.safety_distance, near, request.load, request.starts, request.seed
+        )
         fill_ik(response, answer)
         return answer.status
 
@@ -145,6 +152,24 @@ class Requests:
         start = self._state(request.start, StatusCode.START_STATE_INVALID)
         plan = self.planner.plan_regional(start, goal, options)
         return self._movement(plan, response, options.include_points)
+
+    def plan_service(self, request: Any, response: Any) -> Status:
+        """Out of a machine's work area, or into it."""
+        options = options_of(request.options, self.draw_seed)
+        cell = self.planner.cell
+        configuration = state_of(request.configuration, cell, StatusCode.INVALID_ROBOT_STATE)
+        plan = self.planner.plan_service(
+            request.station,
+            request.direction,
+            configuration,
+            self._known_or_home(),
+            request.max_candidates,
+            options,
+        )
+        fill_service(response, plan, options.include_points)
+        if plan.candidates:
+            self.service_planned(request.station, plan)
+        return plan.status
 
     def plan_trajectory(self, request: Any, response: Any) -> Status:
         """Through given points."""

@@ -5,20 +5,29 @@ from collections.abc import Callable
 from ir_msgs_py.ros.parameters import Parameters
 from rclpy.node import Node
 
+from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
 from ir_planner.settings import PauseSettings, PlannerSettings
 
 
 class PlannerParameters:
-    """Declared on the node: the planner's own, and the times of the power modes under "transitions."."""
+    """Declared on the node: the planner's own, the times of the power modes under "transitions.", and the two
+    stages of service movements under "interaction." and "withdrawal.".
+    """
 
     def __init__(
         self,
         node: Node,
         on_planner: Callable[[PlannerSettings], None],
         on_pauses: Callable[[PauseSettings], None],
+        on_interaction: Callable[[InteractionSettings], None],
+        on_withdrawal: Callable[[WithdrawalSettings], None],
     ) -> None:
         self._planner = Parameters(node, PlannerSettings, on_change=on_planner)
         self._pauses = Parameters(node, PauseSettings, prefix="transitions.", on_change=on_pauses)
+        self._interaction = Parameters(
+            node, InteractionSettings, prefix="interaction.", on_change=on_interaction
+        )
+        self._withdrawal = Parameters(node, WithdrawalSettings, prefix="withdrawal.", on_change=on_withdrawal)
 
     @property
     def planner(self) -> PlannerSettings:
@@ -29,3 +38,13 @@ class PlannerParameters:
     def pauses(self) -> PauseSettings:
         """In force now."""
         return self._pauses.value
+
+    @property
+    def interaction(self) -> InteractionSettings:
+        """In force now."""
+        return self._interaction.value
+
+    @property
+    def withdrawal(self) -> WithdrawalSettings:
+        """In force now."""
+        return self._withdrawal.value

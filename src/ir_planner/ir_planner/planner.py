@@ -21,18 +21,22 @@ from ir_planner.clearance import nearest_pairs
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.following import Reference, plan_through
 from ir_planner.goals import Goal, within_limits
+from ir_planner.interaction_point import STARTS_MAX, searched_configurations
 from ir_planner.inverse_kinematics import free_configurations, no_configuration, ranked_solutions
 from ir_planner.journal import Journal
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.regional import MovementPlan, plan_regional
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene, load_text, scene_with
+from ir_planner.service_movement import ServicePlan, ServiceRequest, checked_request, plan_service
+from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
 from ir_planner.settings import PauseSettings, PlannerSettings
 from ir_planner.standby import Standby, plan_standby
 from ir_planner.store import Store
+from ir_planner.ways_out import known_method
 
 FloatArray = NDArray[np.float64]
-IK_METHODS = ("analytic",)
+IK_METHODS = ("analytic", "ccd")
 PAIRS_MAX = 1000
 _NEVER: Callable[[], bool] = lambda: False  # noqa: E731 - a default argument
 
@@ -77,11 +81,15 @@ class Planner:
         settings: PlannerSettings | None = None,
         pauses: PauseSettings | None = None,
         power: PowerData | None = None,
+        interaction: InteractionSettings | None = None,
+        withdrawal: WithdrawalSettings | None = None,
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
         self.pauses = pauses or PauseSettings()
         self.power = power or load_power_data()
+        self.interaction = interaction or InteractionSettings()
+        self.withdrawal = withdrawal or WithdrawalSettings()
         self._cell: Cell | None = None
         self.trajectories: Store[JointTrajectory] = Store(
             "trajectory", self.settings.stored_trajectories, lambda trajectory: trajectory.trajectory_id
@@ -158,20 +166,37 @@ class Planner:
         )
         return StateCheck(Status.success(sentence), False, smallest, pairs)
 
-    def compute_ik(self, goal: Goal, method: str, margin: float, near: FloatArray, load: str) -> IkAnswer:
-        """All free configurations that reach the goal's pose, ranked by W from `near` (n,)."""
+    def compute_ik(
+        self,
+        goal: Goal,
+        method: str,
+        margin: float,
+        near: FloatArray,
+        load: str,
+        starts: int = 32,
+        seed: int = 0,
+    ) -> IkAnswer:
+        """Free configurations that reach the goal's pose, ranked by W from `near` (n,): all of them
+        (analytic), or those that the paper's search finds from random starts (ccd).
+        """
         chosen(method, IK_METHODS, "method")
         safety_distance(margin)
+        bounded(starts, 1, STARTS_MAX, "starts")
         if goal.pose is None:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 "goal is a configuration: compute_ik takes a pose or a station",
             )
-        journal = Journal(self._budget(PlanOptions(), _NEVER), 0, planner_id=method)
+        journal = Journal(self._budget(PlanOptions(), _NEVER), seed, planner_id=method)
         scene = self.scene(load)
         threshold = scene.thresholds(margin, goal.station)
-        with journal.stage("closed form") as notes:
-            found = free_configurations(goal.pose, scene, threshold, near)
+        with journal.stage("closed form" if method == "analytic" else "ccd") as notes:
+            if method == "analytic":
+                found = free_configurations(goal.pose, scene, threshold, near)
+            else:
+                found = searched_configurations(
+                    goal.pose, scene, threshold, near, starts, seed, self.interaction, journal.budget
+                )
             notes.append(f"{found.reached} reach the pose")
         journal.rejected.update(found.rejected)
         names = scene.cell.robot.joint_names
@@ -237,6 +262,35 @@ class Planner:
             if plan.status.ok or budget.exhausted:
                 break
         return plan
+
+    def plan_service(
+        self,
+        station: str,
+        direction: str,
+        configuration: FloatArray | None,
+        near: FloatArray,
+        max_candidates: int,
+        options: PlanOptions,
+        cancelled: Callable[[], bool] = _NEVER,
+    ) -> ServicePlan:
+        """Ways out of a station or into it. configuration (n,): at the station, None: the best; near (n,):
+        where its cost counts from.
+        """
+        method = known_method(options.planner_id)
+        options, note = checked_options(replace(options, planner_id=""))
+        checked_request(direction, max_candidates)
+        scene = self.scene(options.load)
+        if configuration is not None:
+            configuration = within_limits(
+                configuration, scene.cell, "configuration", StatusCode.INVALID_ROBOT_STATE
+            )
+        request = ServiceRequest(scene.station(station), direction, configuration, near, max_candidates)
+        options = replace(options, planner_id=method)
+        plan = plan_service(request, scene, options, self.withdrawal, self._budget(options, cancelled))
+        for candidate in plan.candidates:
+            if candidate.trajectory is not None:
+                self.trajectories.add(candidate.trajectory)
+        return replace(plan, info=_noted(plan.info, note))
 
     def plan_trajectory(
         self, reference: Reference, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER

@@ -1,0 +1,160 @@
+"""plan_service_movement and compute_ik by ccd over ROS: candidates, ids, markers, and every refusal."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from ir_msgs.msg import PlanOptions, Status
+from ir_msgs.srv import ComputeIk, GetTrajectory, PlanServiceMovement, SetEquipment
+from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.ros.conversions import trajectory_from_msg
+from ir_planner.node import PlannerNode
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
+
+Call = Callable[..., Any]
+SERVICE = "plan_service_movement"
+
+
+@pytest.fixture
+def planner_node(ros_context: Any) -> Iterator[PlannerNode]:
+    """The node with the demonstration cell, spun by an executor of its own threads as in production."""
+    node = PlannerNode(
+        context=ros_context, parameter_overrides=[Parameter("cell", Parameter.Type.STRING, "demo")]
+    )
+    executor = MultiThreadedExecutor(num_threads=4, context=ros_context)
+    executor.add_node(node)
+
+    def spin() -> None:
+        with contextlib.suppress(ExternalShutdownException, ShutdownException):
+            executor.spin()
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    yield node
+    executor.shutdown(timeout_sec=5.0)
+    thread.join(5.0)
+    node.destroy_node()
+
+
+@pytest.fixture
+def call(planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any) -> Call:
+    """Call a service of the planner by its type, name and request."""
+
+    def ask(kind: Any, name: str, /, timeout: float = 60.0, **fields: Any) -> Any:
+        client = ros_executor.run(lambda: ros_node.create_client(kind, f"/ir_planner/{name}"))
+        wait_for(client.service_is_ready, what=f"{name} is offered")
+        future = ros_executor.run(lambda: client.call_async(kind.Request(**fields)))
+        wait_for(future.done, timeout=timeout, what=f"{name} answers")
+        ros_executor.run(lambda: ros_node.destroy_client(client))
+        return future.result()
+
+    return ask
+
+
+def test_exit_and_entry_are_certified_and_their_points_can_be_fetched(call: Call) -> None:
+    for direction in ("exit", "entry"):
+        answer = call(PlanServiceMovement, SERVICE, station="lathe_work", direction=direction)
+        assert answer.status.code == Status.SUCCESS, answer.status.message
+        best = answer.candidates[0]
+        assert best.report.certified
+        assert best.method == answer.info.planner_id == "modified_ga"
+        assert not best.trajectory.points
+        fetched = call(GetTrajectory, "get_trajectory", trajectory_id=best.trajectory_id)
+        trajectory = trajectory_from_msg(fetched.trajectory)
+        ends = (best.work_configuration.position, best.outside_configuration.position)
+        first, last = ends if direction == "exit" else ends[::-1]
+        np.testing.assert_allclose(trajectory.positions[0], first)
+        np.testing.assert_allclose(trajectory.positions[-1], last)
+
+
+def test_the_same_seed_gives_the_same_trajectory_id(call: Call) -> None:
+    request = {"station": "lathe_work", "options": PlanOptions(seed=7), "max_candidates": 1}
+    ids = {call(PlanServiceMovement, SERVICE, **request).candidates[0].trajectory_id for _ in range(2)}
+    assert len(ids) == 1
+
+
+def test_markers_show_the_zone_the_candidates_and_their_closest_pairs(
+    call: Call, ros_node: Any, ros_executor: Any, wait_for: Any
+) -> None:
+    seen: list[MarkerArray] = []
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    ros_executor.run(
+        lambda: ros_node.create_subscription(MarkerArray, "/ir_planner/markers", seen.append, latched)
+    )
+    answer = call(PlanServiceMovement, SERVICE, station="lathe_work", max_candidates=2)
+    wanted = {"service_zone", "service_candidates", "service_closest", "zones"}
+
+    def shown() -> bool:
+        return any(wanted <= {marker.ns for marker in message.markers} for message in seen)
+
+    wait_for(shown, what="the candidates are shown")
+    lines = [marker for marker in seen[-1].markers if marker.ns == "service_candidates"]
+    assert len(lines) == len(answer.candidates)
+
+
+def test_ccd_finds_what_the_closed_form_has(call: Call) -> None:
+    analytic = call(ComputeIk, "compute_ik", goal="lathe_work", method="analytic")
+    searched = call(ComputeIk, "compute_ik", goal="lathe_work", method="ccd", seed=3)
+    assert searched.status.code == Status.SUCCESS, searched.status.message
+    complete = np.array([solution.state.position for solution in analytic.solutions])
+    for solution in searched.solutions:
+        assert np.abs(complete - np.array(solution.state.position)).max(axis=1).min() < 1e-4
+    assert searched.info.seed == 3
+
+
+@pytest.mark.parametrize(
+    ("fields", "code", "word"),
+    [
+        ({"station": "nowhere"}, Status.INVALID_OBJECT_NAME, "lathe_work"),
+        ({"station": "lathe_work", "direction": "up"}, Status.INVALID_GOAL_CONSTRAINTS, "entry"),
+        ({"station": "lathe_work", "max_candidates": 0}, Status.INVALID_GOAL_CONSTRAINTS, "max_candidates"),
+        (
+            {"station": "lathe_work", "options": PlanOptions(planner_id="magic")},
+            Status.INVALID_GOAL_CONSTRAINTS,
+            "modified_ga",
+        ),
+        (
+            {
+                "station": "lathe_work",
+                "configuration": JointState(name=list(JOINT_NAMES), position=[9.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            },
+            Status.INVALID_ROBOT_STATE,
+            "deg",
+        ),
+        (
+            {
+                "station": "lathe_work",
+                "configuration": JointState(
+                    name=list(JOINT_NAMES), position=[-1.57, -0.1, 0.1, 0.0, 0.0, 0.0]
+                ),
+            },
+            Status.START_STATE_IN_COLLISION,
+            "must be more than",
+        ),
+    ],
+)
+def test_bad_requests_are_answered_and_the_node_lives_on(
+    call: Call, fields: dict[str, Any], code: int, word: str
+) -> None:
+    answer = call(PlanServiceMovement, SERVICE, **fields)
+    assert answer.status.code == code, answer.status.message
+    assert word in answer.status.message
+    assert not answer.candidates
+    assert call(ComputeIk, "compute_ik", goal="lathe_work").status.code == Status.SUCCESS
+
+
+def test_a_closed_door_leaves_no_configuration_and_says_the_best_clearance(call: Call) -> None:
+    call(SetEquipment, "set_equipment", name="lathe", state="door_closed")
+    answer = call(PlanServiceMovement, SERVICE, station="lathe_work")
+    assert answer.status.code == Status.GOAL_IN_COLLISION
+    assert "best clearance" in answer.status.message
+    assert "lathe_door_down" in answer.status.message
