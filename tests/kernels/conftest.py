@@ -1,10 +1,11 @@
-"""The kernels' tests share literals (robots.py, geometry_cases.py) and run on every build that is installed."""
+"""Literals shared by the kernels' tests (robots.py, geometry_cases.py), run on every installed build."""
 
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+
 from ir_kernels import compiled
 
 sys.path.insert(0, str(Path(__file__).parent))
