@@ -322,6 +322,7 @@ class Planner:
             bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s"),
             self.settings.regeneration,  # type: ignore[arg-type]
             self.pauses,
+            self.withdrawal,
         )
         movements = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._budget(options, cancelled, movements), progress)

@@ -32,6 +32,7 @@ from ir_planner.regional import search_regional
 from ir_planner.reporting import total_report
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ServiceLine, timed_service
+from ir_planner.service_settings import WithdrawalSettings
 from ir_planner.settings import PauseSettings
 
 FloatArray = NDArray[np.float64]
@@ -63,6 +64,7 @@ class ProgramRequest:
     cycle_time: float = 0.0
     regeneration: Regeneration = "shared"
     pauses: PauseSettings = field(default_factory=PauseSettings)
+    withdrawal: WithdrawalSettings = field(default_factory=WithdrawalSettings)
 
 
 class _FailedError(Exception):
@@ -174,7 +176,8 @@ class _Planner:
         step, margin = self.steps[k].step, self.options.safety_distance
         if step.kind == "POSTURE":
             return posture_nodes(step.target, self._scene(k), margin, self.journal)
-        return station_nodes(step.target, self._scene(k), leaving, margin, near, self.journal)
+        settings = self.request.withdrawal
+        return station_nodes(step.target, self._scene(k), leaving, near, self.options, settings, self.journal)
 
     _unreachable = Status(StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations")
 

@@ -31,9 +31,13 @@ _TORQUE_SHARES = (0.97, 0.92, 0.85)
 
 @dataclass(frozen=True, eq=False)
 class ServiceLine:
-    """Configurations (L, n) from the work configuration to the outer end."""
+    """Configurations (L, n) from the work configuration to the outer end.
+
+    straight: points of a straight way of the tool; else waypoints of a withdrawal (eq. 7).
+    """
 
     points: FloatArray
+    straight: bool = True
 
     @property
     def work(self) -> FloatArray:
@@ -113,7 +117,7 @@ def timed_service(
     Raises TimingError when a torque does not suffice.
     """
     points = line.points[::-1] if entry else line.points
-    if len(points) < 3:
+    if len(points) < 3 or not line.straight:
         return timed_movement(points, scene, options, budget, station)
     names = scene.cell.robot.joint_names
     for share in _TORQUE_SHARES:

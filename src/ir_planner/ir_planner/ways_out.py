@@ -24,6 +24,7 @@ from ir_planner.service_settings import WithdrawalSettings
 from ir_planner.tree import Tree, connect
 from ir_planner.withdrawal import Walk, withdraw
 from ir_planner.work_area import WorkArea
+from ir_planner.zones import tcp_inside
 
 FloatArray = NDArray[np.float64]
 MODIFIED_GA, TREE = "modified_ga", "tree"
@@ -33,6 +34,7 @@ _DIFFERENT = 0.1  # rad: ways that end nearer to each other are one
 _END_SAMPLES = 24
 _BATCH, _SPREADS = 24, (0.05, 0.2, 0.6)  # of the trees' targets, rad
 _OUTSIDE_TRIES = 512
+_EDGE_SAMPLES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,19 @@ class Exit:
             out &= np.linalg.norm(way, axis=1) >= self.least_way
         out[out] = self.outside.states_free(q[out])
         return out
+
+    def contacts_end(self, path: FloatArray) -> bool:
+        """Whether a path (M, n) keeps S_m where its tcp is outside the zone: allowed contacts end there.
+
+        Asked at samples, so that what the proof of the movement would refuse is seldom timed.
+        """
+        scene, station = self.inside.scene, self.area.station.name
+        if not scene.allowed(station).any():
+            return True
+        share = np.linspace(0.0, 1.0, _EDGE_SAMPLES)[:, None, None]
+        q = (path[:-1] + share * np.diff(path, axis=0)).reshape(-1, path.shape[1])
+        beyond = ~tcp_inside(q, scene, station, self.safety_distance)
+        return bool(self.outside.states_free(q[beyond]).all())
 
 
 def ways_out(
@@ -196,12 +211,19 @@ def _cheapest(ways: list[Way], problem: Exit, wanted: int) -> list[Way]:
     shortened = []
     for way in ways:
         path = _end_drawn_back(fewest_corners(way.points, space, weights), problem)
-        shortened.append(Way(way.method, path))
+        shortened.append(Way(way.method, path if problem.contacts_end(path) else way.points))
     chosen: list[Way] = []
     for way in sorted(shortened, key=cost):
         if len(chosen) < wanted and all(_apart(way.points, other.points) for other in chosen):
             chosen.append(way)
-    return sorted((Way(way.method, pulled(way.points, space, weights)) for way in chosen), key=cost)
+    straight = [pulled(way.points, space, weights) for way in chosen]
+    return sorted(
+        (
+            Way(way.method, path if problem.contacts_end(path) else way.points)
+            for way, path in zip(chosen, straight, strict=True)
+        ),
+        key=cost,
+    )
 
 
 def _apart(a: FloatArray, b: FloatArray) -> bool:
