@@ -1,0 +1,158 @@
+"""Stage one: random starts, metric distances and set-back, acceptance and rejection (eqs. 1 to 6)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ir_planner.budget import Budget
+from ir_planner.errors import RequestError
+from ir_planner.goals import parse_goal
+from ir_planner.interaction_point import (
+    branches,
+    distinct_configurations,
+    random_starts,
+    searched_configurations,
+)
+from ir_planner.inverse_kinematics import free_configurations
+from ir_planner.planner import Planner
+from ir_planner.scene import PlanningScene
+from ir_planner.service_settings import InteractionSettings
+from ir_planner.set_back import LITERAL, SECANT, increments, shares_back
+
+HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+distances = st.floats(0.0201, 1.0)
+
+
+def test_starts_of_eq_1_fill_the_joint_range_as_a_truncated_normal() -> None:
+    low, high = np.array([-3.0, 0.0]), np.array([3.0, 1.0])
+    starts = random_starts(low, high, 20_000, "truncated_normal", np.random.default_rng(0))
+    assert (starts >= low).all()
+    assert (starts <= high).all()
+    np.testing.assert_allclose(starts.mean(axis=0), 0.5 * (low + high), atol=0.02)
+    # truncated at three sigmas the deviation is 0.9866 sigma, sigma a sixth of the range
+    np.testing.assert_allclose(starts.std(axis=0), 0.9866 * (high - low) / 6.0, rtol=0.02)
+
+
+def test_uniform_starts_are_an_option_and_seeds_repeat() -> None:
+    low, high = np.zeros(6), np.ones(6)
+    first, second = (random_starts(low, high, 500, "uniform", np.random.default_rng(4)) for _ in range(2))
+    assert np.array_equal(first, second)
+    assert abs(first.std() - 1.0 / np.sqrt(12.0)) < 0.01
+
+
+def test_eq_4_is_the_gain_of_every_metric_distance() -> None:
+    before, after = np.array([[0.1, -0.02]]), np.array([[0.07, 0.01]])
+    np.testing.assert_allclose(increments(before, after), [[-0.03, 0.03]])
+
+
+@given(d=distances, loss=st.floats(1e-3, 2.0))
+@settings(max_examples=200, deadline=None)
+def test_the_secant_step_of_eq_5_ends_at_the_safety_distance_or_beyond(d: float, loss: float) -> None:
+    margin = 0.02
+    after = d - loss
+    share = shares_back(np.array([[d]]), np.array([[after]]), np.array([margin]), SECANT, 0.05)[0]
+    if after > margin:
+        assert share == 0.0
+    else:  # on the linear distance that the secant assumes
+        assert 0.0 < share <= 1.0
+        assert after + share * (d - after) > margin or share == 1.0
+
+
+def test_the_literal_step_is_the_gain_in_metres_and_hardly_moves_where_bodies_touch() -> None:
+    threshold = np.array([0.02])
+    far = shares_back(np.array([[0.4]]), np.array([[-0.1]]), threshold, LITERAL, 0.05)
+    touching = shares_back(np.array([[0.0201]]), np.array([[0.0199]]), threshold, LITERAL, 0.05)
+    assert far[0] == pytest.approx(0.5)
+    assert touching[0] == pytest.approx(0.0002)
+
+
+def test_what_collided_before_the_step_is_not_set_back() -> None:
+    share = shares_back(np.array([[-0.1]]), np.array([[-0.2]]), np.array([0.02]), SECANT, 0.05)
+    assert share[0] == 0.0
+
+
+@pytest.mark.parametrize("set_back", [SECANT, LITERAL])
+@pytest.mark.parametrize(
+    ("cell", "station"), [("cnc_door", "cncL"), ("deep_box", "bin"), ("deep_box", "tun")]
+)
+def test_the_search_finds_a_part_of_the_complete_set(
+    cell: str, station: str, set_back: str, scene_of: Callable[[str], PlanningScene], budget: Budget
+) -> None:
+    scene = scene_of(cell)
+    pose, threshold = scene.station(station).pose, scene.thresholds(0.02, station)
+    complete = free_configurations(pose, scene, threshold, HOME)
+    chosen = InteractionSettings(set_back=set_back)
+    found = searched_configurations(pose, scene, threshold, HOME, 32, 1, chosen, budget)
+    assert len(found.q) > 0
+    for q, branch in zip(found.q, found.branch, strict=True):
+        same = np.abs(complete.q - q).max(axis=1)
+        assert same.min() < 1e-5  # Newton's steps end at rounding; wrists near singular take more of it
+        assert complete.branch[int(np.argmin(same))] == branch
+    costs = np.abs(found.q - HOME) @ scene.weights
+    assert (np.diff(costs) > -1e-5).all()
+
+
+def test_the_same_seed_gives_the_same_configurations(
+    scene_of: Callable[[str], PlanningScene], budget: Budget
+) -> None:
+    scene = scene_of("cnc_door")
+    pose, threshold = scene.station("press").pose, scene.thresholds(0.02, "press")
+    first, second = (
+        searched_configurations(pose, scene, threshold, HOME, 32, 5, InteractionSettings(), budget).q
+        for _ in range(2)
+    )
+    assert np.array_equal(first, second)
+
+
+def test_every_start_is_accepted_or_rejected_with_a_reason(
+    scene_of: Callable[[str], PlanningScene], budget: Budget
+) -> None:
+    scene = scene_of("deep_box")
+    pose, threshold = scene.station("bin").pose, scene.thresholds(0.02, "bin")
+    found = searched_configurations(pose, scene, threshold, HOME, 40, 2, InteractionSettings(), budget)
+    at_the_pose = sum(n for reason, n in found.rejected.items() if reason.startswith("at the pose"))
+    assert found.reached - at_the_pose + sum(found.rejected.values()) == 40
+    assert any("too near bin_" in reason for reason in found.rejected)
+
+
+def test_a_pose_out_of_reach_has_no_solution_and_says_so(planner: Planner) -> None:
+    far = planner.compute_ik(parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "ccd", 0.02, HOME, "")
+    assert not far.solutions
+    assert "not converged" in " ".join(rejection.reason for rejection in far.info.rejected)
+
+
+def test_a_number_of_starts_beyond_its_bound_is_refused(planner: Planner) -> None:
+    goal = parse_goal("lathe_work", planner.cell)
+    for starts in (0, 1_000_000):
+        with pytest.raises(RequestError, match="starts"):
+            planner.compute_ik(goal, "ccd", 0.02, HOME, "", starts, 0)
+
+
+def test_an_unknown_method_lists_both(planner: Planner) -> None:
+    with pytest.raises(RequestError, match="analytic, ccd"):
+        planner.compute_ik(parse_goal("lathe_work", planner.cell), "guess", 0.02, HOME, "")
+
+
+def test_near_twins_are_one_configuration() -> None:
+    q = np.array([[0.0, 0.0], [1e-5, 0.0], [0.5, 0.0]])
+    assert len(distinct_configurations(q)) == 2
+
+
+def test_branches_are_those_of_the_closed_form(scene_of: Callable[[str], PlanningScene]) -> None:
+    scene = scene_of("cnc_door")
+    closed = scene.inverse_kinematics.solve(scene.station("press").pose[None])
+    assert np.array_equal(branches(np.ascontiguousarray(closed.q), scene), closed.branch)
+
+
+def test_a_budget_that_is_spent_ends_the_search(scene_of: Callable[[str], PlanningScene]) -> None:
+    scene = scene_of("cnc_door")
+    spent = Budget(10, time.monotonic() - 1.0, time.monotonic)
+    pose, threshold = scene.station("press").pose, scene.thresholds(0.02, "press")
+    found = searched_configurations(pose, scene, threshold, HOME, 8, 0, InteractionSettings(), spent)
+    assert len(found.q) == 0
+    assert spent.truncated

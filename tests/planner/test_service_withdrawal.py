@@ -1,0 +1,341 @@
+"""Stage two: withdrawal by eq. (7) from every station in a zone, certified, ranked, with reasons."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.status import StatusCode
+from ir_planner.budget import Budget
+from ir_planner.errors import CancelledError, RequestError
+from ir_planner.inverse_kinematics import free_configurations
+from ir_planner.journal import Journal
+from ir_planner.planner import Planner
+from ir_planner.program import ProgramRequest, plan_program
+from ir_planner.reporting import evaluate_trajectory
+from ir_planner.scene import PlanningScene, load_text, scene_with
+from ir_planner.service_movement import ServicePlan, ServiceRequest, plan_service
+from ir_planner.service_settings import WithdrawalSettings
+from ir_planner.step_weights import accumulated_mass, step_weights
+from ir_planner.ways_out import Exit, ways_out
+from ir_planner.withdrawal import withdraw
+from ir_planner.work_area import WorkArea
+
+from ir_description import Body, PowerData, load_cell
+
+IN_ZONES = [
+    ("cnc_door", "cnc"),
+    ("cnc_door", "cncL"),
+    ("cnc_door", "press"),
+    ("deep_box", "bin"),
+    ("deep_box", "binhi"),
+    ("deep_box", "tun"),
+    ("demo", "infeed_pick"),
+    ("demo", "lathe_work"),
+    ("demo", "outfeed_place"),
+]
+SceneOf = Callable[[str], PlanningScene]
+
+
+def a_budget(edges: int = 60_000) -> Budget:
+    return Budget(edges, time.monotonic() + 60.0, time.monotonic)
+
+
+def planned(scene: PlanningScene, station: str, direction: str = "exit", **choices: Any) -> ServicePlan:
+    configuration = choices.pop("configuration", None)
+    wanted = choices.pop("max_candidates", 2)
+    options = PlanOptions(**{"planning_time": 60.0, **choices})
+    request = ServiceRequest(
+        scene.station(station), direction, configuration, np.array(scene.cell.park), wanted
+    )
+    return plan_service(request, scene, options, WithdrawalSettings(), a_budget())
+
+
+def problem_at(scene: PlanningScene, name: str, budget: Budget) -> Exit:
+    station = scene.station(name)
+    free = free_configurations(station.pose, scene, scene.thresholds(0.02, name), scene.cell.park)
+    return Exit.of(free.q[0], scene, station, 0.02, budget)
+
+
+# -- eq. (7)
+
+
+def test_mass_accumulates_from_the_tool_to_the_joint(demo_scene: PlanningScene) -> None:
+    mass = demo_scene.cell.robot.link_mass
+    total = accumulated_mass(mass, 155.0)
+    assert total[-1] == pytest.approx(mass[-1] + 155.0)
+    assert total[0] == pytest.approx(mass[1:].sum() + 155.0)
+    assert (np.diff(total) < 0.0).all()
+
+
+def test_literal_weights_grow_towards_the_base_and_inverse_ones_towards_the_tool() -> None:
+    mass = np.array([100.0, 300.0, 200.0, 50.0])
+    literal, inverse = step_weights(mass, 10.0, "literal"), step_weights(mass, 10.0, "inverse")
+    assert (np.diff(literal) < 0.0).all()
+    assert (np.diff(inverse) > 0.0).all()
+    assert literal.mean() == pytest.approx(1.0)
+    assert inverse.mean() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("weighting", ["literal", "inverse"])
+@pytest.mark.parametrize(("cell", "station"), IN_ZONES)
+def test_the_modified_ga_walks_out_over_certified_steps_while_d_grows(
+    cell: str, station: str, weighting: str, scene_of: SceneOf
+) -> None:
+    scene = scene_of(cell)
+    for seed in range(3):
+        problem = problem_at(scene, station, a_budget())
+        chosen = WithdrawalSettings(weighting=weighting)
+        walk = withdraw(
+            problem.work,
+            problem.area,
+            problem.inside,
+            problem.is_out,
+            chosen,
+            np.random.default_rng(seed),
+            1,
+        )
+        assert walk.paths, walk.rejected.most_common(3)
+        path = walk.paths[0]
+        assert np.array_equal(path[0], problem.work)
+        assert problem.inside.edges_free(path[:-1], path[1:]).all()
+        total = problem.area.total_distance(path)
+        assert total[-1] > total[0]
+        assert problem.area.zone_distance(path[-1:])[0] > 0.02
+
+
+def test_d_counts_only_what_moves_and_this_machine(demo_scene: PlanningScene) -> None:
+    area = WorkArea.of(demo_scene, demo_scene.station("lathe_work"))
+    q = np.array(demo_scene.cell.park)[None]
+    bodies = {body.name for body in demo_scene.cell.machine("lathe").world_bodies()}
+    fixed = {capsule.name for capsule in demo_scene.cell.robot.capsules if capsule.link == 0}
+    wanted = [
+        z
+        for z, pair in enumerate(demo_scene.collision.pairs)
+        if pair.body_b in bodies and pair.body_a not in fixed
+    ]
+    assert area.pairs == len(wanted)
+    assert area.total_distance(q)[0] == pytest.approx(
+        demo_scene.collision.distances(q)[0, wanted].sum(), abs=1e-5
+    )
+
+
+def test_every_candidate_of_the_walk_is_kept_or_has_a_reason(scene_of: SceneOf) -> None:
+    problem = problem_at(scene_of("deep_box"), "tun", a_budget())
+    walk = withdraw(
+        problem.work,
+        problem.area,
+        problem.inside,
+        problem.is_out,
+        WithdrawalSettings(),
+        np.random.default_rng(0),
+        2,
+    )
+    reasons = Counter(
+        reason.split(" beyond")[0] if "beyond" in reason else reason for reason in walk.rejected
+    )
+    assert 0 < sum(walk.rejected.values()) < walk.candidates
+    assert any("too near tun_" in reason for reason in reasons)
+
+
+# -- the whole movement
+
+
+@pytest.mark.parametrize("direction", ["exit", "entry"])
+@pytest.mark.parametrize(
+    ("cell", "station"), [("cnc_door", "cncL"), ("deep_box", "tun"), ("demo", "infeed_pick")]
+)
+def test_candidates_are_certified_distinct_and_ranked(
+    cell: str, station: str, direction: str, scene_of: SceneOf
+) -> None:
+    scene = scene_of(cell)
+    plan = planned(scene, station, direction, max_candidates=3, objective="time")
+    assert plan.status.ok, plan.status.message
+    times = [candidate.report.duration for candidate in plan.candidates]
+    assert times == sorted(times)
+    for candidate in plan.candidates:
+        trajectory = candidate.trajectory
+        assert trajectory is not None
+        again = evaluate_trajectory(trajectory, scene, 0.02, station)
+        assert again.verification.certified
+        ends = (candidate.work, candidate.outside)
+        first, last = ends if direction == "exit" else ends[::-1]
+        assert np.array_equal(trajectory.positions[0], first)
+        assert np.array_equal(trajectory.positions[-1], last)
+        pose = scene.chain.tcp_poses(candidate.work[None])[0]
+        np.testing.assert_allclose(pose, scene.station(station).pose, atol=1e-8)
+    outer = np.array([candidate.outside for candidate in plan.candidates])
+    for k in range(1, len(outer)):
+        assert np.abs(outer[:k] - outer[k]).max(axis=1).min() > 0.05
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_way(scene_of: SceneOf) -> None:
+    scene = scene_of("cnc_door")
+    ids = [
+        tuple(candidate.trajectory_id for candidate in planned(scene, "press", seed=seed).candidates)
+        for seed in (3, 3, 4)
+    ]
+    assert ids[0] == ids[1]
+    assert ids[0] != ids[2]
+
+
+@pytest.mark.parametrize(("cell", "station"), IN_ZONES)
+def test_the_tree_finds_a_way_where_it_is_asked_to(cell: str, station: str, scene_of: SceneOf) -> None:
+    plan = planned(scene_of(cell), station, planner_id="tree", max_candidates=1)
+    assert plan.status.ok, plan.status.message
+    assert plan.candidates[0].method == plan.info.planner_id == "tree"
+    assert plan.candidates[0].report.certified
+
+
+def test_the_tree_takes_over_where_the_walk_is_given_up(scene_of: SceneOf) -> None:
+    scene = scene_of("deep_box")
+    problem = problem_at(scene, "bin", a_budget())
+    journal = Journal(problem.inside.budget, 0)
+    found = ways_out(problem, WithdrawalSettings(generations=1), 1, "", journal)
+    assert [way.method for way in found.ways] == ["tree"]
+    assert [stage.name for stage in journal.stages] == ["modified GA", "tree", "shorten"]
+
+
+def test_a_configuration_of_the_request_is_where_the_movement_starts(scene_of: SceneOf) -> None:
+    scene = scene_of("cnc_door")
+    free = free_configurations(
+        scene.station("press").pose, scene, scene.thresholds(0.02, "press"), scene.cell.park
+    )
+    plan = planned(scene, "press", configuration=free.q[-1])
+    assert plan.status.ok, plan.status.message
+    assert all(np.array_equal(candidate.work, free.q[-1]) for candidate in plan.candidates)
+
+
+def test_outside_the_zone_already_the_tool_goes_by_the_approach_distance(demo_scene: PlanningScene) -> None:
+    station = demo_scene.station("gauge_measure")
+    plan = planned(demo_scene, station.name)
+    assert plan.status.ok, plan.status.message
+    for candidate in plan.candidates:
+        ends = demo_scene.chain.tcp_poses(np.stack([candidate.work, candidate.outside]))[:, :3, 3]
+        assert np.linalg.norm(ends[1] - ends[0]) >= station.approach_distance - 1e-9
+
+
+# -- failures
+
+
+@pytest.fixture(scope="module")
+def boxed(power: PowerData) -> PlanningScene:
+    """The press with plates before its opening: the hole that is left takes the wrist, not the tool."""
+    cell = load_cell("cnc_door")
+    machine, hole = cell.machine("press"), 0.26
+
+    def plate(name: str, size: tuple[float, float, float], y: float, z: float) -> Body:
+        pose = np.eye(4)
+        pose[:3, 3] = (-0.5, y, z)
+        return Body(name, "box", pose, np.array(size))
+
+    plates = (
+        plate("plate_left", (0.02, 0.6, 0.8), hole + 0.3, 1.1),
+        plate("plate_right", (0.02, 0.6, 0.8), -hole - 0.3, 1.1),
+        plate("plate_top", (0.02, 1.1, 0.6), 0.0, 1.1 + hole + 0.3),
+        plate("plate_bottom", (0.02, 1.1, 0.6), 0.0, 1.1 - hole - 0.3),
+    )
+    closed = replace(machine, bodies=(*machine.bodies, *plates))
+    boxed = replace(cell, equipment=tuple(closed if m is machine else m for m in cell.equipment))
+    return scene_with(boxed, load_text(boxed), power)
+
+
+def test_a_box_without_an_exit_is_answered_within_the_budget_and_names_its_walls(
+    boxed: PlanningScene,
+) -> None:
+    request = ServiceRequest(boxed.station("press"), "exit", None, np.array(boxed.cell.park))
+    budget = a_budget(3000)
+    plan = plan_service(request, boxed, PlanOptions(), WithdrawalSettings(), budget)
+    assert plan.status.code == StatusCode.PLANNING_FAILED
+    assert "to leave the zone of press (clearance there" in plan.status.message
+    assert "too near plate_" in plan.status.message
+    assert "modified GA (0 ways" in plan.status.message
+    assert "tree (no way)" in plan.status.message
+    assert budget.iterations < 3200
+    assert not budget.truncated
+    assert any("plate_" in rejection.reason for rejection in plan.info.rejected)
+
+
+def test_a_pose_out_of_reach_is_no_ik_solution(demo_scene: PlanningScene) -> None:
+    station = demo_scene.station("gauge_measure")
+    pose = np.array(station.pose)
+    pose[:3, 3] += [3.0, 0.0, 0.0]
+    request = ServiceRequest(replace(station, pose=pose), "exit", None, np.array(demo_scene.cell.park))
+    plan = plan_service(request, demo_scene, PlanOptions(), WithdrawalSettings(), a_budget())
+    assert plan.status.code == StatusCode.NO_IK_SOLUTION
+    assert "gauge_measure" in plan.status.message
+
+
+def test_no_free_configuration_says_the_best_clearance(demo_scene: PlanningScene) -> None:
+    plan = planned(demo_scene, "lathe_work", safety_distance=0.5)
+    assert plan.status.code == StatusCode.GOAL_IN_COLLISION
+    assert "the best clearance is" in plan.status.message
+
+
+def test_a_start_in_collision_is_refused_with_its_pair(scene_of: SceneOf) -> None:
+    scene = scene_of("cnc_door")
+    plan = planned(scene, "cnc", configuration=np.array([0.0, -0.2, 0.2, 0.0, 0.0, 0.0]))
+    assert plan.status.code == StatusCode.START_STATE_IN_COLLISION
+    assert "must be more than 20.0 mm" in plan.status.message
+    entry = planned(scene, "cnc", "entry", configuration=np.array([0.0, -0.2, 0.2, 0.0, 0.0, 0.0]))
+    assert entry.status.code == StatusCode.GOAL_IN_COLLISION
+
+
+def test_without_a_way_out_the_answer_says_how_far_it_came_and_what_was_in_the_way(
+    scene_of: SceneOf,
+) -> None:
+    scene = scene_of("cnc_door")
+    options = PlanOptions(planning_time=60.0, max_iterations=400, planner_id="modified_ga")
+    request = ServiceRequest(scene.station("cnc"), "exit", None, np.array(scene.cell.park), 1)
+    plan = plan_service(request, scene, options, WithdrawalSettings(generations=1), a_budget(400))
+    assert plan.status.code == StatusCode.PLANNING_FAILED
+    assert "lacks" in plan.status.message
+    assert "clearance there" in plan.status.message
+    assert "tried: " in plan.status.message
+    assert not plan.candidates
+
+
+def test_cancelling_ends_the_search(scene_of: SceneOf) -> None:
+    scene = scene_of("deep_box")
+    budget = Budget(60_000, time.monotonic() + 60.0, time.monotonic, lambda: True)
+    request = ServiceRequest(scene.station("tun"), "exit", None, np.array(scene.cell.park))
+    with pytest.raises(CancelledError):
+        plan_service(request, scene, PlanOptions(), WithdrawalSettings(), budget)
+
+
+def test_unknown_choices_list_the_known(planner: Planner) -> None:
+    park = np.array(planner.cell.park)
+    for fields, word in (
+        (("nowhere", "exit", None, park, 3, PlanOptions()), "lathe_work"),
+        (("lathe_work", "sideways", None, park, 3, PlanOptions()), "exit, entry"),
+        (("lathe_work", "exit", None, park, 0, PlanOptions()), r"\[1, 20\]"),
+        (("lathe_work", "exit", None, park, 3, PlanOptions(planner_id="magic")), "modified_ga, tree"),
+    ):
+        with pytest.raises(RequestError, match=word):
+            planner.plan_service(*fields)
+
+
+# -- in a program
+
+
+def test_a_program_withdraws_where_the_straight_line_does_not_leave_the_zone(power: PowerData) -> None:
+    cell = load_cell("cnc_door")
+    request = ProgramRequest(
+        cell, power, ("cncL", "pal"), np.array(cell.park), PlanOptions(planning_time=60.0)
+    )
+    plan = plan_program(request, a_budget(), lambda phase, done, total, cost: None)
+    assert plan.status.ok, plan.status.message
+    exits = [m for m in plan.movements if m.kind == "service_exit"]
+    scene = scene_with(cell, load_text(cell), power)
+    area = WorkArea.of(scene, scene.station("cncL"))
+    assert len(exits) == 1
+    trajectory = exits[0].trajectory
+    assert trajectory is not None
+    assert area.zone_distance(trajectory.positions[-1:])[0] > 0.02
+    assert all(m.report.certified for m in plan.movements if not m.is_pause)
