@@ -68,7 +68,9 @@ if TYPE_CHECKING:
 
 _NS = 1_000_000_000
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-_STREAM = QoSProfile(depth=100)
+# Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged yet. What
+# is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
+_STREAM = QoSProfile(depth=2000)
 _ROBOT = ColorRGBA(r=1.0, g=0.45, b=0.1, a=1.0)
 _LOAD = ColorRGBA(r=0.35, g=0.4, b=0.45, a=1.0)
 _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
