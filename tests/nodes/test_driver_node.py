@@ -133,6 +133,23 @@ def test_bus_power_off_by_bits_and_back(make_driver, cell_client, listen, wait_f
     wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
 
 
+def test_levels_in_force_are_published_whoever_sets_them(make_driver, cell_client, listen, wait_for):
+    driver = make_driver(modbus=True, modbus_port=0)
+    in_force = listen(names.PLC_INPUTS_IN_FORCE, PlcInputs, latched=True)
+    wait_for(lambda: in_force, timeout=20.0)
+    assert in_force[0].move_enable
+    assert in_force[0].operating_mode == PlcInputs.EXT
+    cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
+    wait_for(lambda: in_force[-1].ab)
+    with ModbusTcpClient("127.0.0.1", port=driver.modbus_port) as plc:
+        plc.write_coil(COILS.index("emergency_stop"), True)
+        wait_for(lambda: in_force[-1].emergency_stop)
+    assert in_force[-1].ab
+    cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=False))
+    wait_for(lambda: not in_force[-1].ab)
+    assert len(in_force) == 4
+
+
 def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wait_for, ros_node):
     driver = make_driver()
     states = listen(names.JOINT_STATES, JointState)

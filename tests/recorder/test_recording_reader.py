@@ -8,11 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ir_msgs.msg import PlcInputs
 from ir_recorder.cdr import Columns
 from ir_recorder.errors import ReadError
+from ir_recorder.qos import QosOffer
 from ir_recorder.raw import read_raw
 from ir_recorder.reader import read_recording
 from ir_recorder.schemas import SchemaLibrary
+from ir_recorder.session import RecordingSession
+from ir_recorder.writer import RecordingWriter
 from mcap.reader import make_reader
 from mcap.records import Schema
 from mcap.writer import Writer
@@ -33,6 +37,22 @@ def test_series_are_what_was_published(demo_file: Path) -> None:
     assert recording.events[0].movement.to_station == "table"
     assert recording.loads[0].text == "none"
     assert recording.fact("hibernation_leave") == "3 s"
+
+
+def test_levels_in_force_are_preferred_to_those_that_were_sent(tmp_path: Path) -> None:
+    kind = "ir_msgs/msg/PlcInputs"
+    for topics in (["plc_inputs"], ["plc_inputs", "plc_inputs_in_force"]):
+        path = tmp_path / f"{len(topics)}.mcap"
+        session = RecordingSession(RecordingWriter(path), {}, 10**18)
+        for topic in topics:
+            name = f"/ir_sim_driver/{topic}"
+            session.open_topic(name, kind, [QosOffer(transient_local=True)])
+            sent = PlcInputs(ab=topic == "plc_inputs", hib=topic != "plc_inputs")
+            session.message(name, serialize_message(sent), 10**18)
+        session.finish()
+        series = read_recording(path).plc_inputs
+        levels = dict(zip(series.names, series.levels[0].tolist(), strict=True))
+        assert (levels["ab"], levels["hib"]) == ((1, 0) if len(topics) == 1 else (0, 1))
 
 
 def test_columns_agree_with_the_decoder_message_by_message(demo_file: Path) -> None:

@@ -66,7 +66,7 @@ class _Reader:
             joints=self._series(names.JOINT_STATES, self._joints),
             power=self._series(names.POWER_STATE, self._power),
             controller=self._series(names.CONTROLLER_STATE, self._controller),
-            plc_inputs=self._series(names.PLC_INPUTS, self._bits(_IN_BITS, stamped=False), needed=False),
+            plc_inputs=self._plc_inputs(),
             plc_outputs=self._series(names.PLC_OUTPUTS, self._bits(_OUT_BITS, stamped=True), needed=False),
             events=tuple(self._events()),
             loads=tuple(self._loads()),
@@ -153,6 +153,12 @@ class _Reader:
             return BitSeries(self._seconds(times), bits, levels)
 
         return build
+
+    def _plc_inputs(self) -> BitSeries | None:
+        """What counted, whoever set it; in a recording without it what was sent on the topic."""
+        bits = self._bits(_IN_BITS, stamped=False)
+        in_force = self._series(names.PLC_INPUTS_IN_FORCE, bits, needed=False)
+        return in_force or self._series(names.PLC_INPUTS, bits, needed=False)
 
     def _events(self) -> Iterator[ProgramEvent]:
         broken = 0

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
-from ir_msgs_py.plc import PlcOutputs
+from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_msgs_py.power import PowerState
 
 from ir_sim_driver.arrays import Array
@@ -31,7 +31,8 @@ NO_GOAL = 0
 class Frame:
     """What is published at a stamp [ns]; None: nothing of it now.
 
-    q, qd, torque (n,) are None while the controller is off the network.
+    q, qd, torque (n,) are None while the controller is off the network. inputs: the levels that count, when
+    they have changed, whoever set them.
     """
 
     stamp_ns: int
@@ -41,6 +42,7 @@ class Frame:
     power: PowerState | None
     following: Following | None
     outputs: PlcOutputs | None
+    inputs: PlcInputs | None = None
 
 
 class Driver:
@@ -57,6 +59,7 @@ class Driver:
         self._burnt = 0.0
         self._metered = 0.0
         self._outputs: PlcOutputs | None = None
+        self._inputs: PlcInputs | None = None
 
     def close(self) -> None:
         """Stop checking trajectories."""
@@ -134,9 +137,12 @@ class Driver:
                 self._outputs = outputs = present
         if online and simulation.steps % CONTROLLER_PERIOD < self._steps:
             following = simulation.executor.following(backend.q, backend.qd)
+        levels = simulation.plc.levels
+        inputs = None if levels is self._inputs or not online or levels == self._inputs else levels
+        self._inputs = inputs or self._inputs
         if not online:
             return Frame(stamp_ns, None, None, None, power, None, outputs)
-        return Frame(stamp_ns, backend.q, backend.qd, backend.torque, power, following, outputs)
+        return Frame(stamp_ns, backend.q, backend.qd, backend.torque, power, following, outputs, inputs)
 
     def _power(self, stamp_ns: int) -> PowerState:
         simulation = self._simulation

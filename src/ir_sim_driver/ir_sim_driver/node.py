@@ -17,6 +17,7 @@ from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, Sta
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.conversions import (
     plc_inputs_from_msg,
+    plc_inputs_to_msg,
     plc_outputs_to_msg,
     point_to_msg,
     power_state_to_msg,
@@ -142,6 +143,7 @@ class SimDriver(Node):
         self._power_states = self.create_publisher(PowerState, names.POWER_STATE, _STREAM)
         self._controller_states = self.create_publisher(ControllerState, names.CONTROLLER_STATE, _STREAM)
         self._outputs = self.create_publisher(PlcOutputsMsg, names.PLC_OUTPUTS, _LATCHED)
+        self._in_force = self.create_publisher(PlcInputsMsg, names.PLC_INPUTS_IN_FORCE, _LATCHED)
         self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
         self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
         self._description = self.create_publisher(String, names.ROBOT_DESCRIPTION, _LATCHED)
@@ -204,6 +206,8 @@ class SimDriver(Node):
             msg = plc_outputs_to_msg(frame.outputs)
             msg.header.stamp = time_to_msg(stamp_ns)
             self._outputs.publish(msg)
+        if frame.inputs is not None:
+            self._in_force.publish(plc_inputs_to_msg(frame.inputs))
 
     def _clock_jumped(self, sentence: str) -> None:
         with self._driver.locked() as simulation:
