@@ -6,6 +6,7 @@ import platform
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from glob import glob
 
 from setuptools import Extension, find_packages, setup
@@ -82,6 +83,15 @@ class BuildBothVariants(build_ext):
                 file=sys.stderr,
             )
 
+    def build_extensions(self):
+        with ThreadPoolExecutor(os.cpu_count() or 2) as self.pool:
+            super().build_extensions()
+
+    def compile_files_side_by_side(self, sources, **options):
+        """CCompiler.compile, on the processors that both variants share."""
+        jobs = [self.pool.submit(self.compiler.compile, [source], **options) for source in sources]
+        return [name for job in jobs for name in job.result()]
+
     def build_extension(self, ext):
         compiler = self.compiler.compiler_so[0]
         native = ext.name.endswith("_native")
@@ -99,6 +109,8 @@ class BuildBothVariants(build_ext):
         ext.define_macros = [*ext.define_macros, ("IR_NATIVE_FEATURES", f'"{",".join(features)}"')]
         own = copy.copy(self)  # its own folder for objects: both variants compile the same files
         own.build_temp = os.path.join(self.build_temp, ext.name)
+        own.compiler = copy.copy(self.compiler)
+        own.compiler.compile = self.compile_files_side_by_side
         super(BuildBothVariants, own).build_extension(ext)
 
 
