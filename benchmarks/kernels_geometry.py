@@ -82,7 +82,7 @@ def _speed(name: str, cell: Cell, rng: np.random.Generator) -> tuple[list[Row], 
     path, random = path_like(cell, rng), uniform(cell, rng, SAMPLES)
     coal, bullet = Coal(model, capsules, bodies), Bullet(cell, model, bodies)
     ours = best(lambda: model.min_distance(path), SAMPLES, REPETITIONS)
-    theirs = best(lambda: [coal.compute(q) for q in path[:COAL_SAMPLES]], COAL_SAMPLES, 5)
+    theirs = best(lambda: coal.compute_all(path[:COAL_SAMPLES]), COAL_SAMPLES, 5)
     pybullet = best(lambda: [bullet.compute(q) for q in path[:BULLET_SAMPLES]], BULLET_SAMPLES, 2)
     others = {
         "minimum distance, random": best(lambda: model.min_distance(random), SAMPLES, REPETITIONS),

@@ -84,6 +84,11 @@ class Coal:
         """All distances at one configuration."""
         pinocchio.computeDistances(self.model, self.data, self.geometry, self.geometry_data, q)
 
+    def compute_all(self, batch: Array) -> None:
+        """All distances, one configuration after the other."""
+        for q in batch:
+            self.compute(q)
+
     def distances(self, q: Array) -> Array:
         """(Z,), after compute, in the order of the model's pairs."""
         self.compute(q)
