@@ -125,19 +125,19 @@ class _Descent:
         q[:, i] = value
         after = self.scene.collision.distances(q)
         blocked = np.full(len(q), -1)
-        rows = np.arange(len(q))
+        rows = np.flatnonzero(((after <= self.threshold) & (before > self.threshold)).any(axis=1))
         for attempt in range(self.settings.repairs + 1):
-            share = shares_back(
-                before[rows], after[rows], self.threshold, self.settings.set_back, self.settings.overshoot
-            )
-            rows, share = rows[share > 0.0], share[share > 0.0]
+            start, end = before[rows], after[rows]
+            share = shares_back(start, end, self.threshold, self.settings.set_back, self.settings.overshoot)
+            back = share > 0.0
+            rows, share = rows[back], share[back]
             if len(rows) == 0:
                 break
-            blocked[rows] = np.argmin(after[rows] - self.threshold, axis=1)
+            blocked[rows] = np.argmin(end[back] - self.threshold, axis=1)
             step = q[rows, i] - old[rows]
             last = attempt == self.settings.repairs
             q[rows, i] = old[rows] if last else q[rows, i] - share * step
-            after[rows] = before[rows] if last else self.scene.collision.distances(q[rows])
+            after[rows] = start[back] if last else self.scene.collision.distances(q[rows])
         return q, after, blocked
 
     def _finish(self, q: FloatArray) -> tuple[BoolArray, FloatArray]:

@@ -3,8 +3,6 @@
 Everything is tried in batches of certified edges, so a polished path is as free as the one it came from.
 """
 
-import itertools
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,12 +44,12 @@ def fewest_corners(path: FloatArray, space: FreeSpace, weights: FloatArray) -> F
 
 def densified(path: FloatArray, count: int) -> FloatArray:
     """The path with points added in its longest steps until there are `count`."""
-    points = [np.asarray(q) for q in path]
+    points = np.array(path)
     while len(points) < count:
-        steps = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(points)]
-        k = int(np.argmax(steps))
-        points.insert(k + 1, 0.5 * (points[k] + points[k + 1]))
-    return np.array(points)
+        k = int(np.argmax(np.square(np.diff(points, axis=0)).sum(axis=1)))
+        middle = 0.5 * (points[k] + points[k + 1])
+        points = np.concatenate([points[: k + 1], middle[None], points[k + 1 :]])
+    return points
 
 
 def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray:

@@ -22,7 +22,7 @@ class InteractionSettings:
     overshoot: float = setting(
         0.05, "eps of eq. 5: how much farther than the secant says.", minimum=0.0, maximum=1.0
     )
-    repairs: int = setting(4, "Times a step is set back before it is taken back.", minimum=1, maximum=50)
+    repairs: int = setting(2, "Times a step is set back before it is taken back.", minimum=1, maximum=50)
     sweeps: int = setting(6, "Sweeps over the joints before a start is given up.", minimum=1, maximum=1000)
     finish_every: int = setting(
         2, "Sweeps between two tries to finish with Newton's steps.", minimum=1, maximum=1000

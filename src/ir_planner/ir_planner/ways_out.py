@@ -209,7 +209,7 @@ def _cheapest(ways: list[Way], problem: Exit, wanted: int) -> list[Way]:
         return path_cost(weights, way.points)
 
     shortened = []
-    for way in ways:
+    for way in sorted(ways, key=cost)[: _SEARCHED * wanted]:
         path = _end_drawn_back(fewest_corners(way.points, space, weights), problem)
         shortened.append(Way(way.method, path if problem.contacts_end(path) else way.points))
     chosen: list[Way] = []
