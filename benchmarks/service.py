@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _service_checks import clearance_left, largest_share, over_ros
+from _service_stations import StationFigures, measured, scene_of
 from kernels import commit, machine
-from service_checks import clearance_left, largest_share, over_ros
-from service_stations import StationFigures, measured, scene_of
 
 from ir_description import load_cell
 
