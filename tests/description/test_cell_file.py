@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -310,3 +310,12 @@ def test_a_huge_mesh_is_refused_unread(tmp_path: Path) -> None:
         file.truncate(2_000_000_000)
     with pytest.raises(CellFileError, match="has 2000000000 bytes, must be at most 20000000 bytes"):
         load_cell(cell_with(tmp_path, "mesh.stl"))
+
+
+def test_a_half_turn_is_written_the_same_whatever_the_sign_of_its_zeros() -> None:
+    cell = load_cell("open")
+    turned = np.diag([-1.0, -1.0, 1.0, 1.0])
+    negative = turned.copy()
+    negative[1, 0] = -0.0
+    texts = {cell_to_yaml(replace(cell, base_pose=pose)) for pose in (turned, negative)}
+    assert len(texts) == 1

@@ -180,6 +180,7 @@ def _pose(pose: Array) -> str:
     if np.array_equal(R, np.eye(3)):
         return xyz
     abc = np.round(abc_from_rotation(R), _DIGITS)
+    abc[abc == -180.0] = 180.0  # the same turn: a signed zero in R must not change the text
     if np.array_equal(rotation_from_abc(abc), R):
         return f"{xyz}, abc_deg: {_row(abc)}"
     return f"{xyz}, rotation: [{', '.join(_row(row) for row in R)}]"
