@@ -15,10 +15,10 @@ import subprocess
 from dataclasses import asdict
 from pathlib import Path
 
-import kernels_build
-import kernels_dynamics
-import kernels_geometry
-from kernels_dynamics import Claim, Row
+import _kernels_build
+import _kernels_dynamics
+import _kernels_geometry
+from _kernels_dynamics import Claim, Row
 
 from ir_description import bundled_cells
 
@@ -50,10 +50,10 @@ def main() -> None:
     claims: list[Claim] = []
     cells = given.cell or [name for name in bundled_cells() if name != "demo"]
     for seed in range(given.seeds):
-        for part in (kernels_geometry.measure(cells, seed), kernels_dynamics.measure(seed)):
+        for part in (_kernels_geometry.measure(cells, seed), _kernels_dynamics.measure(seed)):
             rows += part[0]
             claims += part[1]
-    part = kernels_build.measure(given.build)
+    part = _kernels_build.measure(given.build)
     rows += part[0]
     claims += part[1]
     for row in rows:

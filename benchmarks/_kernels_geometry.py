@@ -15,8 +15,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from kernels_dynamics import Claim, Row, best
-from kernels_peers import Bullet, Coal
+from _kernels_dynamics import Claim, Row, best
+from _kernels_peers import Bullet, Coal
 from numpy.typing import NDArray
 
 from ir_description import Cell, load_cell

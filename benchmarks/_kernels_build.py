@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from kernels_dynamics import Claim, Row
+from _kernels_dynamics import Claim, Row
 
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "ir_kernels"
 IMPORT = "import time, numpy; t = time.perf_counter(); import ir_kernels; print(time.perf_counter() - t)"

@@ -1,6 +1,6 @@
 """Dynamics and inverse kinematics half of `benchmarks/kernels.py`: nanoseconds per sample, beside Pinocchio.
 
-`rows()` measures and `claims()` judges; `python benchmarks/kernels_dynamics.py` prints both on its own.
+`rows()` measures and `claims()` judges; `python benchmarks/_kernels_dynamics.py` prints both on its own.
 One thread, best of several repetitions (what the machine can do, not what its other work leaves), peers in
 the same run.
 """
