@@ -38,7 +38,7 @@ check: setup      ## ruff and mypy --strict
 	@$(BIN)/mypy
 
 sanitize: setup   ## the compiled core under the address and undefined-behaviour sanitizers
-	@PYTHON=$(BIN)/python src/ir_kernels/sanitize.sh $(ARGS)
+	@PYTHON=$(CURDIR)/$(BIN)/python src/ir_kernels/sanitize.sh $(ARGS)
 
 bench: setup      ## every benchmark, its claims at the end; JSON in out/bench
 	@mkdir -p out/bench; for script in benchmarks/[!_]*.py; do \
