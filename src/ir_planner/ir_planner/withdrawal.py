@@ -135,9 +135,10 @@ class _Walker:
         q, owner, total = q[order], owner[order], total[order]
         chosen = self._certified(parents, q, owner)
         children = self._children(parents, q[chosen], owner[chosen], total[chosen])
-        stuck = np.flatnonzero(collided)
+        survivors = len(children)
         children = self._finished(children)
-        if len(stuck):  # all of its offspring collide: look 1 rad around it
+        stuck = np.flatnonzero(collided if survivors else np.ones(len(parents), dtype=bool))
+        if len(stuck):  # all of its offspring collide, or all steps do: look 1 rad around it
             stay = parents.of(stuck)
             again = _Population(
                 stay.q,
