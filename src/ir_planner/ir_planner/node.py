@@ -5,12 +5,12 @@ other services nor its own cancel.
 """
 
 import random
+import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point
 from ir_msgs.action import Plan
@@ -32,13 +32,14 @@ from ir_msgs.srv import (
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.ros.conversions import configuration_from_msg, pose_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.polled import LatestMessage
+from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -258,20 +259,12 @@ def _marker(shape: Shape, number: int) -> Marker:
     return marker
 
 
-def main(args: Sequence[str] | None = None) -> None:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped."""
-    rclpy.init(args=args)
-    node = PlannerNode()
-    executor = MultiThreadedExecutor(num_threads=_THREADS)
-    executor.add_node(node)
-    try:
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    return run_node(
+        names.PLANNER, PlannerNode, arguments, executor=lambda: MultiThreadedExecutor(num_threads=_THREADS)
+    )
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import rclpy
 from ir_msgs.action import RunProgram
 from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
@@ -24,12 +23,12 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.driver import Driver
 from ir_msgs_py.ros.planner import Planner
+from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
@@ -264,26 +263,8 @@ class ProgramRunnerNode(Node):
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is told to end."""
-    rclpy.init(args=arguments)
-    node = None
-    try:
-        node = ProgramRunnerNode()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (ParameterError, DescriptionError, ValueError) as error:
-        sys.stderr.write(f"{names.PROGRAM_RUNNER}: {error}\n")
-        return 1
-    except Exception:  # a signal while the node is being made leaves it half made: that is no fault
-        if rclpy.ok():
-            raise
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    refusals = (ParameterError, DescriptionError, ValueError)
+    return run_node(names.PROGRAM_RUNNER, ProgramRunnerNode, arguments, refusals=refusals)
 
 
 if __name__ == "__main__":

@@ -8,20 +8,16 @@ the node.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import StatusCode
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ir_msgs_py import names
@@ -116,6 +112,13 @@ class RecorderNode(Node):
             f"{self._listener.lost} lost"
         )
         return summary
+
+    def destroy_node(self) -> None:
+        """End the recording, if there is one, then the node."""
+        try:
+            self.finish()
+        finally:
+            super().destroy_node()
 
     def _on_start(self, request: Any, response: Any) -> Any:
         response.status.source = self.get_name()
@@ -245,36 +248,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
     parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
     options = parser.parse_args(remove_ros_args(["ir-record", *everything])[1:])
-    # rclpy's own handlers end the context, perhaps between two lines of finishing the file; a flag can't
-    stopping = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stopping.set())
-    rclpy.init(args=everything, signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        return _record(options, stopping)
-    except (RecorderError, MsgsError) as error:
-        sys.stderr.write(f"ir-record: {error}\n")
-        return 1
-    finally:
-        rclpy.try_shutdown()
 
-
-def _record(options: argparse.Namespace, stopping: threading.Event) -> int:
-    node = RecorderNode()
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    try:
-        if options.path:
-            node.start(options.path, options.overwrite, options.topics, options.cell)
-        while not stopping.is_set():
-            executor.spin_once(timeout_sec=0.1)
-    finally:
+    def start() -> RecorderNode:
+        node = RecorderNode()
         try:
-            node.finish()
-        finally:
-            executor.remove_node(node)
+            if options.path:
+                node.start(options.path, options.overwrite, options.topics, options.cell)
+        except BaseException:
             node.destroy_node()
-    return 0
+            raise
+        return node
+
+    return run_node("ir-record", start, everything, refusals=(RecorderError, MsgsError))
 
 
 if __name__ == "__main__":

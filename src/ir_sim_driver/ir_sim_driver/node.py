@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from typing import TYPE_CHECKING, Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Pose, Quaternion, Vector3
 from ir_msgs.action import ExecuteTrajectory
@@ -23,9 +21,8 @@ from ir_msgs_py.ros.conversions import (
     power_state_to_msg,
     time_to_msg,
 )
-from rclpy._rclpy_pybind11 import RCLError
+from ir_msgs_py.ros.running import run_node
 from rclpy.action import ActionServer, CancelResponse
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
@@ -378,32 +375,11 @@ def _diagnostic(entry: Entry) -> DiagnosticStatus:
     )
 
 
-def main() -> None:
+def main() -> int:
     """Spin the driver until it is told to stop."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
-    rclpy.init()
-    node = None
-    try:
-        node = SimDriver()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except RCLError:
-        if (
-            rclpy.ok()
-        ):  # else a signal has shut the context down under the executor: that is an end like others
-            raise
-    except (DriverError, DescriptionError, MsgsError) as error:
-        sys.exit(f"ir_sim_driver: {error}")
-    finally:
-        for number in (signal.SIGINT, signal.SIGTERM):  # a second one must not cut the clean-up short
-            signal.signal(number, signal.SIG_IGN)
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
+    return run_node(names.SIM_DRIVER, SimDriver, refusals=(DriverError, DescriptionError, MsgsError))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

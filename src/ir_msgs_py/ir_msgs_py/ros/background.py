@@ -12,9 +12,11 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
+
+from ir_msgs_py.ros.running import Spinning
 
 T = TypeVar("T")
 _POLL = 0.005  # s, for conditions that nobody announces, as the discovery of a service
@@ -31,6 +33,7 @@ class BackgroundExecutor:
         self._executor = SingleThreadedExecutor(context=context)
         self._nodes: list[Node] = []
         self._failure: BaseException | None = None
+        self._spinning = Spinning()
         self._thread = threading.Thread(target=self._spin, name="ros_spin", daemon=True)
         self._thread.start()
 
@@ -74,8 +77,9 @@ class BackgroundExecutor:
 
     def close(self) -> None:
         """Stop spinning and destroy the nodes; raises what a callback raised and nobody has heard of yet."""
-        self._executor.shutdown(timeout_sec=5.0)
+        self._spinning.end()  # first, so that nobody spins what is taken apart
         self._thread.join(5.0)
+        self._executor.shutdown(timeout_sec=5.0)
         for node in self._nodes:
             node.destroy_node()
         self._nodes.clear()
@@ -95,9 +99,7 @@ class BackgroundExecutor:
     def _spin(self) -> None:
         while True:
             try:
-                self._executor.spin()
-            except (ExternalShutdownException, ShutdownException):
-                return
+                self._spinning.run(self._executor)
             except Exception as failure:  # of somebody's callback: it belongs to whoever waits
                 self._failure = failure
             else:

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-import rclpy
-from rclpy.executors import ExternalShutdownException
+from ir_msgs_py.ros.running import run_node
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
@@ -65,6 +64,11 @@ class PlayNode(Node):
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
+
+    def destroy_node(self) -> None:
+        """Stop playing, then end the node."""
+        self.stop()
+        super().destroy_node()
 
     @property
     def playing(self) -> bool:
@@ -126,16 +130,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     for problem in recording.problems:
         sys.stderr.write(f"ir-play: {problem}\n")
-    rclpy.init(args=everything)
-    node = PlayNode(recording, settings, options.clock, options.delay)
-    node.start()
-    try:
-        while node.playing:
-            rclpy.spin_once(node, timeout_sec=0.1)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.stop()
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+
+    def start() -> PlayNode:
+        node = PlayNode(recording, settings, options.clock, options.delay)
+        node.start()
+        return node
+
+    return run_node("ir-play", start, everything, goes_on=lambda node: node.playing)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,115 @@
+"""A node as a process: made, spun until SIGINT or SIGTERM, cleaned up while its context is still whole.
+
+rclpy's own signal handlers end the context under the executor and the clean-up, which then fail in many ways
+(ExternalShutdownException, RCLError, KeyboardInterrupt in any line). Here a signal only ends the spinning,
+and a second one finds nothing to cut short.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import rclpy
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.executors import Executor, ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+N = TypeVar("N", bound=Node)
+_POLL = 0.1  # s
+
+
+class Spinning:
+    """Spins an executor in the thread that calls `run`, until any thread calls `end`."""
+
+    def __init__(self) -> None:
+        self._ended = threading.Event()
+        self._executor: Executor | None = None
+
+    def run(self, executor: Executor, goes_on: Callable[[], bool] | None = None) -> None:
+        """Return after `end`, when the executor's context has ended, or soon after goes_on() is False.
+
+        Raises what a callback raises; `run` may be called again then.
+        """
+        self._executor = executor
+        context = executor.context
+        period = None if goes_on is None else _POLL
+        try:
+            while not self._ended.is_set() and context.ok() and (goes_on is None or goes_on()):
+                executor.spin_once(timeout_sec=period)
+        except (ExternalShutdownException, ShutdownException):
+            return
+        except RCLError:
+            if context.ok():
+                raise  # else somebody ended the context between two lines of the executor
+
+    def end(self) -> None:
+        """Let `run` return after the present callback."""
+        if self._ended.is_set():
+            return
+        self._ended.set()
+        executor = self._executor
+        if executor is not None:
+            executor.create_task(_nothing)  # waking alone does not end a wait, work does
+
+
+def run_node(
+    name: str,
+    make: Callable[[], N],
+    arguments: Sequence[str] | None = None,
+    *,
+    executor: Callable[[], Executor] = SingleThreadedExecutor,
+    refusals: tuple[type[Exception], ...] = (),
+    goes_on: Callable[[N], bool] | None = None,
+) -> int:
+    """Make the node and spin it until a signal comes, or soon after goes_on(node) is False; the exit code.
+
+    refusals: what `make` or the clean-up raises for reasons that a sentence on stderr explains (exit code
+    1). Call it in the main thread, as the last thing of a process: its signals stay taken.
+    """
+    spinning = Spinning()
+    _on_signals(spinning.end)
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = make()
+        try:
+            spins = executor()
+            spins.add_node(node)
+            spinning.run(spins, None if goes_on is None else lambda: goes_on(node))
+            spins.remove_node(node)
+        finally:
+            node.destroy_node()
+    except refusals as error:
+        sys.stderr.write(f"{name}: {error}\n")
+        return 1
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+def _on_signals(act: Callable[[], None]) -> None:
+    """Call `act` in a thread of its own at each SIGINT or SIGTERM, also while the main thread is in C."""
+    heard, told = os.pipe()
+    os.set_blocking(told, False)
+
+    def listen() -> None:
+        while os.read(heard, 1):
+            act()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _ignore)
+    signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    threading.Thread(target=listen, name="signals", daemon=True).start()
+
+
+def _ignore(number: int, frame: object) -> None:
+    """What Python does in the main thread when it comes to it: nothing more."""
+
+
+def _nothing() -> None:
+    """A task that ends a wait."""

@@ -1,0 +1,73 @@
+"""Every node as a process: SIGINT or SIGTERM, once or twice, ends it with exit code 0 and no traceback."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+
+from ir_msgs_py import names
+
+MODULES = {
+    names.PLANNER: ["ir_planner.node"],
+    names.SIM_DRIVER: ["ir_sim_driver.node", "--ros-args", "-p", "cell:=open", "-p", "wake_port:=0"],
+    names.PROGRAM_RUNNER: ["ir_program_runner.node"],
+    names.RECORDER: ["ir_recorder.node", "FILE"],
+    "ir_play": ["ir_recorder.play.node", "FILE", "--loop", "--delay", "60"],
+}
+INT, TERM = signal.SIGINT, signal.SIGTERM
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    from ir_recorder.qos import QosOffer
+    from ir_recorder.session import RecordingSession
+    from ir_recorder.writer import RecordingWriter
+    from rclpy.serialization import serialize_message
+    from std_msgs.msg import String
+
+    path = tmp_path_factory.mktemp("recording") / "played.mcap"
+    session = RecordingSession(RecordingWriter(path), {}, 10**18)
+    session.open_topic("/text", "std_msgs/msg/String", [QosOffer()])
+    session.message("/text", serialize_message(String(data="a")), 10**18)
+    session.finish()
+    return path
+
+
+@pytest.fixture
+def watcher(monkeypatch):
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    context = Context()
+    rclpy.init(context=context)
+    node = Node("watcher", context=context)
+    yield node
+    node.destroy_node()
+    context.try_shutdown()
+
+
+@pytest.mark.parametrize("signals", [[INT], [TERM], [INT, INT], [TERM, INT]])
+@pytest.mark.parametrize("name", MODULES)
+def test_a_node_that_is_told_to_end_ends_well(name, signals, recording, tmp_path, watcher, wait_for):
+    file = recording if name == "ir_play" else tmp_path / "new.mcap"
+    words = [str(file) if word == "FILE" else word for word in MODULES[name]]
+    process = subprocess.Popen([sys.executable, "-m", *words], stderr=subprocess.PIPE, text=True)
+    try:
+        wait_for(lambda: name in watcher.get_node_names(), timeout=60.0)
+        for number in signals:
+            process.send_signal(number)
+        assert process.wait(30.0) == 0
+        assert process.stderr is not None
+        assert "Traceback" not in process.stderr.read()
+    finally:
+        process.kill()
+        assert process.stderr is not None
+        process.stderr.close()
+    if name == names.RECORDER:
+        from ir_recorder.raw import read_raw
+
+        assert read_raw(file).problems == ()
