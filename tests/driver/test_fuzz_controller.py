@@ -84,9 +84,23 @@ def act(simulation, what, value, plan, start):
             simulation.plc.set_bit(bit, value)
 
 
-@settings(max_examples=60, deadline=None)
-@given(sequence=st.lists(st.tuples(actions, st.integers(1, 120)), min_size=5, max_size=30))
+sequences = st.lists(st.tuples(actions, st.integers(1, 120)), min_size=5, max_size=30)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(sequence=sequences)
 def test_no_sequence_breaks_the_controller(make, plan, start, sequence):
+    keep_the_laws(make, plan, start, sequence)
+
+
+@pytest.mark.long
+@settings(max_examples=1_000, deadline=None, derandomize=True)
+@given(sequence=sequences)
+def test_a_thousand_sequences_don_t_break_the_controller(make, plan, start, sequence):
+    keep_the_laws(make, plan, start, sequence)
+
+
+def keep_the_laws(make, plan, start, sequence):
     simulation = make(
         transitions=QUICK, controller=ControllerSettings(enabling_switch=True), load="none", backend="ideal"
     )
@@ -118,10 +132,11 @@ def test_no_sequence_breaks_the_controller(make, plan, start, sequence):
         assert reading.energy == pytest.approx(parts, rel=1e-9, abs=1e-6)
 
 
-def test_a_hundred_thousand_steps_of_random_bits(make):
+@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(8, 12))])
+def test_a_hundred_thousand_steps_of_random_bits(make, seed):
     """Bits that a broken PLC might send, 1000 a second."""
     simulation = make(transitions=QUICK, load="none")
-    generator = np.random.default_rng(7)
+    generator = np.random.default_rng(seed)
     seen = set()
     before = simulation.modes.mode
     for k in range(100_000):

@@ -14,6 +14,7 @@ from ir_sim_driver.driver import Driver
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.modbus import ModbusServer
 from ir_sim_driver.modbus_map import COILS, DISCRETE_INPUTS, HEARTBEAT, INPUT_REGISTERS, OPERATING_MODE, PAUSE
+from ir_sim_driver.plc import PlcSettings
 from ir_sim_driver.plc_link import PlcLink
 from ir_sim_driver.power_modes import TransitionSettings
 from ir_sim_driver.simulation_settings import ControllerSettings
@@ -199,12 +200,54 @@ def endangered(make):
     driver.close()
 
 
-@settings(max_examples=60, deadline=None)
-@given(frames=st.lists(st.binary(min_size=0, max_size=40), min_size=1, max_size=4), framed=st.booleans())
+word = st.one_of(st.integers(0, 20), st.integers(0, 0xFFFF))
+pdu = st.builds(
+    lambda function, words, rest: struct.pack(f">B{len(words)}H", function, *words) + rest,
+    st.one_of(st.sampled_from([1, 2, 3, 4, 5, 6, 15, 16, 22, 23]), st.integers(0, 255)),
+    st.lists(word, max_size=4),
+    st.binary(max_size=8),
+)
+requests = st.lists(st.one_of(pdu, st.binary(max_size=40)), min_size=1, max_size=4)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(frames=requests, framed=st.booleans())
 def test_no_bytes_bring_the_server_down(endangered, frames, framed):
+    survive(endangered, frames, framed)
+
+
+@pytest.mark.long
+@settings(max_examples=5_000, deadline=None, derandomize=True)
+@given(frames=requests, framed=st.booleans())
+def test_five_thousand_connections_don_t_bring_the_server_down(endangered, frames, framed):
+    survive(endangered, frames, framed)
+
+
+def survive(endangered, frames, framed):
     driver, port = endangered
+    with driver.locked() as simulation:  # a request may have put the controller to sleep
+        simulation.plc.set_bit("hib", False)
+        simulation.wake()
     with socket.create_connection(("127.0.0.1", port), timeout=2.0) as link:
         for body in frames:
             link.sendall(struct.pack(">HHHB", 1, 0, len(body) + 1, 1) + body if framed else body)
     run(driver, 0.01)
     assert exchange(port, struct.pack(">BHH", 1, 0, 1))[0] in (0x01, 0x81)
+
+
+def test_inputs_that_belong_to_the_topic_are_refused_but_the_emergency_stop(make, serve):
+    simulation = make(plc=PlcSettings(owner="topic"))
+    driver, client, _ = serve(simulation)
+    assert client.write_coil(coil("ab"), True).exception_code == 3
+    assert client.write_register(OPERATING_MODE, 1).exception_code == 3
+    run(driver, 0.1)
+    assert not simulation.plc.levels.ab
+    assert any("plc.owner" in notice.sentence for notice in simulation.notices.take())
+    levels = [True] * len(COILS)
+    assert (
+        client.write_coils(0, levels).exception_code == 3
+    )  # all at once: the stop counts, the rest does not
+    run(driver, 0.1)
+    assert simulation.modes.mode is Mode.EMERGENCY_STOP
+    assert not simulation.plc.raw.ab
+    assert client.write_coil(coil("emergency_stop"), False).exception_code == 3  # released by its owner only

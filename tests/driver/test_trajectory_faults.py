@@ -140,6 +140,7 @@ def test_effort_and_multi_dof_are_unsupported(standing, start, plan, home):
         (JointTolerance("joint_a1", -2.0), "-2"),
         (JointTolerance("joint_a1", float("nan")), "nan"),
         (JointTolerance("joint_a1", velocity=float("inf")), "inf"),
+        (JointTolerance("joint_a1", acceleration=0.5), "nobody measures accelerations"),
     ],
 )
 def test_tolerances_that_mean_nothing_are_refused(standing, start, plan, home, tolerance, word):
@@ -227,9 +228,20 @@ finite = st.floats(-10.0, 10.0)
 wild = st.one_of(finite, st.sampled_from([float("nan"), float("inf"), 1e300, -1e300, 5e-324]))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150, deadline=None, derandomize=True)
 @given(data=st.data())
-def test_no_trajectory_brings_the_driver_down(make, start, cell, data, fuzzed):
+def test_no_trajectory_brings_the_driver_down(start, cell, data, fuzzed):
+    survive(start, cell, data, fuzzed)
+
+
+@pytest.mark.long
+@settings(max_examples=10_000, deadline=None, derandomize=True)
+@given(data=st.data())
+def test_ten_thousand_trajectories_don_t_bring_the_driver_down(start, cell, data, fuzzed):
+    survive(start, cell, data, fuzzed)
+
+
+def survive(start, cell, data, fuzzed):
     """Whatever comes in: a named refusal, or a motion that keeps its limits."""
     simulation = fuzzed
     count = data.draw(st.integers(1, 4))

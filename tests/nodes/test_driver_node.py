@@ -6,6 +6,7 @@ import socket
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
@@ -148,6 +149,29 @@ def test_levels_in_force_are_published_whoever_sets_them(make_driver, cell_clien
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=False))
     wait_for(lambda: not in_force[-1].ab)
     assert len(in_force) == 4
+
+
+def test_inputs_belong_to_their_owner_but_the_emergency_stop_to_everybody(
+    make_driver, cell_client, listen, ros_node, wait_for
+):
+    make_driver(**{"plc.owner": "service"})
+    in_force = listen(names.PLC_INPUTS_IN_FORCE, PlcInputs, latched=True)
+    told = listen(names.DIAGNOSTICS, DiagnosticArray)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    publisher = ros_node.create_publisher(PlcInputs, names.PLC_INPUTS, latched)
+    publisher.publish(PlcInputs(ab=True))
+    wait_for(lambda: any("plc.owner" in s.message for msg in told for s in msg.status), timeout=20.0)
+    cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="drives_on", value=True))
+    wait_for(lambda: in_force and in_force[-1].drives_on, timeout=20.0)
+    publisher.publish(PlcInputs(ab=True, emergency_stop=True))
+    wait_for(lambda: in_force[-1].emergency_stop)
+    assert not any(msg.ab for msg in in_force)
+
+
+def test_inputs_of_another_owner_are_refused_to_the_service(make_driver, cell_client):
+    make_driver(**{"plc.owner": "modbus"})
+    with pytest.raises(RequestRefusedError, match=r"belong to 'modbus' \(parameter plc.owner\)"):
+        cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
 
 
 def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wait_for, ros_node):

@@ -31,6 +31,7 @@ _READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT = 1, 2, 3, 4
 _WRITE_COILS, _WRITE_HOLDING = (5, 15), (6, 16)
 _FUNCTIONS = (_READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT, *_WRITE_COILS, *_WRITE_HOLDING)
 _FUNCTION, _REFUSAL = 7, 0x80  # place of the function in a frame, mark of a refusal
+_FOR_ALL = ("heartbeat", "emergency_stop")  # written first: what is refused comes after them
 _BITS = 16  # coils live in registers of 16
 
 
@@ -161,7 +162,9 @@ class ModbusServer:
     def _write_coils(self, address: int, values: list[Any]) -> ExcCodes | None:
         if address + len(values) > len(COILS):
             return ExcCodes.ILLEGAL_ADDRESS
-        for k, level in enumerate(values, start=address):
+        levels = dict(enumerate(values, start=address))
+        for k in sorted(levels, key=lambda k: COILS[k] not in _FOR_ALL):
+            level = levels[k]
             if k == HEARTBEAT:
                 self._link.heartbeat()
             else:

@@ -49,6 +49,7 @@ from ir_sim_driver.messages import (
 )
 from ir_sim_driver.notices import Level
 from ir_sim_driver.parameters import DriverParameters, NodeSettings
+from ir_sim_driver.plc import TOPIC
 from ir_sim_driver.plc_link import PlcLink
 from ir_sim_driver.real_time import GridThread, ScaledClock
 from ir_sim_driver.services import Services
@@ -229,10 +230,17 @@ class SimDriver(Node):
 
     def _on_plc_inputs(self, msg: PlcInputsMsg) -> None:
         with self._driver.locked() as simulation:
+            plc, refusal = simulation.plc, simulation.plc.refusal(TOPIC)
             try:
-                simulation.plc.set_all(plc_inputs_from_msg(msg))
+                inputs = plc_inputs_from_msg(msg)
+                if not refusal:
+                    plc.set_all(inputs)
+                elif inputs.emergency_stop:
+                    plc.set_bit("emergency_stop", True)
             except MsgsError as error:
-                simulation.notices.add(Level.WARN, f"plc_inputs ignored: {error}")
+                refusal = str(error)
+            if refusal:
+                simulation.notices.add(Level.WARN, f"plc_inputs ignored: {refusal}")
 
     def _on_speed_scaling(self, msg: Float64) -> None:
         with self._driver.locked() as simulation:

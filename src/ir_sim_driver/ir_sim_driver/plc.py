@@ -15,6 +15,8 @@ from ir_msgs_py.settings import check_settings, setting
 
 from ir_sim_driver.notices import Level, Notices
 
+TOPIC, MODBUS, SERVICE = "topic", "modbus", "service"
+OWNERS = ("any", TOPIC, MODBUS, SERVICE)
 POWER_BITS = ("ab", "hib", "ks")
 BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
 _BIT_OF_REST = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib"}
@@ -38,6 +40,13 @@ class PlcSettings:
         unit="s",
         minimum=0.0,
         maximum=60.0,
+        read_only=True,
+    )
+
+    owner: str = setting(
+        "any",
+        "Who may set PLC inputs; 'any': the last writer of a bit. A pressed emergency stop counts from all.",
+        choices=OWNERS,
         read_only=True,
     )
 
@@ -66,6 +75,16 @@ class Plc:
         self._uptime = 0.0
         self._greeted = False
         self._judged: tuple[object, bool] = (None, False)
+
+    def refusal(self, writer: str, presses_stop: bool = False) -> str:
+        """Why `writer` (TOPIC, MODBUS or SERVICE) may not set inputs, "" when it may.
+
+        presses_stop: all it wants is emergency_stop = 1, which anybody may.
+        """
+        owner = self._settings.owner
+        if presses_stop or owner in ("any", writer):
+            return ""
+        return f"PLC inputs belong to {owner!r} (parameter plc.owner): {writer} may only press emergency_stop"
 
     def set_all(self, inputs: PlcInputs) -> None:
         """Take all levels at once, as the topic and the field bus do."""

@@ -12,6 +12,9 @@ from ir_msgs_py.status import StatusCode
 from ir_sim_driver.driver import Driver
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.modbus_map import COILS, HEARTBEAT, Readout
+from ir_sim_driver.notices import Level
+from ir_sim_driver.plc import MODBUS
+from ir_sim_driver.simulation import Simulation
 
 
 class PlcLink:
@@ -49,8 +52,9 @@ class PlcLink:
             return [bool(getattr(simulation.plc.raw, name)) for name in COILS[:HEARTBEAT]]
 
     def write_coil(self, name: str, level: bool) -> None:
-        """Set the level of one coil."""
+        """Set the level of one coil. Raises RequestRefusedError."""
         with self._driver.locked() as simulation:
+            _check_owner(simulation, presses_stop=name == "emergency_stop" and level)
             simulation.plc.set_bit(name, level)
 
     def operating_mode(self) -> int:
@@ -65,6 +69,7 @@ class PlcLink:
                 StatusCode.INVALID_GOAL_CONSTRAINTS, f"operating mode is {mode}: it must be in 1 .. 4"
             )
         with self._driver.locked() as simulation:
+            _check_owner(simulation)
             simulation.plc.set_operating_mode(OperatingMode(mode))
 
     def write_pause(self, seconds: int) -> None:
@@ -79,3 +84,10 @@ class PlcLink:
         """The PLC is alive; from the first one on it is watched."""
         with self._driver.locked() as simulation:
             simulation.watch.beat(simulation.time, self._watchdog)
+
+
+def _check_owner(simulation: Simulation, presses_stop: bool = False) -> None:
+    refusal = simulation.plc.refusal(MODBUS, presses_stop)
+    if refusal:
+        simulation.notices.add(Level.WARN, refusal)
+        raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, refusal)

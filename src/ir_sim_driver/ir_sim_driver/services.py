@@ -18,6 +18,7 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_sim_driver.driver import Driver
 from ir_sim_driver.errors import DriverError, RequestRefusedError
 from ir_sim_driver.loads import CUSTOM, carried, custom_load
+from ir_sim_driver.plc import SERVICE
 from ir_sim_driver.simulation import Simulation
 
 
@@ -37,6 +38,9 @@ class Services:
                 plc.raw.with_bit(request.name, bool(request.value))
             except MsgsError as error:
                 raise RequestRefusedError(StatusCode.INVALID_OBJECT_NAME, str(error)) from error
+            refusal = plc.refusal(SERVICE, request.name == "emergency_stop" and bool(request.value))
+            if refusal:
+                raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, refusal)
             if request.name in OperatingMode.__members__:
                 plc.set_operating_mode(OperatingMode[request.name])
             else:

@@ -143,6 +143,11 @@ def _check_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) ->
                 f"{what} tolerance of {tolerance.name} is {value:g}: it must be at least 0 (0: "
                 "default), or -1 (unbounded)"
             )
+    if tolerance.acceleration > 0.0:
+        raise _invalid(
+            f"acceleration tolerance of {tolerance.name} is {tolerance.acceleration:g} rad/s^2: nobody "
+            "measures accelerations, it must be 0 (default) or -1 (unbounded)"
+        )
 
 
 def _invalid(sentence: str) -> TrajectoryRefusedError:

@@ -1,0 +1,165 @@
+"""The driver on somebody else's /clock: late start, freeze, a hundred times faster, back and ahead."""
+
+from __future__ import annotations
+
+import threading
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.node import SimDriver
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+
+from ir_description import load_cell
+from ir_msgs_py import names
+
+NS = 1_000_000_000
+PERIOD = 2_000_000
+TICK = 5_000_000  # ns of real time between two messages of the clock
+
+
+class ClockSource:
+    """Publishes /clock every 5 ms from a thread of its own; `rate` [s/s] and `now` [ns] may be set."""
+
+    def __init__(self, node):
+        self._publisher = node.create_publisher(Clock, "/clock", 10)
+        self.now, self.rate = 0, 1.0
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def start(self, now):
+        self.now = now
+        self._thread.start()
+
+    def close(self):
+        self._end.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self):
+        while not self._end.wait(TICK / NS):
+            self.now += round(TICK * self.rate)
+            msg = Clock()
+            msg.clock.sec, msg.clock.nanosec = divmod(self.now, NS)
+            self._publisher.publish(msg)
+
+
+@pytest.fixture
+def clock(ros_node):
+    source = ClockSource(ros_node)
+    yield source
+    source.close()
+
+
+@pytest.fixture
+def stamps(ros_node):
+    received = []
+    ros_node.create_subscription(
+        JointState,
+        names.JOINT_STATES,
+        lambda msg: received.append(msg.header.stamp.sec * NS + msg.header.stamp.nanosec),
+        QoSProfile(depth=2000),
+    )
+    return received
+
+
+@pytest.fixture
+def driver(ros_context, ros_executor):
+    values = {"cell": "open", "backend": "ideal", "wake_port": 0, "use_sim_time": True}
+    overrides = [Parameter(name, value=value) for name, value in values.items()]
+    return ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+
+
+@pytest.fixture
+def client(ros_context, driver):
+    with Client(context=ros_context) as client:
+        yield client
+
+
+def movement(step=0.05, duration=0.5):
+    cell = load_cell("open")
+    q = np.array(cell.machine_home)
+    rest = np.zeros((2, 6))
+    return JointTrajectory.from_seconds(cell.robot.joint_names, [0.0, duration], [q, q + step], rest, rest)
+
+
+def gaps(stamps):
+    return [b - a for a, b in pairwise(stamps)]
+
+
+def test_before_the_clock_starts_nothing_passes_and_then_the_grid_begins(driver, clock, stamps, wait_for):
+    wait_for(lambda: clock._publisher.get_subscription_count() > 0, timeout=20.0)
+    with driver._driver.locked() as simulation:
+        assert simulation.steps == 0
+    assert not stamps
+    clock.start(1_000 * NS)
+    wait_for(lambda: len(stamps) > 300, timeout=20.0)
+    assert stamps[0] >= 1_000 * NS
+    assert set(gaps(stamps[:300])) == {PERIOD}
+
+
+def test_a_frozen_clock_freezes_the_plant_and_nothing_is_skipped_after(
+    driver, client, clock, stamps, wait_for
+):
+    clock.start(50 * NS)
+    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    clock.rate = 0.0
+    frozen = clock.now
+    wait_for(lambda: stamps[-1] + PERIOD > frozen, timeout=20.0)
+    count = len(stamps)
+    for _ in range(20):  # services go on while time stands
+        assert client.graph.publishers(names.JOINT_STATES)
+    assert len(stamps) == count
+    clock.rate = 1.0
+    wait_for(lambda: len(stamps) > count + 100, timeout=20.0)
+    assert set(gaps(stamps)) == {PERIOD}
+    assert client.execute(movement(), timeout=30.0).energy > 0.0
+
+
+@pytest.mark.parametrize(("jump", "where"), [(-20, "back"), (100, "ahead")])
+def test_a_jump_aborts_the_goal_with_its_reason_and_the_grid_starts_anew(
+    client, clock, stamps, wait_for, jump, where
+):
+    clock.start(100 * NS)
+    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    jumped = []
+
+    def leap(feedback):
+        if not jumped:
+            jumped.append(feedback)
+            clock.now += jump * NS
+
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.3, 4.0)))
+    result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=30.0)
+    assert result.error_code == ExecuteTrajectory.Result.INVALID_GOAL
+    assert f"the clock jumped {where}" in result.error_string
+    assert all(stamp % PERIOD == 0 for stamp in stamps)
+    assert sum(gap != PERIOD for gap in gaps(stamps)) == 1
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=30.0).error_code == 0
+
+
+def lead_in():
+    """A goal from wherever the robot stands."""
+    cell = load_cell("open")
+    home = np.array(cell.machine_home)[None]
+    trajectory = JointTrajectory.from_seconds(cell.robot.joint_names, [2.0], home, np.zeros((1, 6)))
+    return ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(trajectory))
+
+
+def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(client, clock, stamps, wait_for):
+    clock.start(10 * NS)
+    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    clock.rate = 100.0
+    wait_for(lambda: stamps[-1] > 40 * NS, timeout=60.0)
+    clock.rate = 1.0
+    wait_for(lambda: clock.now - stamps[-1] < NS, timeout=60.0)
+    assert min(gaps(stamps)) >= PERIOD
+    assert all(stamp % PERIOD == 0 for stamp in stamps)
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=30.0).error_code == 0
