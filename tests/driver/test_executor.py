@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.assembly import make_simulation
 from ir_sim_driver.execution_settings import ExecutionSettings
 from ir_sim_driver.goal import ErrorCode, JointTolerance
 
@@ -196,6 +198,28 @@ def test_a_hundred_replacements_a_second_end_each_goal_once(make, plan, start, h
     outcomes = simulation.take_outcomes()
     assert [outcome.goal_id for outcome in outcomes] == ids
     assert [outcome.code for outcome in outcomes] == [ErrorCode.INVALID_GOAL] * 99 + [ErrorCode.SUCCESSFUL]
+
+
+BOUND = np.array([600.0, 600.0, 600.0, 100.0, 100.0, 100.0])  # Nm, of docs/driver.md
+
+
+@pytest.mark.parametrize("load", ["none", "gripper"])
+@pytest.mark.parametrize("seed", range(3))
+def test_up_to_the_bound_a_disturbed_tool_stays_within_a_millimetre(load, seed, start, run_out):
+    simulation = make_simulation("demo", load, "pybullet")
+    home = np.array(simulation.cell.machine_home)
+    generator = np.random.default_rng(seed)
+    target = home + np.array([0.6, 0.2, -0.2, 0.4, 0.3, 0.5])
+    rest = np.zeros((2, 6))
+    names = simulation.robot.joint_names
+    start(simulation, JointTrajectory.from_seconds(names, [0.0, 1.6], [home, target], rest, rest))
+    outcomes = []
+    while not outcomes:
+        simulation.disturb(BOUND * generator.choice([-1.0, 1.0], 6))
+        simulation.run(float(generator.choice([0.005, 0.03, 0.2])))
+        outcomes = simulation.take_outcomes()
+    assert outcomes[0].code == ErrorCode.SUCCESSFUL
+    assert outcomes[0].max_tool_deviation < 0.001
 
 
 def test_the_tube_stops_a_disturbed_robot_on_its_path(make, plan, start, run_out, home, there, cell):

@@ -38,7 +38,7 @@ class Path:
     def _at(self, segment: int, t: float) -> Array:
         t2 = t * t
         powers = np.array((1.0, t, t2, t2 * t, t2 * t2, t2 * t2 * t))
-        value: Array = powers @ self._c[segment]
+        value: Array = np.dot(powers, self._c[segment])  # half the time of @ on arrays this small
         return value
 
     def position(self, s: float) -> Array:

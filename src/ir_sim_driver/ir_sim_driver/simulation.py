@@ -35,7 +35,7 @@ from ir_sim_driver.tool_point import ToolPoint
 from ir_sim_driver.trajectory_checks import check_goal, check_trajectory, checked_route
 from ir_sim_driver.watchdog import Watchdog
 
-METER_STEPS = 50
+METER_STEPS = 250  # at the latest: arrays of many steps cost what arrays of few do
 _HOME = 0.01  # rad
 _MANUAL = (OperatingMode.T1, OperatingMode.T2)
 
@@ -287,18 +287,19 @@ class Simulation:
         plc, executor, pauses = self.plc, self.executor, self.pauses
         if self.modes.motors_on:
             pauses.wants_motors = False
+        active = executor.active
         rest = plc.rest or pauses.rest
         if rest is None:
             if self._drives_off:
                 rest = Mode.STAND_ON_BRAKES
             elif pauses.wants_motors:
                 rest = Mode.STAND_ON_MOTORS
-        if executor.active and (self._restart or rest not in (None, Mode.STAND_ON_MOTORS)):
+        if active and (self._restart or (rest is not None and rest is not Mode.STAND_ON_MOTORS)):
             what = "Cold start" if self._restart else _name(rest)
             self.abort(f"{what} was requested during the movement; stopped on the path")
         wish = Wish(
             rest,
-            executor.active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
+            active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
             self._standing(),
             self._wake,
             plc.levels.emergency_stop or bool(self.fault),
