@@ -27,7 +27,7 @@ from ir_planner.ways_out import Exit, ways_out
 from ir_planner.withdrawal import withdraw
 from ir_planner.work_area import WorkArea
 
-from ir_description import Body, PowerData, load_cell
+from ir_description import Body, Cell, PowerData, load_cell
 
 IN_ZONES = [
     ("cnc_door", "cnc"),
@@ -219,6 +219,34 @@ def test_outside_the_zone_already_the_tool_goes_by_the_approach_distance(demo_sc
     for candidate in plan.candidates:
         ends = demo_scene.chain.tcp_poses(np.stack([candidate.work, candidate.outside]))[:, :3, 3]
         assert np.linalg.norm(ends[1] - ends[0]) >= station.approach_distance - 1e-9
+
+
+def test_a_machine_that_is_switched_off_has_no_zone_to_leave(demo_cell: Cell, power: PowerData) -> None:
+    cell = demo_cell.with_equipment("lathe", enabled=False)
+    scene = scene_with(cell, load_text(cell), power)
+    plan = planned(scene, "lathe_work", max_candidates=1)
+    assert plan.status.ok, plan.status.message
+    best = plan.candidates[0]
+    ends = scene.chain.tcp_poses(np.stack([best.work, best.outside]))[:, :3, 3]
+    assert np.linalg.norm(ends[1] - ends[0]) >= scene.station("lathe_work").approach_distance - 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_limits_hold_at_10_khz_and_distances_between_the_points(seed: int, scene_of: SceneOf) -> None:
+    scene, robot = scene_of("cnc_door"), scene_of("cnc_door").cell.robot
+    plan = planned(scene, "cncL", seed=seed, max_candidates=1)
+    trajectory = plan.candidates[0].trajectory
+    assert trajectory is not None
+    at = trajectory.sample(np.arange(0.0, trajectory.duration, 1e-4))
+    slack = 1.0 + 1e-6
+    assert (np.abs(at.qd) <= slack * robot.velocity_max).all()
+    assert (np.abs(at.qdd) <= slack * robot.acceleration_max).all()
+    assert (np.abs(at.qddd) <= slack * robot.jerk_max).all()
+    assert (at.q >= robot.position_min - 1e-9).all()
+    assert (at.q <= robot.position_max + 1e-9).all()
+    torque = np.abs(scene.dynamics.inverse_dynamics(at.q, at.qd, at.qdd))
+    assert (torque <= slack * scene.dynamics.torque_limit(at.qd)).all()
+    assert scene.collision.min_distance(at.q).distance.min() > 0.02 - 1e-6
 
 
 # -- failures

@@ -152,7 +152,10 @@ class _Walker:
 
     def _mean(self, parents: _Population) -> FloatArray:
         """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
-        grown = np.clip(parents.total / self.first_total, 0.25, _LARGEST_MEAN)
+        counted = self.area.pairs > 0  # a zone without bodies has no D
+        grown = np.clip(
+            parents.total / self.first_total if counted else np.ones(len(parents)), 0.25, _LARGEST_MEAN
+        )
         out = self._retreat(parents.q) * self.settings.step
         length = np.linalg.norm(out, axis=1, keepdims=True)
         last = parents.step
