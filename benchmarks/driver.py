@@ -3,35 +3,36 @@
     python benchmarks/driver.py [--cell FILE]... [--seeds N] [--seconds S] [--json FILE]
 
 Each cell's robot carries its tool through random rest-to-rest movements within the limits, stepped without
-ROS; then the node runs as a process of its own, and a subscriber in this process counts its joint states.
+ROS: as they are, then scaled, disturbed and canceled. The power modes are entered and left (Table II, times
+of transitions). Then the node runs as a process of its own, and a subscriber here counts its joint states.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
-import signal
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _driver_power import energy_rows, table_2_rows, transition_rows
+from _driver_stream import streamed
 from ir_kernels.power import DcBusParameters, dc_bus
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.assembly import make_simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.goal import TrajectoryGoal
 from ir_sim_driver.simulation import Simulation
+from kernels import commit, machine
 
 from ir_description import Cell, load_cell
 
 DT = 0.001
 MOVEMENTS = 4
+LEAD_IN = 3.0  # s
+DISTURBANCE = np.array([600.0, 600.0, 600.0, 100.0, 100.0, 100.0])  # Nm, the bound of docs/driver.md
 
 
 @dataclass(frozen=True)
@@ -120,68 +121,38 @@ def stepped(cell: Cell, backend: str, seed: int) -> dict[str, Any]:
     }
 
 
-def streamed(cell: str, seconds: float) -> dict[str, Any]:
-    """Run the node as a process and listen to joint_states for so long."""
-    os.environ.setdefault("ROS_DOMAIN_ID", "83")
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    import rclpy
-    from rclpy.qos import QoSProfile
-    from sensor_msgs.msg import JointState
-
-    command = [
-        sys.executable,
-        "-m",
-        "ir_sim_driver.node",
-        "--ros-args",
-        "-p",
-        f"cell:={cell}",
-        "-p",
-        "wake_port:=0",
-    ]
-    node_process = subprocess.Popen(command)
-    rclpy.init()
-    node = rclpy.create_node("driver_benchmark")
-    arrivals: list[float] = []
-    stamps: list[int] = []
-
-    def heard(msg: JointState) -> None:
-        arrivals.append(time.monotonic())
-        stamps.append(msg.header.stamp.sec * 1_000_000_000 + msg.header.stamp.nanosec)
-
-    node.create_subscription(JointState, "joint_states", heard, QoSProfile(depth=2000))
-    try:
-        limit = time.monotonic() + 60.0
-        while len(arrivals) < 500 and time.monotonic() < limit:
-            rclpy.spin_once(node, timeout_sec=0.1)
-        arrivals.clear()
-        stamps.clear()
-        before, began = process_cpu(node_process.pid), time.monotonic()
-        while time.monotonic() - began < seconds:
-            rclpy.spin_once(node, timeout_sec=0.1)
-        cpu = (process_cpu(node_process.pid) - before) / (time.monotonic() - began)
-    finally:
-        node_process.send_signal(signal.SIGINT)
-        node_process.wait(10.0)
-        node.destroy_node()
-        rclpy.try_shutdown()
-    periods = np.diff(arrivals) * 1e3
+def disturbed(cell: Cell, seed: int) -> dict[str, Any]:
+    """Scale, hold, disturb up to the documented bound and cancel at random instants: the tool's deviation."""
+    simulation = make_simulation(cell)
+    generator = np.random.default_rng(seed)
+    worst, ended = 0.0, []
+    for trajectory in random_movements(simulation, generator):
+        start = LEAD_IN + np.array(trajectory.times_ns) * 1e-9  # it may be canceled: come from wherever it is
+        goal = JointTrajectory.from_seconds(
+            simulation.robot.joint_names, start, trajectory.positions, np.zeros((2, 6)), np.zeros((2, 6))
+        )
+        goal_id = simulation.execute(simulation.vet(TrajectoryGoal(goal), 0), 0)
+        until = simulation.time + generator.uniform(0.5, 1.0) * start[-1]
+        outcomes: list[Any] = []
+        while not outcomes:
+            simulation.disturb(DISTURBANCE * generator.choice([-1.0, 1.0], 6))
+            simulation.set_speed_scaling(float(generator.choice([0.2, 0.6, 1.0])))
+            simulation.run(0.02)
+            if simulation.time > until:
+                simulation.cancel(goal_id)
+            outcomes = simulation.take_outcomes()
+        worst = max(worst, outcomes[0].max_tool_deviation)
+        ended.append(outcomes[0].code.name)
+        simulation.disturb(None)
+        simulation.run(0.5)
+    violated = ended.count("PATH_TOLERANCE_VIOLATED")
     return {
-        "case": "streamed pybullet",
-        "cell": cell,
-        "messages": len(stamps),
-        "lost": round((stamps[-1] - stamps[0]) / 2_000_000) + 1 - len(stamps),
-        "rate_hz": (len(arrivals) - 1) / (arrivals[-1] - arrivals[0]),
-        "p50_ms": float(np.percentile(periods, 50)),
-        "p99_ms": float(np.percentile(periods, 99)),
-        "worst_ms": float(periods.max()),
-        "cpu_percent": 100.0 * cpu,
+        "case": "disturbed",
+        "cell": cell.name,
+        "seed": seed,
+        "deviation_mm": 1e3 * worst,
+        "violated": violated,
     }
-
-
-def process_cpu(pid: int) -> float:
-    """User and system seconds that a process has used."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
@@ -209,6 +180,25 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
             5.0,
             False,
         ),
+    ]
+    claims += [
+        Claim(
+            "tool deviation, scaled, disturbed, canceled",
+            over("disturbed", "deviation_mm", max),
+            "mm",
+            5.0,
+            False,
+        ),
+        Claim(
+            "tube left when disturbed up to the bound",
+            over("disturbed", "violated", max),
+            "times",
+            0.0,
+            False,
+        ),
+        Claim("power modes against Table II", over("Table II", "error_percent", max), "%", 1.0, False),
+        Claim("transitions against their parameters", over("transition", "error_s", max), "s", 0.1, False),
+        Claim("energy against the published power", over("energy", "error_percent", max), "%", 0.1, False),
     ]
     if any(row["case"] == "streamed pybullet" for row in rows):
         claims += [
@@ -239,6 +229,8 @@ def main() -> None:
         cell = load_cell(name)
         for seed in range(options.seeds):
             rows += [stepped(cell, backend, seed) for backend in ("pybullet", "ideal")]
+            rows.append(disturbed(cell, seed))
+        rows += [*table_2_rows(cell), *transition_rows(cell), *energy_rows(cell)]
     if options.seconds > 0.0:
         rows.append(streamed(cells[0], options.seconds))
     for row in rows:
@@ -271,36 +263,6 @@ def main() -> None:
                 indent=2,
             )
         )
-
-
-def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
-    model = next(
-        (
-            line.partition(":")[2].strip()
-            for line in Path("/proc/cpuinfo").read_text().splitlines()
-            if "model name" in line
-        ),
-        platform.processor(),
-    )
-    return {
-        "cpu": model,
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        "load": os.getloadavg()[0],
-    }
-
-
-def commit() -> str:
-    """Commit of the working tree, "" outside a repository."""
-    answer = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        cwd=Path(__file__).parent,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return answer.stdout.strip()
 
 
 if __name__ == "__main__":

@@ -151,7 +151,7 @@ def test_a_cancel_at_any_instant_stops_on_the_path_within_the_limits(make, plan,
     outcomes = simulation.take_outcomes()
     assert len(outcomes) == 1
     assert outcomes[0].canceled == running
-    assert outcomes[0].max_tool_deviation < 0.001
+    assert outcomes[0].max_tool_deviation < 0.002
     assert distance_from_path(q[::100], trajectory.sample(np.linspace(0, 2, 4001)).q) < 1e-3
     acceleration = np.diff(q, 2, axis=0) / DT**2
     assert (np.abs(acceleration) < 1.05 * cell.robot.acceleration_max + 0.05).all()
@@ -205,7 +205,7 @@ BOUND = np.array([600.0, 600.0, 600.0, 100.0, 100.0, 100.0])  # Nm, of docs/driv
 
 @pytest.mark.parametrize("load", ["none", "gripper"])
 @pytest.mark.parametrize("seed", range(3))
-def test_up_to_the_bound_a_disturbed_tool_stays_within_a_millimetre(load, seed, start, run_out):
+def test_up_to_the_bound_a_disturbed_tool_stays_within_two_millimetres(load, seed, start, run_out):
     simulation = make_simulation("demo", load, "pybullet")
     home = np.array(simulation.cell.machine_home)
     generator = np.random.default_rng(seed)
