@@ -122,6 +122,8 @@ def test_a_cycle_time_is_filled_and_too_short_a_one_refused(demo_cell: Cell, pow
     assert longer.report.peak_power < free.report.peak_power
     with pytest.raises(RequestError, match="the shortest is"):
         planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=1.0)
+    with pytest.raises(RequestError, match="at most 3600 s"):
+        planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=604_800.0)
 
 
 def test_a_station_that_nobody_reaches_fails_with_its_name(demo_cell: Cell, power: PowerData) -> None:

@@ -18,9 +18,11 @@ from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, 
 from ir_planner.budget import Budget
 from ir_planner.energy import movement_energy
 from ir_planner.errors import RequestError
+from ir_planner.goals import Goal
 from ir_planner.level_timing import fastest
 from ir_planner.movement import timed_movement
 from ir_planner.objective import best_stretch
+from ir_planner.planner import Planner
 from ir_planner.scene import PlanningScene
 from ir_planner.spline_timing import time_spline
 from ir_planner.time_law import StepLaws, TimeLaw
@@ -171,6 +173,20 @@ def test_stretching_keeps_the_path_and_divides_the_speed() -> None:
     t = np.linspace(0.0, fast.duration, 777)
     assert slow.sample(t * factor).q == pytest.approx(fast.sample(t).q, abs=1e-9)
     assert slow.sample(t * factor).qd * factor == pytest.approx(fast.sample(t).qd, abs=1e-7)
+
+
+def test_hours_keep_their_nanoseconds() -> None:
+    laws = (StepLaws((TimeLaw((20, 100, 20, 30, 20, 80, 20)),)),)
+    fast = blended(TimedPath(np.array([[0.0], [1.0]]), laws, ()), ("a",))
+    slow = stretched(fast, 2e6)  # nanoseconds times millionths would be 5.8e20
+    assert slow.times_ns.tolist() == [2_000_000 * t for t in fast.times_ns.tolist()]
+
+
+@pytest.mark.parametrize(("scaling", "says"), [(1e-5, "at most 3600 s"), (1e-9, "velocity_scaling is 1e-09")])
+def test_a_movement_that_would_take_hours_is_refused(scaling: float, says: str, planner: Planner) -> None:
+    home, park = np.array(planner.cell.machine_home), Goal(configuration=np.array(planner.cell.park))
+    with pytest.raises(RequestError, match=says):
+        planner.plan_regional(home, park, PlanOptions(velocity_scaling=scaling))
 
 
 def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene, budget: Budget) -> None:

@@ -82,8 +82,9 @@ def stretched(trajectory: JointTrajectory, factor: float) -> JointTrajectory:
     """
     millionths = int(np.ceil(factor * 1e6 - 1e-6))
     exact = millionths / 1e6
-    times = trajectory.times_ns * millionths
-    whole = np.where(times % 1_000_000 == 0, times // 1_000_000, np.rint(times / 1e6).astype(np.int64))
+    # milliseconds apart from the rest: the product of nanoseconds and millionths leaves 64 bits within hours
+    milliseconds, rest = np.divmod(trajectory.times_ns, GRID_NS)
+    whole = milliseconds * millionths + (rest * millionths + 500_000) // 1_000_000
     velocities, accelerations = trajectory.velocities, trajectory.accelerations
     return JointTrajectory(
         trajectory.joint_names,

@@ -11,6 +11,7 @@ from ir_planner.errors import RequestError
 PLANNERS = ("", "direct", "detours", "retreat", "tree")
 SAFETY_DISTANCE_MAX = 1.0  # m
 DURATION_MAX = 3600.0  # s
+SCALING_MIN = 1e-6
 TIME_VALUE_MAX = 1e6  # W
 PLANNING_TIME_MAX = 600.0  # s
 
@@ -52,6 +53,8 @@ def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:
     safety_distance(options.safety_distance)
     bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
     bounded(options.duration, 0.0, DURATION_MAX, "duration", "s")
+    bounded(options.velocity_scaling, SCALING_MIN, 1.0, "velocity_scaling")
+    bounded(options.acceleration_scaling, SCALING_MIN, 1.0, "acceleration_scaling")
     if options.planning_time > PLANNING_TIME_MAX:
         note = f"planning_time {options.planning_time:g} s is capped to {PLANNING_TIME_MAX:g} s"
         return replace(options, planning_time=PLANNING_TIME_MAX), note

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ir_planner.asynchronous import own_laws
 from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, stretched
+from ir_planner.bounds import DURATION_MAX
 from ir_planner.budget import Budget
 from ir_planner.clearance_checks import clearance_violation
 from ir_planner.errors import RequestError
@@ -221,8 +222,15 @@ def stretched_to_wish(
 ) -> JointTrajectory:
     """The fastest trajectory at the wished duration, or at the one the objective likes best.
 
-    Raises RequestError when the wished duration is shorter than the fastest.
+    Raises RequestError when the wished duration is shorter than the fastest, or that longer than any may be.
     """
+    if quickest.duration > DURATION_MAX:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"velocity_scaling {options.velocity_scaling:g} and acceleration_scaling "
+            f"{options.acceleration_scaling:g} make a movement of {quickest.duration:.4g} s: "
+            f"it must be at most {DURATION_MAX:g} s",
+        )
     if options.duration > 0.0:
         if options.duration < quickest.duration * (1.0 - _DURATION_SLACK):
             raise RequestError(

@@ -18,6 +18,7 @@ from ir_msgs_py.status import Status, StatusCode
 from numpy.typing import NDArray
 
 from ir_description import Cell, PowerData
+from ir_planner.bounds import DURATION_MAX
 from ir_planner.budget import Budget
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.free_space import FreeSpace
@@ -265,7 +266,8 @@ class _Planner:
             self.options = replace(self.options, objective="time")
             self.ways.clear()
             legs = self._legs(stops, nodes)
-            standing, moving = _seconds(self._assembled(legs))
+            planned = self._assembled(legs)
+            standing, moving = _seconds(planned)
         if wanted < moving * (1.0 - 1e-9):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
@@ -274,6 +276,13 @@ class _Planner:
                 "pauses",
             )
         factor = wanted / moving if moving > 0.0 else 1.0
+        longest = factor * max((m.duration for m in planned if not m.is_pause), default=0.0)
+        if longest > DURATION_MAX:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"cycle_time is {cycle:g} s: stretched to it, a movement would take {longest:.4g} s, at most "
+                f"{DURATION_MAX:g} s; a shorter cycle time with a pause in the program costs less",
+            )
         margin = self.options.safety_distance
         return self._assembled({k: leg.slower(factor, margin) for k, leg in legs.items()})
 
