@@ -126,6 +126,11 @@ def test_a_cycle_time_is_filled_and_too_short_a_one_refused(demo_cell: Cell, pow
         planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=604_800.0)
 
 
+def test_a_program_takes_no_duration_of_a_movement(demo_cell: Cell, power: PowerData) -> None:
+    with pytest.raises(RequestError, match="duration is 5 s: a program has a cycle_time"):
+        planned(demo_cell, power, "home", "park", duration=5.0)
+
+
 def test_a_station_that_nobody_reaches_fails_with_its_name(demo_cell: Cell, power: PowerData) -> None:
     shut = demo_cell.with_equipment("lathe", state="door_closed")
     plan = planned(shut, power, "lathe_work")

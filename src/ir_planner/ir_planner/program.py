@@ -109,7 +109,7 @@ class _Planner:
 
     def __init__(self, request: ProgramRequest, journal: Journal, progress: Progress) -> None:
         self.request, self.journal, self.progress = request, journal, progress
-        self.options = replace(request.options, duration=0.0)
+        self.options = request.options
         cell = request.cell
         steps = steps_of(cell, request.stations)
         self.steps = placed_steps(cell, steps, cell.parts_at_start())
@@ -118,6 +118,12 @@ class _Planner:
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"load is {request.options.load!a}: in a program the steps say what is "
                 "attached, leave it empty",
+            )
+        if request.options.duration > 0.0:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"duration is {request.options.duration:g} s: a program has a cycle_time instead, "
+                "leave it 0 s",
             )
         bare = request.options.load == NO_LOAD
         self.scenes = Scenes(cell, request.power, request.regeneration, bare)
