@@ -131,6 +131,20 @@ def test_a_program_takes_no_duration_of_a_movement(demo_cell: Cell, power: Power
         planned(demo_cell, power, "home", "park", duration=5.0)
 
 
+def test_progress_tells_the_cost_of_the_chain_to_the_end(demo_cell: Cell, power: PowerData) -> None:
+    told: dict[str, list[float]] = {}
+    request = ProgramRequest(
+        demo_cell, power, ("home", "gauge_measure"), np.array(demo_cell.machine_home), PlanOptions()
+    )
+    plan_program(
+        request,
+        Budget(100_000, time.monotonic() + 60.0, time.monotonic),
+        lambda phase, done, total, cost: told.setdefault(phase, []).append(cost),
+    )
+    assert told["movements"] == pytest.approx([told["station graph"][-1]] * len(told["movements"]))
+    assert told["movements"][0] > 0.0
+
+
 def test_a_station_that_nobody_reaches_fails_with_its_name(demo_cell: Cell, power: PowerData) -> None:
     shut = demo_cell.with_equipment("lathe", state="door_closed")
     plan = planned(shut, power, "lathe_work")

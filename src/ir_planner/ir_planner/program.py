@@ -128,6 +128,7 @@ class _Planner:
         bare = request.options.load == NO_LOAD
         self.scenes = Scenes(cell, request.power, request.regeneration, bare)
         self.ways: dict[tuple[int, int, int], TimedMovement] = {}
+        self.best_cost = 0.0  # W of the chain of configurations
 
     def run(self) -> tuple[tuple[PlannedMovement, ...], tuple[float, ...]]:
         """Movements in order and when each starts [s]."""
@@ -175,6 +176,7 @@ class _Planner:
             total = len(stops)
             chosen, cost = graph.solve(lambda best: self.progress("station graph", 0, total, best))
             notes.append(f"W {cost:.0f}, {graph.settled} settled")
+            self.best_cost = cost
         if not np.isfinite(cost):
             raise _FailedError(self._unreachable)
         return [layer[k] for layer, k in zip(layers, chosen, strict=True)]
@@ -229,7 +231,7 @@ class _Planner:
         legs: dict[int, Leg] = {}
         with self.journal.stage("movements") as notes:
             for place, k in enumerate(stops):
-                self.progress("movements", place, len(stops), 0.0)
+                self.progress("movements", place, len(stops), self.best_cost)
                 legs[k] = self._leg(stops, place, nodes[place], nodes[place + 1])
             notes.append(f"{sum(len(leg.movements) for leg in legs.values())} movements")
         return legs
