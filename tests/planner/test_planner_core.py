@@ -130,6 +130,17 @@ def test_reference_points_are_passed_with_the_wished_proportions(planner: Planne
         assert trajectory.times[passed] == pytest.approx(times, abs=0.01)
 
 
+@pytest.mark.parametrize(("wished", "taken"), [(8.0, 8.0), (0.01, None)])
+def test_two_reference_points_take_their_time_or_the_shortest(
+    wished: float, taken: float | None, planner: Planner
+) -> None:
+    points = HOME + np.radians([[0] * 6, [40, 10, 0, 0, 20, 0]])
+    plan = planner.plan_trajectory(Reference(points, np.array([0.0, wished])), PlanOptions())
+    fastest = planner.plan_trajectory(Reference(points), PlanOptions(objective="time"))
+    assert plan.status.ok, plan.status.message
+    assert plan.report.duration == pytest.approx(taken or fastest.report.duration, abs=1e-5)
+
+
 def test_a_reference_beyond_a_limit_names_the_point(planner: Planner) -> None:
     points = np.stack([HOME, HOME + np.radians([200.0, 0, 0, 0, 0, 0])])
     with pytest.raises(RequestError, match="point 1: joint_a1 is 200 deg") as caught:

@@ -5,7 +5,7 @@ movements that stop at each. What violates a limit or a clearance is named with 
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from ir_msgs_py.options import PlanOptions
@@ -15,13 +15,14 @@ from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
 from ir_planner.blending import TimedPath, blended, stretched
+from ir_planner.bounds import DURATION_MAX, bounded
 from ir_planner.budget import Budget
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.free_space import FreeSpace
 from ir_planner.goals import within_limits
 from ir_planner.journal import Journal
 from ir_planner.level_timing import fastest
-from ir_planner.movement import distinct, stretched_to_wish, timed_movement
+from ir_planner.movement import TimedMovement, distinct, stretched_to_wish, timed_movement
 from ir_planner.regional import MovementPlan, end_in_collision
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene
@@ -73,6 +74,8 @@ def _check_points(reference: Reference, scene: PlanningScene) -> None:
             StatusCode.INVALID_MOTION_PLAN,
             f"the reference has {len(reference.points)} points: at most {POINTS_MAX} are taken",
         )
+    if reference.times is not None:
+        bounded(float(reference.times[-1]), 0.0, DURATION_MAX, "time of the last point", "s")
     for k, q in enumerate(reference.points):
         within_limits(q, scene.cell, f"point {k}", StatusCode.INVALID_MOTION_PLAN)
 
@@ -84,7 +87,7 @@ def _followed(
     if len(points) < 3:
         with journal.stage("ptp"):
             journal.planner_id = "ptp"
-            movement = timed_movement(points, scene, options, journal.budget)
+            movement = _ptp(points, reference, scene, options, journal.budget)
         return movement.trajectory, movement.evaluation
     limits = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
     names = scene.cell.robot.joint_names
@@ -108,6 +111,18 @@ def _followed(
         straight = evaluate_trajectory(stopping, scene, options.safety_distance)
         notes.append("straight between the points, stopping at each")
     return stopping, straight
+
+
+def _ptp(
+    points: FloatArray, reference: Reference, scene: PlanningScene, options: PlanOptions, budget: Budget
+) -> TimedMovement:
+    if reference.times is None or options.duration > 0.0 or len(reference.points) != 2 or len(points) != 2:
+        return timed_movement(points, scene, options, budget)
+    fastest_one = timed_movement(points, scene, replace(options, objective="time"), budget)
+    wished = float(reference.times[-1] - reference.times[0])
+    if wished <= fastest_one.trajectory.duration:
+        return fastest_one
+    return timed_movement(points, scene, replace(options, duration=wished), budget)
 
 
 def _spline(
