@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from typing import Any
 
@@ -11,10 +12,13 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.bounds import PLANNING_TIME_MAX
+from ir_planner.budget import Budget
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.following import Reference
+from ir_planner.free_space import FreeSpace
 from ir_planner.goals import Goal, parse_goal
 from ir_planner.planner import Planner
+from ir_planner.regional import too_near
 from ir_planner.scene import scene_with, with_parts
 from ir_planner.service import retreat_poses, service_lines
 from ir_planner.store import Store
@@ -83,6 +87,7 @@ def test_an_unreachable_pose_and_an_occupied_one_are_told_apart(planner: Planner
     occupied = planner.compute_ik(inside, "analytic", 0.02, HOME, "")
     assert occupied.status.code == StatusCode.GOAL_IN_COLLISION
     assert "gauge_table" in occupied.status.message
+    assert re.search(r"come to -?[\d.]+ mm, they must keep more than 20.0 mm", occupied.status.message)
     assert occupied.info.rejected
 
 
@@ -139,6 +144,29 @@ def test_two_reference_points_take_their_time_or_the_shortest(
     fastest = planner.plan_trajectory(Reference(points), PlanOptions(objective="time"))
     assert plan.status.ok, plan.status.message
     assert plan.report.duration == pytest.approx(taken or fastest.report.duration, abs=1e-5)
+
+
+def test_a_state_in_collision_names_pair_value_and_bound(planner: Planner) -> None:
+    check = planner.check_state(np.radians([0.0, -20, 60, 0, 0, 0]), 0.02, 3, "", "")
+    assert not check.valid
+    pair = check.pairs[0]
+    assert f"{pair.body_a} and {pair.body_b}" in check.status.message
+    assert f"in penetration: distance {pair.distance * 1e3:.1f} mm" in check.status.message
+    assert check.status.message.endswith("it must be more than 20.0 mm")
+
+
+def test_the_bound_of_an_allowed_contact_is_its_own(planner: Planner) -> None:
+    scene = planner.scene("gripper+gear")
+    station = scene.station("lathe_work")
+    contact = station.allowed_contacts[0]
+    closer = np.array(station.pose)
+    closer[:3, 3] += closer[:3, 0] * 0.0045  # towards the spindle: 0.5 mm are left where 1 mm must be
+    q = scene.inverse_kinematics.solve(closer[None]).q
+    space = FreeSpace.of(scene, 0.02, Budget(1, 1.0, lambda: 0.0), "lathe_work")
+    told = [too_near(at, space, "start", 0.02) for at in q if not space.states_free(at[None])[0]]
+    own = [text for text in told if contact.body_a in text and contact.body_b in text]
+    assert own
+    assert all(text.endswith("it must be more than 1.0 mm") for text in own)
 
 
 def test_a_reference_beyond_a_limit_names_the_point(planner: Planner) -> None:

@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from ir_kernels.collision import MinDistance
 from ir_msgs_py.stations import IkSolution
 from ir_msgs_py.status import Status, StatusCode
 from numpy.typing import NDArray
@@ -21,12 +22,16 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Configurations:
-    """Free configurations q (K, n), ranked; branch (K,); and why the others were dropped."""
+    """Free configurations q (K, n), ranked; branch (K,); and why the others were dropped.
+
+    nearest: where none is free, the pair in the way of the one that lacks least ("" where it is not known).
+    """
 
     q: FloatArray
     branch: NDArray[np.int64]
     reached: int
     rejected: Counter[str]
+    nearest: str = ""
 
 
 def free_configurations(
@@ -47,7 +52,18 @@ def free_configurations(
     free = np.array([z < 0 or d > limit[z] for z, d in zip(closest.pair, closest.distance, strict=True)])
     q, branch, margin = found.q[free], found.branch[free], closest.distance[free]
     order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
-    return Configurations(q[order], branch[order], len(found.q), rejected)
+    nearest = "" if len(q) else _least_lacking(scene, closest, threshold)
+    return Configurations(q[order], branch[order], len(found.q), rejected, nearest)
+
+
+def _least_lacking(scene: PlanningScene, closest: MinDistance, threshold: FloatArray) -> str:
+    lacking = threshold[closest.pair] - closest.distance
+    k = int(np.argmin(lacking))
+    pair, kept = scene.collision.pairs[int(closest.pair[k])], float(threshold[closest.pair[k]])
+    return (
+        f"in the best of them {pair.body_a} and {pair.body_b} come to {closest.distance[k] * 1e3:.1f} mm, "
+        f"they must keep more than {kept * 1e3:.1f} mm"
+    )
 
 
 def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configurations, what: str) -> Status:
@@ -66,7 +82,8 @@ def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configuratio
     reasons = ", ".join(f"{reason} ({count})" for reason, count in found.rejected.most_common(4))
     return Status(
         StatusCode.GOAL_IN_COLLISION,
-        f"{place}: {found.reached} configurations reach it, none is free: {reasons}",
+        f"{place}: {found.reached} configurations reach it, none is free: {reasons}"
+        + (f"; {found.nearest}" if found.nearest else ""),
     )
 
 

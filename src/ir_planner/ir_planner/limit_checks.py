@@ -54,7 +54,7 @@ def position_violation(
     sentence = (
         f"{robot.joint_names[j]} reaches {np.degrees(reached):.6g} deg after waypoint {k}: it must be in "
         f"[{np.degrees(robot.position_min[j]):g}, {np.degrees(robot.position_max[j]):g}] deg "
-        f"(excess {excess[k, j]:.3g} rad)"
+        f"(excess {np.degrees(excess[k, j]):.3g} deg)"
     )
     return Violation(float(trajectory.times[k]), k, "position", float(excess[k, j]), sentence)
 

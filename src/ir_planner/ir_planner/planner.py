@@ -25,7 +25,7 @@ from ir_planner.interaction_point import STARTS_MAX, searched_configurations
 from ir_planner.inverse_kinematics import free_configurations, no_configuration, ranked_solutions
 from ir_planner.journal import Journal
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
-from ir_planner.regional import MovementPlan, plan_regional
+from ir_planner.regional import MovementPlan, plan_regional, too_near_sentence
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_planner.service_movement import ServicePlan, ServiceRequest, checked_request, plan_service
@@ -160,10 +160,7 @@ class Planner:
             return StateCheck(Status.success(), valid, smallest, pairs)
         worst = nearest_pairs(scene, q, threshold, 1, station)[0]
         kept = float(threshold[int(np.argmin(distance - threshold))])
-        sentence = (
-            f"{worst.body_a} and {worst.body_b} ({worst.kind}) are {worst.distance * 1e3:.1f} mm apart, they "
-            f"must keep {kept * 1e3:.1f} mm"
-        )
+        sentence = too_near_sentence(worst, kept)
         return StateCheck(Status.success(sentence), False, smallest, pairs)
 
     def compute_ik(

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from ir_kernels.collision import FREE
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import PlanningInfo, TrajectoryReport
+from ir_msgs_py.report import DistancePair, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
 from ir_planner.budget import Budget
-from ir_planner.clearance import nearest_pair, pair_value
+from ir_planner.clearance import pair_value
 from ir_planner.detours import drawn_back, over_postures, scattered
 from ir_planner.errors import TimingError
 from ir_planner.free_space import FreeSpace
@@ -28,7 +28,7 @@ from ir_planner.movement_cost import path_cost
 from ir_planner.objective import objective_value
 from ir_planner.polish import fewest_corners, pulled
 from ir_planner.retreat import retreating_paths
-from ir_planner.scene import PlanningScene
+from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.tree import connect
 
 FloatArray = NDArray[np.float64]
@@ -196,14 +196,19 @@ def end_in_collision(
 
 def too_near(q: FloatArray, space: FreeSpace, what: str, safety_distance: float) -> str:
     """The sentence for a configuration (n,) in which a pair is nearer than it may be."""
-    pair = nearest_pair(space.scene, q, space.threshold)
-    if pair is None:
+    z = int(space.scene.collision.min_distance(q[None], space.threshold).pair[0])
+    if z < 0:
         return f"{what} is not free"
+    kept = min(safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2)  # a contact has its own
+    return f"{what}: {too_near_sentence(pair_value(space.scene, q, z), kept)}"
+
+
+def too_near_sentence(pair: DistancePair, kept: float) -> str:
+    """Which pair is how near, and the distance [m] it must keep."""
     where = "in penetration" if pair.distance < 0.0 else "too near"
     return (
-        f"{what}: {pair.body_a} and {pair.body_b} ({pair.kind}) are {where}: "
-        f"distance {pair.distance * 1e3:.1f} mm, "
-        f"it must be more than {safety_distance * 1e3:.1f} mm"
+        f"{pair.body_a} and {pair.body_b} ({pair.kind}) are {where}: "
+        f"distance {pair.distance * 1e3:.1f} mm, it must be more than {kept * 1e3:.1f} mm"
     )
 
 
