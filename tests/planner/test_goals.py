@@ -80,6 +80,8 @@ def test_exactly_one_form_is_taken() -> None:
     for text, q, pose in (("", None, None), ("home", home, None), ("", home, np.eye(4))):
         with pytest.raises(RequestError, match="exactly one"):
             one_goal(text, q, pose, CELL)
+    with pytest.raises(RequestError, match="exactly one of goal and goal_pose must be given, it is none"):
+        one_goal("", None, None, CELL, ("goal", "goal_pose"))
 
 
 @given(st.text(max_size=80))

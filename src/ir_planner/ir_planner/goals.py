@@ -36,15 +36,21 @@ class Goal:
     text: str = ""
 
 
-def one_goal(text: str, configuration: FloatArray | None, pose: FloatArray | None, cell: Cell) -> Goal:
-    """The goal that a request gives in exactly one of three forms."""
+def one_goal(
+    text: str,
+    configuration: FloatArray | None,
+    pose: FloatArray | None,
+    cell: Cell,
+    forms: tuple[str, ...] = ("goal", "goal_state", "goal_pose"),
+) -> Goal:
+    """The goal that a request gives in exactly one of its `forms`."""
     given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not None),
                                       ("goal_pose", pose is not None)) if there]  # fmt: skip
     if len(given) != 1:
-        which = " and ".join(given) or "none"
+        which = " and ".join(given) or "none (a goal_pose without a frame_id is not given)"
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"exactly one of goal, goal_state and goal_pose must be given, it is {which}",
+            f"exactly one of {', '.join(forms[:-1])} and {forms[-1]} must be given, it is {which}",
         )
     if text:
         return parse_goal(text, cell)

@@ -87,11 +87,12 @@ def pose_of(msg: Any, cell: Cell) -> FloatArray | None:
 
 
 def goal_of(request: Any, cell: Cell) -> Goal:
-    """Goal of a request in exactly one of its three forms."""
+    """Goal of a request in exactly one of its forms: not every request has a goal_state."""
+    forms = tuple(name for name in ("goal", "goal_state", "goal_pose") if hasattr(request, name))
     configuration = None
-    if hasattr(request, "goal_state"):
+    if "goal_state" in forms:
         configuration = state_of(request.goal_state, cell, StatusCode.GOAL_STATE_INVALID)
-    return one_goal(request.goal, configuration, pose_of(request.goal_pose, cell), cell)
+    return one_goal(request.goal, configuration, pose_of(request.goal_pose, cell), cell, forms)
 
 
 def options_of(msg: Any, draw_seed: Any) -> PlanOptions:
