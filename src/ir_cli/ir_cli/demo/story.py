@@ -6,6 +6,7 @@ need not wait half an hour; the recording carries the facts and the report says 
 
 from __future__ import annotations
 
+import socket
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,6 +48,7 @@ class Demonstration:
     def __init__(self, cell: str, out: Path, seed: int, progress: Progress) -> None:
         self._out, self._seed, self._progress = out, seed, progress
         self._cell = with_short_pauses(load_cell(cell), LONGEST_PAUSE)
+        self._link = LinkSettings(wake_port=free_udp_port())
         self._loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
 
     def run(self) -> Outcome:
@@ -67,7 +69,8 @@ class Demonstration:
                 cell_nodes(
                     str(cell_file.resolve()),
                     planner=transitions,
-                    driver=transitions,
+                    driver={**transitions, "wake_port": self._link.wake_port},
+                    runner={"wake_port": self._link.wake_port},
                     recorder={"facts": facts},
                 )
             )
@@ -105,7 +108,7 @@ class Demonstration:
 
     def _tour(self, client: Client) -> None:
         self._progress.begin("visit the power modes at machine home")
-        tour(client, PowerWatch(client), self._loads, TOUR_STAY, wake, self._progress.update)
+        tour(client, PowerWatch(client), self._loads, TOUR_STAY, self._wake, self._progress.update)
         self._progress.end("motors, brakes, Bus Power Off, hibernation, with and without the tool")
 
     def _drive(self, client: Client, plan: ProgramPlan) -> None:
@@ -118,11 +121,16 @@ class Demonstration:
         )
         self._progress.end(f"{run.executed} steps, {run.duration:.1f} s, {run.energy / 1000.0:.1f} kJ")
 
+    def _wake(self) -> None:
+        """Send the Wake-on-LAN packet that the program runner would send."""
+        send_packet(magic_packet(self._link.mac), self._link.wake_address, self._link.wake_port)
 
-def wake() -> None:
-    """Send the Wake-on-LAN packet that the program runner would send."""
-    link = LinkSettings()
-    send_packet(magic_packet(link.mac), link.wake_address, link.wake_port)
+
+def free_udp_port() -> int:
+    """Port that nobody listens on now: another cell may run on this machine."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def with_short_pauses(cell: Cell, longest: float) -> Cell:
