@@ -29,6 +29,7 @@ from ir_planner.goals import Goal, one_goal
 from ir_planner.planner import Planner
 
 FloatArray = NDArray[np.float64]
+MEASURED = 9  # decimals of rad: finer than any encoder, and less than what counts as movement
 
 
 @dataclass
@@ -44,9 +45,11 @@ class LastState:
     _lock: Lock = field(default_factory=Lock)
 
     def take(self, q: FloatArray, now: float) -> None:
-        """A state came."""
+        """A state came. It is kept to MEASURED decimals: a robot that stands is one start, not a new one with
+        every measurement, so the same request gives the same trajectory.
+        """
         with self._lock:
-            self.q, self.came = q, now
+            self.q, self.came = np.round(q, MEASURED) + 0.0, now  # + 0.0: no negative zeros
 
     def fresh(self, now: float, max_age: float) -> FloatArray:
         """The state (n,). Raises RequestError when there is none, or an old one."""
