@@ -48,6 +48,14 @@ def test_a_node_that_dies_is_named_with_the_end_of_its_output(tmp_path: Path) ->
             check_until_it_raises(nodes)
 
 
+def test_a_node_that_is_killed_is_named_with_the_signal(tmp_path: Path) -> None:
+    environment = write_module(tmp_path, "killed", "import os\nos.kill(os.getpid(), 9)\n")
+    with NodeProcesses(tmp_path / "log", environment) as nodes:
+        nodes.start([NodeCommand("killed")])
+        with pytest.raises(ProcessError, match=r"^killed was ended by SIGKILL$"):
+            check_until_it_raises(nodes)
+
+
 def test_leaving_the_context_ends_all_nodes(tmp_path: Path) -> None:
     body = "import os, signal\nprint(os.getpid(), flush=True)\nprint('up', flush=True)\nsignal.pause()\n"
     environment = write_module(tmp_path, "waiting", body)

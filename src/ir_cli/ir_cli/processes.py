@@ -41,6 +41,16 @@ def _yaml(value: object) -> str:
     return repr(value)
 
 
+def ending(code: int) -> str:
+    """How a process with this return code ended, as people say it."""
+    if code >= 0:
+        return f"ended with exit code {code}"
+    try:
+        return f"was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was ended by signal {-code}"
+
+
 class NodeProcesses:
     """A group of node processes; leaving the context stops all that were started."""
 
@@ -78,11 +88,12 @@ class NodeProcesses:
             code = process.poll()
             if code is not None:
                 last = self._log(name).read_text(errors="replace").splitlines()[-12:]
-                raise ProcessError(f"{name} ended with exit code {code}:\n  " + "\n  ".join(last))
+                colon = ":" if last else ""
+                raise ProcessError("\n  ".join([f"{name} {ending(code)}{colon}", *last]))
 
     def end(self) -> None:
         """Stop all nodes; raise ProcessError when one of them did not end well."""
-        bad = [f"{name} ended with exit code {code}" for name, code in self.stop().items() if code != 0]
+        bad = [f"{name} {ending(code)}" for name, code in self.stop().items() if code != 0]
         if bad:
             raise ProcessError(f"{'; '.join(bad)}; their output is in {self._log_folder}")
 
