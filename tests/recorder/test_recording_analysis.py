@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -89,6 +90,20 @@ def test_clearance_is_that_of_the_recorded_joint_states(analysis: Analysis) -> N
 def test_a_part_that_was_put_down_is_a_body_where_it_lies(analysis: Analysis) -> None:
     leaving = analysis.movements[2].clearance
     assert any("part_box" in pair for pair in leaving.pairs)
+
+
+@pytest.mark.parametrize("deviation", [0.0, 0.002, 0.1, math.nan])
+def test_clearance_may_only_lack_what_the_tool_was_off(analysis: Analysis, deviation: float) -> None:
+    moved = analysis.movements[1]
+    assert moved.clearance is not None
+    tolerated = 0.005 if math.isnan(deviation) else min(deviation, 0.005)
+    for beyond, ok in ((-2e-5, True), (2e-5, False)):
+        short = tolerated + 1e-4 + beyond
+        near = replace(moved.clearance, least=0.02 - short, contact_margin=-short)
+        result = replace(moved, tool_deviation=deviation, clearance=near)
+        one = replace(analysis, steps=(result,))
+        told = {check.name.split(" on ")[0]: check.ok for check in findings(one)}
+        assert (told["clearance"], told["allowed contacts"]) == (ok, ok)
 
 
 def test_checks_hold_for_a_run_as_planned(analysis: Analysis) -> None:

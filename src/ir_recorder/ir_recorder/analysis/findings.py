@@ -15,9 +15,10 @@ class Tolerances:
     """How far measured may be from planned.
 
     energy_relative or energy_absolute [J], whichever is larger, per movement; duration [s]; tool_deviation
-    [m]; safety_distance [m]: S_m, that the executed clearance keeps but for deviation; contact: how far an
-    allowed pair may come under its own distance [m]; table_2_relative; table_2_rows: how many rows the
-    recording has to show; indirect_relative: indirect against direct measurement.
+    [m]; safety_distance [m]: S_m, that the executed clearance keeps but for the deviation that was measured
+    (or tolerated, where none was) and `slack` [m]; allowed pairs keep their own distance alike;
+    table_2_relative; table_2_rows: how many rows the recording has to show; indirect_relative: indirect
+    against direct measurement.
     """
 
     energy_relative: float = 0.05
@@ -25,7 +26,7 @@ class Tolerances:
     duration: float = 0.05
     tool_deviation: float = 0.005
     safety_distance: float = 0.02
-    contact: float = 0.005
+    slack: float = 1e-4
     table_2_relative: float = 0.01
     table_2_rows: int = 0
     indirect_relative: float = 0.05
@@ -80,12 +81,11 @@ def _movement(result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
         yield _below(f"tool deviation on {name}", result.tool_deviation, bounds.tool_deviation)
     near = result.clearance
     if near is not None:
-        least = bounds.safety_distance - bounds.tool_deviation
-        yield _above(f"clearance on {name}", near.least, least, near.least_pair)
+        off = bounds.tool_deviation if math.isnan(result.tool_deviation) else result.tool_deviation
+        off = min(off, bounds.tool_deviation) + bounds.slack
+        yield _above(f"clearance on {name}", near.least, bounds.safety_distance - off, near.least_pair)
         if math.isfinite(near.contact_margin):
-            yield _above(
-                f"allowed contacts on {name}", near.contact_margin, -bounds.contact, "over their own"
-            )
+            yield _above(f"allowed contacts on {name}", near.contact_margin, -off, "over their own")
 
 
 def _table_2(analysis: Analysis, bounds: Tolerances) -> Iterator[Finding]:
