@@ -57,40 +57,40 @@ core::ChainInput input_of(const py::object& data) {
   return in;
 }
 
-class Dynamics {
+class Dynamics : public core::Core {
  public:
   explicit Dynamics(const py::object& data) : Dynamics(input_of(data)) {}
 
   py::tuple inverse_dynamics(const Array& q, const Array& qd, const Array& qdd) const {
     return run(q, {&qd, &qdd}, [&](double* tau) {
-      return core::inverse_dynamics(model_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
+      return core::inverse_dynamics(model, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
     });
   }
   py::tuple inverse_dynamics_single(const Array& q, const Array& qd, const Array& qdd) const {
     return run(q, {&qd, &qdd}, [&](double* tau) {
-      return core::inverse_dynamics(single_, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
+      return core::inverse_dynamics(single, q.data(), qd.data(), qdd.data(), q.shape(0), tau);
     });
   }
   py::tuple bias(const Array& q, const Array& qd) const {
-    return run(q, {&qd}, [&](double* tau) { return core::bias(model_, q.data(), qd.data(), q.shape(0), tau); });
+    return run(q, {&qd}, [&](double* tau) { return core::bias(model, q.data(), qd.data(), q.shape(0), tau); });
   }
   py::tuple gravity(const Array& q) const {
-    return run(q, {}, [&](double* tau) { return core::bias(model_, q.data(), nullptr, q.shape(0), tau); });
+    return run(q, {}, [&](double* tau) { return core::bias(model, q.data(), nullptr, q.shape(0), tau); });
   }
   py::tuple counterbalance(const Array& q) const {
-    return run(q, {}, [&](double* tau) { return core::counterbalance(model_, q.data(), q.shape(0), tau); });
+    return run(q, {}, [&](double* tau) { return core::counterbalance(model, q.data(), q.shape(0), tau); });
   }
   py::tuple forward_dynamics(const Array& q, const Array& qd, const Array& tau) const {
     return run(q, {&qd, &tau}, [&](double* qdd) {
-      return core::forward_dynamics(model_, q.data(), qd.data(), tau.data(), q.shape(0), qdd);
+      return core::forward_dynamics(model, q.data(), qd.data(), tau.data(), q.shape(0), qdd);
     });
   }
   py::tuple torque_limit(const Array& qd) const {
-    return run(qd, {}, [&](double* limit) { return envelope_.limits(qd.data(), qd.shape(0), limit); });
+    return run(qd, {}, [&](double* limit) { return envelope.limits(qd.data(), qd.shape(0), limit); });
   }
   py::tuple axis_power(const Array& qd, const Array& tau) const {
     return run(qd, {&tau}, [&](double* power) {
-      return core::axis_power(model_, qd.data(), tau.data(), qd.shape(0), power);
+      return core::axis_power(model, qd.data(), tau.data(), qd.shape(0), power);
     });
   }
   py::tuple mass_matrix(const Array& q) const {
@@ -99,7 +99,7 @@ class Dynamics {
     bool finite;
     {
       py::gil_scoped_release released;
-      finite = core::mass_matrix(model_, q.data(), q.shape(0), H.mutable_data());
+      finite = core::mass_matrix(model, q.data(), q.shape(0), H.mutable_data());
     }
     return py::make_tuple(H, finite);
   }
@@ -109,7 +109,7 @@ class Dynamics {
     bool finite;
     {
       py::gil_scoped_release released;
-      finite = core::torque_gradients(model_, q.data(), qd.data(), qdd.data(), q.shape(0), of_q.mutable_data(),
+      finite = core::torque_gradients(model, q.data(), qd.data(), qdd.data(), q.shape(0), of_q.mutable_data(),
                                     of_qd.mutable_data(), of_qdd.mutable_data());
     }
     return py::make_tuple(py::make_tuple(of_q, of_qd, of_qdd), finite);
@@ -117,33 +117,32 @@ class Dynamics {
 
   // upper, sampled, time (n,) and the number of intervals
   py::tuple torque_bounds(const Array& coefficients, const Array& durations, double tolerance, long most) const {
-    if (coefficients.ndim() != 3 || coefficients.shape(1) != model_.n || durations.ndim() != 1 ||
+    if (coefficients.ndim() != 3 || coefficients.shape(1) != model.n || durations.ndim() != 1 ||
         durations.shape(0) != coefficients.shape(0) || coefficients.shape(2) > core::kMaxTerms)
       throw std::invalid_argument("coefficients have to be (S, n, d + 1) and durations (S,)");
     core::TorqueBounds bounds;
     {
       py::gil_scoped_release released;
-      bounds = core::torque_bounds(model_, envelope_, coefficients.data(), durations.data(), coefficients.shape(0),
+      bounds = core::torque_bounds(model, envelope, coefficients.data(), durations.data(), coefficients.shape(0),
                                  static_cast<int>(coefficients.shape(2)), tolerance, most);
     }
-    const auto n = static_cast<py::ssize_t>(model_.n);
+    const auto n = static_cast<py::ssize_t>(model.n);
     return py::make_tuple(Array(n, bounds.upper.data()), Array(n, bounds.sampled.data()), Array(n, bounds.time.data()),
                           bounds.intervals);
   }
 
  private:
-  explicit Dynamics(const core::ChainInput& in)
-      : model_(core::build_model(in)),
-        single_(core::to_single(model_)),
-        envelope_(in.n, in.knots, in.envelope_speed, in.envelope_torque) {}
+  explicit Dynamics(const core::ChainInput& in) : Dynamics(in, core::build_model(in)) {}
+  Dynamics(const core::ChainInput& in, const core::Model<double>& built)
+      : Core{built, core::to_single(built), core::Envelope(in.n, in.knots, in.envelope_speed, in.envelope_torque)} {}
 
   void check(const Array& first, std::initializer_list<const Array*> others) const {
-    bool fits = first.ndim() == 2 && first.shape(1) == model_.n;
+    bool fits = first.ndim() == 2 && first.shape(1) == model.n;
     for (const Array* other : others)
-      fits = fits && other->ndim() == 2 && other->shape(0) == first.shape(0) && other->shape(1) == model_.n;
+      fits = fits && other->ndim() == 2 && other->shape(0) == first.shape(0) && other->shape(1) == model.n;
     if (!fits) throw std::invalid_argument("arrays have to be (N, n) of one length");
   }
-  Array cube(py::ssize_t N) const { return Array({N, py::ssize_t(model_.n), py::ssize_t(model_.n)}); }
+  Array cube(py::ssize_t N) const { return Array({N, py::ssize_t(model.n), py::ssize_t(model.n)}); }
 
   template <class Function>
   py::tuple run(const Array& first, std::initializer_list<const Array*> others, Function function) const {
@@ -157,10 +156,6 @@ class Dynamics {
     }
     return py::make_tuple(result, finite);
   }
-
-  core::Model<double> model_;
-  core::Model<float> single_;
-  core::Envelope envelope_;
 };
 
 py::tuple dc_bus(const Array& power, const Array& dt, double capacity, const std::string& regeneration,
@@ -198,7 +193,8 @@ py::tuple polynomial_extrema(const Array& coefficients, const Array& durations) 
 }  // namespace
 
 void bind_dynamics(py::module_& m) {
-  py::class_<Dynamics>(m, "Dynamics", py::module_local())
+  py::class_<core::Core>(m, "DynamicsCore", py::module_local());
+  py::class_<Dynamics, core::Core>(m, "Dynamics", py::module_local())
       .def(py::init<const py::object&>())
       .def("inverse_dynamics", &Dynamics::inverse_dynamics)
       .def("inverse_dynamics_single", &Dynamics::inverse_dynamics_single)

@@ -27,10 +27,20 @@ class Envelope {
   double limit(int joint, double speed) const;
   double least(int joint, double slowest, double fastest) const;  // over a range of speeds, both >= 0
   bool limits(const double* qd, long N, double* limit) const;
+  int knots() const { return knots_; }
+  const double* speeds(int joint) const { return &speed_[joint * knots_]; }             // (knots)
+  const double* torques(int joint) const { return &torque_[joint * (knots_ + 1)]; }     // (knots + 1)
 
  private:
   int n_, knots_;
   std::vector<double> speed_, torque_;
+};
+
+// What is built once per robot and load.
+struct Core {
+  Model<double> model;
+  Model<float> single;
+  Envelope envelope;
 };
 
 enum class Regeneration { kShared, kNone, kFedBack };

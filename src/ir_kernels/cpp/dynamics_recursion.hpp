@@ -89,10 +89,17 @@ inline Vector<S> move_field(const Joint<T>& next, const S& square, const S& rate
   return a;
 }
 
-// H qdd + h: sin and cos of q + theta0, torque per joint. Without `gravity` the weight is left out.
-template <int kJoints = 0, class S, class T>
+// Who doesn't want to know what the recursion passes on its way.
+struct NoTrace {
+  template <class S> void motion(int, const Vector<S>&, const Vector<S>&, const Vector<S>&) {}
+  template <class S> void load(int, const Vector<S>&, const Vector<S>&) {}
+};
+
+// H qdd + h: sin and cos of q + theta0, torque per joint. Without `gravity` the weight is left out. `trace` is told the
+// motion of each link (angular velocity and acceleration, acceleration of its origin) and the load that it hands on.
+template <int kJoints = 0, class S, class T, class Trace = NoTrace>
 inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau,
-                         bool gravity = true) {
+                         bool gravity = true, Trace&& trace = {}) {
   const int n = kJoints ? kJoints : m.n;  // a number known at compile time unrolls the loops
   constexpr int kMost = kJoints ? kJoints : kMaxJoints;
   Vector<S> force[kMost], moment[kMost];
@@ -101,6 +108,7 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
   const T on = gravity ? T(1) : T(0);
   Vector<S> a = into_link(m.joint[0], sn[0], cs[0],
                           {zero + m.lift[0] * on, zero + m.lift[1] * on, zero + m.lift[2] * on});
+  trace.motion(0, w, dw, a);
   const Joint<T>& first = m.joint[0];
   const S square = qd[0] * qd[0];
   force[0] = {square * -first.hx - qdd[0] * first.hy, qdd[0] * first.hx - square * first.hy, zero};
@@ -113,6 +121,7 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
     a = into_link(j, sn[i], cs[i], a);
     w = {w_before.x, w_before.y, w_before.z + qd[i]};
     dw = {dw_before.x + w_before.y * qd[i], dw_before.y - w_before.x * qd[i], dw_before.z + qdd[i]};
+    trace.motion(i, w, dw, a);
     Vector<S>& f = force[i];
     Vector<S>& t = moment[i];
     if (j.products) {
@@ -153,6 +162,7 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
   for (int i = n - 1; i > 0; --i) {
     const Joint<T>& j = m.joint[i];
     tau[i] = moment[i].z;
+    trace.load(i, force[i], moment[i]);
     const Vector<S> f = out_of_link(j, sn[i], cs[i], force[i]);
     const Vector<S> t = add_moment(j, out_of_link(j, sn[i], cs[i], moment[i]), f);
     if (i == 1) {

@@ -40,4 +40,5 @@ PYBIND11_MODULE(IR_MODULE, m) {
   bind_geometry(m);
   bind_dynamics(m);
   bind_inverse_kinematics(m);
+  bind_spline(m);
 }

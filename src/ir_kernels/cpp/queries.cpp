@@ -200,6 +200,25 @@ WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& fram
   return w;
 }
 
+// Derivatives of the distances by the joint values: each joint turns what is farther from the base than itself.
+void slopes(const Model& model, const std::vector<Frame<Double8>>& frames, const int* pair, int count,
+            const WitnessLanes& w, Double8* gradient) {
+  const int outside = static_cast<int>(model.environment.size());
+  Int8 link_a{}, link_b{};
+  for (int k = 0; k < count; ++k) {
+    const bool own = pair[k] >= outside;
+    const int a = own ? model.self_pairs[pair[k] - outside].a : model.environment[pair[k]][0];
+    link_a[k] = model.capsules[a].link;
+    link_b[k] = own ? model.capsules[model.self_pairs[pair[k] - outside].b].link : 0;
+  }
+  for (int j = 0; j < model.chain.n; ++j) {
+    const Vec<Double8>&axis = frames[j + 1].z, &origin = frames[j + 1].origin;
+    const Double8 a = dot(w.normal, cross(axis, w.centre_a - origin));
+    const Double8 b = dot(w.normal, cross(axis, w.centre_b - origin));
+    gradient[j] = (j < link_a ? a : Double8{}) - (j < link_b ? b : Double8{});
+  }
+}
+
 void write(const Model& model, const WitnessLanes& w, int count, std::size_t first, const WitnessArrays& to) {
   const double* base = model.chain.base_origin;
   const Double8 columns[9] = {w.point_a.x + base[0], w.point_a.y + base[1], w.point_a.z + base[2],
@@ -302,7 +321,8 @@ void is_free(const Model& model, const double* q, std::size_t count, const doubl
 void witnesses(const Model& model, const double* q, std::size_t count, const std::int64_t* pair,
                const WitnessArrays& result, double* gradient) {
   Placement<Double8> placement(model);
-  const int n = model.chain.n, outside = static_cast<int>(model.environment.size());
+  const int n = model.chain.n;
+  std::vector<Double8> slope(n);
   for (std::size_t first = 0; first < count; first += 8) {
     const Rows<8> rows(q, first, count, n);
     placement.place(rows.row, rows.count);
@@ -311,20 +331,17 @@ void witnesses(const Model& model, const double* q, std::size_t count, const std
     const WitnessLanes w = witness(model, placement.exact[0], chosen, rows.count);
     write(model, w, rows.count, first, result);
     if (gradient == nullptr) continue;
-    for (int j = 0; j < n; ++j) {
-      const Vec<Double8>& axis = placement.exact[0][j + 1].z;
-      const Vec<Double8>& origin = placement.exact[0][j + 1].origin;
-      const Double8 a = dot(w.normal, cross(axis, w.centre_a - origin));
-      const Double8 b = dot(w.normal, cross(axis, w.centre_b - origin));
-      for (int k = 0; k < rows.count; ++k) {
-        const bool own = chosen[k] >= outside;
-        const int link_a = model.capsules[own ? model.self_pairs[chosen[k] - outside].a
-                                              : model.environment[chosen[k]][0]].link;
-        const int link_b = own ? model.capsules[model.self_pairs[chosen[k] - outside].b].link : 0;
-        gradient[(first + k) * n + j] = (j < link_a ? a[k] : 0.0) - (j < link_b ? b[k] : 0.0);
-      }
-    }
+    slopes(model, placement.exact[0], chosen, rows.count, w, slope.data());
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < rows.count; ++k) gradient[(first + k) * n + j] = slope[j][k];
   }
+}
+
+void pair_slopes(const Model& model, const std::vector<Frame<Double8>>& frames, const int pair[8], Double8& distance,
+                 Double8* gradient) {
+  const WitnessLanes w = witness(model, frames, pair, 8);
+  distance = w.distance;
+  slopes(model, frames, pair, 8, w, gradient);
 }
 
 }  // namespace ir

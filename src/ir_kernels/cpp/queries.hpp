@@ -17,5 +17,8 @@ void is_free(const Model& model, const double* q, std::size_t count, const doubl
 // gradient: (count, n), or null
 void witnesses(const Model& model, const double* q, std::size_t count, const std::int64_t* pair,
                const WitnessArrays& result, double* gradient);
+// One pair in each of eight configurations with the frames of their links: distance, and its n derivatives by the joints.
+void pair_slopes(const Model& model, const std::vector<Frame<Double8>>& frames, const int pair[8], Double8& distance,
+                 Double8* gradient);
 
 }  // namespace ir

@@ -1,0 +1,70 @@
+// What a motion along a uniform cubic B-spline costs and by how much it leaves its bounds, with the derivatives by its
+// control points and by the time between its knots: see ir_kernels/spline.py for the terms.
+#pragma once
+
+#include <vector>
+
+#include "dynamics_adjoint.hpp"
+#include "dynamics_kernels.hpp"
+#include "visit.hpp"
+
+namespace ir {
+
+struct SplineTerms {
+  std::vector<double> velocity, acceleration, jerk, low, high, travel;  // (n) each; travel: cost per rad
+  double torque_share, energy_value, time_value, capacity;
+  dynamics::Regeneration regeneration;
+  std::vector<double> threshold;  // (rows, pairs) [m]
+  double clearance_margin, clearance_scale, penalty, clearance_penalty;
+};
+
+class SplineCost {
+ public:
+  static constexpr int samples = 2;  // per interval between knots
+
+  SplineCost(const Model& geometry, const dynamics::Core& drives, SplineTerms terms);
+
+  // control (K, n) with K - 3 intervals of `interval` s; row (K - 3): which thresholds hold. Returns the cost; fills
+  // gradient (K, n) and of_interval.
+  double operator()(const double* control, int K, const std::int32_t* row, double interval, double* gradient,
+                    double& of_interval);
+
+  double energy = 0.0;  // [J] at the mains for the axes, of the last call
+
+ private:
+  using Lane = Double8;
+  struct Group {  // eight samples, and what the cost owes to each of their numbers
+    Lane q[dynamics::kMaxJoints], qd[dynamics::kMaxJoints], qdd[dynamics::kMaxJoints];
+    Lane s[dynamics::kMaxJoints], c[dynamics::kMaxJoints], tau[dynamics::kMaxJoints];
+    Lane of_q[dynamics::kMaxJoints], of_qd[dynamics::kMaxJoints], of_qdd[dynamics::kMaxJoints];
+    Lane of_tau[dynamics::kMaxJoints], power[dynamics::kMaxJoints];
+    dynamics::LinkTrace<Lane> link[dynamics::kMaxJoints];
+    Lane counts;  // 1 where the lane is a sample
+  };
+  void sample(const double* control);
+  double drives(double interval);
+  double bus(double step);
+  double knots(const double* control, int intervals, double interval, double* gradient, double& of_interval);
+  double clearance(const std::int32_t* row, double step, double& of_step);
+  void scatter(int intervals, double interval, double* gradient) const;
+
+  const Model& model_;
+  const dynamics::Core& core_;
+  SplineTerms terms_;
+  int n_, count_ = 0;
+  double of_step_ = 0.0;
+  std::vector<double> bend_at_, bend_;  // (n, knots + 2): where the smoothed torque limit changes its slope, by how much
+  std::vector<Group> groups_;
+  std::vector<double> power_, of_power_, q_;  // (N), (N), (N, n)
+  // clearance
+  Shifts<float> shift_float_;
+  Shifts<double> shift_double_;
+  Placement<Float16> placement_float_;
+  Placement<Double8> placement_double_;
+  std::vector<int> hits_[16];
+  std::vector<Lane> slope_;
+  template <class V> double clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>& shift,
+                                         const std::int32_t* row, double step, double& of_step);
+};
+
+}  // namespace ir
