@@ -1,0 +1,72 @@
+"""The least J that any method finds for a task when it has longer than a request has."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from itertools import cycle
+from pathlib import Path
+
+from _regional_ompl import PLANNERS, OmplPath, ompl_path
+from _regional_ours import asked, until
+from _regional_tasks import Cost, Task
+from _regional_toppra import timed
+from ir_planner.errors import RequestError
+from ir_planner.following import Reference
+from ir_planner.planner import Planner
+
+ITERATIONS = 2_000_000  # certified edges: more than a minute holds
+
+
+def best_of(planner: Planner, task: Task, seconds: float) -> dict[str, Cost]:
+    """The cheapest movement of each method that found one within `seconds` each."""
+    methods: dict[str, Callable[[], Iterator[Cost]]] = {
+        "planner": lambda: until(planner, task, seconds, ITERATIONS),
+        "OMPL": lambda: (cost for _, cost in _ompl(task, seconds)),
+        "planner through OMPL's path": lambda: _followed(planner, task, seconds),
+    }
+    found = {}
+    for name, method in methods.items():
+        costs = list(method())
+        if costs:
+            found[name] = min(costs, key=lambda cost: cost.J)
+    return found
+
+
+def read(file: Path) -> dict[str, tuple[str, float]]:
+    """Method and J per task of an earlier run's JSON."""
+    rows = json.loads(file.read_text())["rows"]
+    return {row["task"]: (row["best_by"], float(row["best_J"])) for row in rows if row.get("best_J")}
+
+
+def _ompl(task: Task, seconds: float) -> Iterator[tuple[OmplPath, Cost]]:
+    """OMPL's planners in turn, each path with its time."""
+    end = time.perf_counter() + seconds
+    for name in cycle(PLANNERS):
+        left = end - time.perf_counter()
+        if left <= 0.0:
+            return
+        path = ompl_path(task, name, min(left, 10.0))
+        done = timed(path, task) if path is not None else None
+        if path is not None and done is not None:
+            yield path, done[1]
+
+
+def _followed(planner: Planner, task: Task, seconds: float) -> Iterator[Cost]:
+    """OMPL's paths driven by the planner: half of the time finds paths, half drives the cheapest of them."""
+    ways = sorted(_ompl(task, 0.5 * seconds), key=lambda way: way[1].J)
+    end = time.perf_counter() + 0.5 * seconds
+    optimize = getattr(planner, "optimize_trajectory", None)
+    for path, _ in ways:
+        if time.perf_counter() > end:
+            return
+        try:
+            plan = planner.plan_trajectory(Reference(path.corners), asked(task))
+            if optimize is not None and plan.trajectory is not None:
+                plan = optimize(plan.trajectory, asked(task))
+        except RequestError:
+            continue
+        report = plan.report
+        if plan.status.ok and report.certified:
+            yield Cost.of(report.energy - report.base_energy, report.duration)

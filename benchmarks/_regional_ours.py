@@ -1,0 +1,154 @@
+"""Runs of the planner: what a regional movement costs and how long it took, and whether answers repeat."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+from _regional_tasks import TIME_VALUE, Cost, Task
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import PlanningInfo
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.errors import RequestError
+from ir_planner.goals import Goal
+from ir_planner.planner import Planner
+
+PLANNING_TIME = 1.0  # s
+UNHURRIED = 60.0  # s: where ids are compared, so that the budget of work ends a search and never the clock
+FIRST = "first feasible"  # how the note of the stage begins that knew the first free way
+NOTHING = "nothing free"
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One answer: solved means found and certified; times in ms; clearance [m]."""
+
+    seed: int
+    solved: bool
+    truncated: bool
+    first_ms: float
+    final_ms: float
+    cost: Cost | None
+    clearance: float
+    trajectory: JointTrajectory | None
+    message: str
+
+    @property
+    def trajectory_id(self) -> str:
+        """Of the trajectory, "" without one."""
+        return self.trajectory.trajectory_id if self.trajectory is not None else ""
+
+
+def planner_of(cell: str) -> Planner:
+    """A planner with the cell."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", cell)
+    return planner
+
+
+def asked(task: Task, seed: int = 0) -> PlanOptions:
+    """The request's options: J as the objective, as near as a request comes to it.
+
+    A request's joules contain the base load, and with it base watts x T; so the watts that a second is worth
+    are those of J less the base load.
+    """
+    worth = max(TIME_VALUE - task.scene.base_watts, 0.0)
+    return PlanOptions(seed=seed, safety_distance=task.margin, planning_time=PLANNING_TIME, time_value=worth)
+
+
+def first_feasible(info: PlanningInfo) -> float:
+    """Seconds until the first free way was known, as the stages tell it.
+
+    Without a note of it: until the first stage had ended that didn't come back with nothing.
+    """
+    for tells in (lambda note: note.startswith(FIRST), lambda note: not note.startswith(NOTHING)):
+        passed = 0.0
+        for stage in info.stages:
+            passed += stage.seconds
+            if tells(stage.note):
+                return passed
+    return float("nan")
+
+
+def tells_first(info: PlanningInfo) -> bool:
+    """Whether a stage notes the first feasible way."""
+    return any(stage.note.startswith(FIRST) for stage in info.stages)
+
+
+def run(planner: Planner, task: Task, options: PlanOptions) -> Run:
+    """Ask once; the time is that of the whole call."""
+    begin = time.perf_counter()
+    plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options)
+    took = time.perf_counter() - begin
+    report = plan.report
+    solved = plan.status.ok and report.certified
+    return Run(
+        options.seed,
+        solved,
+        plan.info.truncated,
+        1e3 * first_feasible(plan.info),
+        1e3 * took,
+        Cost.of(report.energy - report.base_energy, report.duration) if solved else None,
+        report.min_clearance,
+        plan.trajectory,
+        plan.status.message,
+    )
+
+
+def runs(planner: Planner, task: Task, seeds: int) -> list[Run]:
+    """Seeds 0 .. N-1, after one answer that isn't counted."""
+    run(planner, task, asked(task))
+    return [run(planner, task, asked(task, seed)) for seed in range(seeds)]
+
+
+def until(planner: Planner, task: Task, seconds: float, iterations: int) -> Iterator[Cost]:
+    """Costs of answers with a large budget and one seed after the other, until the time is up."""
+    end, seed = time.perf_counter() + seconds, 1000
+    while (left := end - time.perf_counter()) > 0.0:
+        options = replace(asked(task, seed), planning_time=max(left, 0.05), max_iterations=iterations)
+        found = run(planner, task, options)
+        if found.cost is not None:
+            yield found.cost
+        seed += 1
+
+
+def repeats(planner: Planner, tasks: Sequence[Task]) -> tuple[int, int]:
+    """How many of the answers come again bit by bit: asked twice, and by two threads at once; of how many."""
+
+    def identity(task: Task, seed: int) -> str:
+        return run(planner, task, replace(asked(task, seed), planning_time=UNHURRIED)).trajectory_id
+
+    same, count = 0, 0
+    with ThreadPoolExecutor(2) as threads:
+        for task, other in zip(tasks, [*tasks[1:], tasks[0]], strict=True):
+            alone = identity(task, 0), identity(other, 1)
+            again = identity(task, 0)
+            together = tuple(threads.map(identity, (task, other), (0, 1)))
+            same += (again == alone[0]) + (together[0] == alone[0]) + (together[1] == alone[1])
+            count += 3
+    return same, count
+
+
+def knows(planner: Planner, task: Task, planner_id: str) -> bool:
+    """Whether the planner takes this planner_id."""
+    try:
+        planner.plan_regional(
+            task.start, Goal(configuration=task.start), replace(asked(task), planner_id=planner_id)
+        )
+    except RequestError as error:
+        if "unknown" in str(error):
+            return False
+        raise
+    return True
+
+
+def solved_alone(planner: Planner, tasks: Sequence[Task], planner_id: str, seeds: int) -> tuple[int, int]:
+    """Answers of one planner_id alone that are certified, of how many."""
+    found = [
+        run(planner, task, replace(asked(task, seed), planner_id=planner_id)).solved
+        for task in tasks
+        for seed in range(seeds)
+    ]
+    return sum(found), len(found)
