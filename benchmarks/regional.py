@@ -162,14 +162,18 @@ def main() -> None:
     chosen = {cell: tasks_of(cell) for cell in given.cell or CELLS}
     if given.task:
         chosen = {cell: [t for t in tasks if t.name in given.task] for cell, tasks in chosen.items()}
-        chosen = {cell: tasks for cell, tasks in chosen.items() if tasks}
+    chosen = {cell: tasks for cell, tasks in chosen.items() if tasks}
+    if not chosen:
+        raise SystemExit("no cell has such a task")
     figures: list[Figures] = []
     noted = True
     for cell, tasks in chosen.items():
         planner, opinion = planner_of(cell), SecondOpinion(tasks[0].scene)
         for task in tasks:
             figures.append(measured(planner, task, opinion, given, earlier))
-            print("  ".join(f"{key} {value}" for key, value in figures[-1].row().items()), flush=True)
+            row = figures[-1].row()
+            shown = ("task", "solved", "first_ms", "final_ms", "J", "ompl_J", "best_J")
+            print("  ".join(f"{key} {row.get(key, '-')}" for key in shown), flush=True)
         plan = planner.plan_regional(tasks[0].start, Goal(configuration=tasks[0].goal), asked(tasks[0]))
         noted &= tells_first(plan.info)
     print()
