@@ -195,11 +195,12 @@ template <class V> class Examiner {
 
 class Certifier {
  public:
-  Certifier(const Model& model, const double* threshold, const Motions& motions, bool with_bound)
-      : model_(model), motions_(motions), coarse_(model, threshold, with_bound), fine_(model, threshold, with_bound) {}
+  Certifier(const Model& model, const double* threshold, bool with_bound)
+      : model_(model), coarse_(model, threshold, with_bound), fine_(model, threshold, with_bound) {}
 
   // Rounds over some motions until all are decided; `first` is the number of the first of them.
-  void decide(std::vector<Progress>& all, std::size_t first) {
+  void decide(const Motions& motions, std::vector<Progress>& all, std::size_t first) {
+    motions_ = &motions;
     for (;;) {
       items_.clear();
       for (std::size_t m = 0; m < all.size(); ++m)
@@ -234,7 +235,7 @@ class Certifier {
     int count = 0;
     const auto flush = [&] {
       if (count == 0) return;
-      examiner.examine(motions_, motion, interval, count, finding);
+      examiner.examine(*motions_, motion, interval, count, finding);
       for (int k = 0; k < count; ++k) items_[at[k]].finding = finding[k];
       count = 0;
     };
@@ -286,7 +287,7 @@ class Certifier {
   }
 
   const Model& model_;
-  const Motions& motions_;
+  const Motions* motions_ = nullptr;
   Examiner<Float16> coarse_;
   Examiner<Double8> fine_;
   std::vector<Item> items_;
@@ -308,28 +309,40 @@ Outcome outcome(const Progress& p) {
 
 }  // namespace
 
-void certify_edges(const Model& model, const double* q0, const double* q1, std::size_t count, const double* threshold,
-                   Outcome* result) {
-  const Edges edges(q0, q1, model.chain.n);
-  Certifier certifier(model, threshold, edges, false);
+struct EdgeCertifier::Parts {
+  Certifier certifier;
   std::vector<Progress> all;
+};
+
+EdgeCertifier::EdgeCertifier(const Model& model, const double* threshold)
+    : n_(model.chain.n), parts_(new Parts{Certifier(model, threshold, false), {}}) {}
+EdgeCertifier::~EdgeCertifier() = default;
+
+void EdgeCertifier::certify(const double* q0, const double* q1, std::size_t count, Outcome* result) {
+  const Edges edges(q0, q1, n_);
+  std::vector<Progress>& all = parts_->all;
   for (std::size_t first = 0; first < count; first += window) {
     all.assign(std::min(window, count - first), begin(1.0, 4));
-    certifier.decide(all, first);
+    parts_->certifier.decide(edges, all, first);
     for (std::size_t k = 0; k < all.size(); ++k) result[first + k] = outcome(all[k]);
   }
+}
+
+void certify_edges(const Model& model, const double* q0, const double* q1, std::size_t count, const double* threshold,
+                   Outcome* result) {
+  EdgeCertifier(model, threshold).certify(q0, q1, count, result);
 }
 
 Outcome certify_trajectory(const Model& model, const double* coefficients, int terms, const double* durations,
                            std::size_t count, const double* threshold) {
   const Polynomials motions(coefficients, model.chain.n, terms);
-  Certifier certifier(model, threshold, motions, true);
+  Certifier certifier(model, threshold, true);
   std::vector<Progress> all;
   double time = 0.0, bound = infinity;
   for (std::size_t first = 0; first < count; first += window) {
     all.clear();
     for (std::size_t k = first; k < std::min(first + window, count); ++k) all.push_back(begin(durations[k], 1));
-    certifier.decide(all, first);
+    certifier.decide(motions, all, first);
     for (const Progress& p : all) {
       Outcome o = outcome(p);
       if (o.verdict != free_verdict) {

@@ -41,4 +41,5 @@ PYBIND11_MODULE(IR_MODULE, m) {
   bind_dynamics(m);
   bind_inverse_kinematics(m);
   bind_spline(m);
+  bind_search(m);
 }

@@ -1,5 +1,5 @@
-"""Batch functions over arrays: kinematics, exact distances, certified motion, dynamics, inverse
-kinematics.
+"""Batch functions over arrays: kinematics, exact distances, certified motion, path search, dynamics,
+inverse kinematics.
 """
 
 from ir_kernels.ccd import CcdResult, CcdSettings, ccd
@@ -20,6 +20,7 @@ from ir_kernels.geometry import ENVIRONMENT, SELF, Pair
 from ir_kernels.inverse_kinematics import IkSet, SphericalWristIk
 from ir_kernels.limits import Extrema, MotionExtrema, motion_extrema, polynomial_extrema
 from ir_kernels.power import DcBus, DcBusParameters, DriveEnergy, dc_bus, drive_energy
+from ir_kernels.search import BidirectionalTree
 from ir_kernels.spline import SplineCost, SplineTerms
 from ir_kernels.torque_bounds import EXCEEDS, WITHIN, TorqueBounds
 
@@ -31,6 +32,7 @@ __all__ = [
     "SELF",
     "UNDECIDED",
     "WITHIN",
+    "BidirectionalTree",
     "CcdResult",
     "CcdSettings",
     "Certificate",
