@@ -129,8 +129,7 @@ def retreat(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) ->
 
 def tree(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
     """A free path found by two trees, polished."""
-    scale = np.sqrt(space.scene.weights / space.scene.weights[0])
-    path = connect(start, goal, space, np.maximum(scale, 0.1), np.random.default_rng(seed))
+    path = connect(start, goal[None], space, seed)
     if path is None:
         return []
     for _ in range(3):

@@ -21,7 +21,7 @@ from ir_planner.movement_cost import path_cost
 from ir_planner.polish import fewest_corners, pulled
 from ir_planner.scene import PlanningScene
 from ir_planner.service_settings import WithdrawalSettings
-from ir_planner.tree import Tree, connect
+from ir_planner.tree import connect, joint_scale
 from ir_planner.withdrawal import Walk, withdraw
 from ir_planner.work_area import WorkArea
 from ir_planner.zones import tcp_inside
@@ -32,8 +32,7 @@ METHODS = (MODIFIED_GA, TREE)
 _SEARCHED = 2  # raw ways per candidate that is wanted
 _DIFFERENT = 0.1  # rad: ways that end nearer to each other are one
 _END_SAMPLES = 24
-_BATCH, _SPREADS = 24, (0.05, 0.2, 0.6)  # of the trees' targets, rad
-_OUTSIDE_TRIES = 512
+_OUTSIDE_TRIES, _OUTSIDE_GOALS = 512, 8  # configurations drawn, and how many of those outside trees aim at
 _EDGE_SAMPLES = 12
 
 
@@ -164,35 +163,24 @@ def _told(walk: Walk) -> str:
 
 def tree_out(problem: Exit, rng: np.random.Generator) -> FloatArray | None:
     """A way by two trees, from the work configuration and from outside; None when the budget ended before."""
-    work = problem.work
-    goal = _somewhere_outside(problem, rng)
-    if goal is None:
+    goals = _outside(problem, rng)
+    if len(goals) == 0:
         return None
-    weights = problem.inside.scene.weights
-    scale = np.maximum(np.sqrt(weights / weights[0]), 0.1)
-
-    def draw(here: Tree, there: Tree, space: FreeSpace, rng: np.random.Generator) -> FloatArray:
-        """A third all over, a third around nodes of this tree, a third the other tree's nodes."""
-        third = _BATCH // 3
-        targets = rng.uniform(space.low, space.high, (_BATCH, len(work)))
-        around = here.nodes[rng.integers(0, len(here.nodes), third)]
-        noise = rng.standard_normal((third, len(work))) * rng.choice(_SPREADS, (third, 1))
-        targets[:third] = np.clip(around + noise, space.low, space.high)
-        targets[third : 2 * third] = there.nodes[rng.integers(0, len(there.nodes), third)]
-        return targets
-
-    path = connect(work, goal, problem.inside, scale, rng, draw)
-    return None if path is None else _until_out(np.ascontiguousarray(path), problem)
+    path = connect(problem.work, goals, problem.inside, int(rng.integers(2**63)))
+    return None if path is None else _until_out(path, problem)
 
 
-def _somewhere_outside(problem: Exit, rng: np.random.Generator) -> FloatArray | None:
-    """Park or machine home where they are outside and free, else the first such configuration drawn."""
+def _outside(problem: Exit, rng: np.random.Generator) -> FloatArray:
+    """Free configurations (G, n) outside: park and machine home where they are, and the nearest of those
+    drawn.
+    """
     cell, space = problem.inside.scene.cell, problem.inside
     postures = np.array([cell.park, cell.machine_home])
     drawn = rng.uniform(space.low, space.high, (_OUTSIDE_TRIES, len(postures[0])))
-    candidates = np.concatenate([postures, drawn])
-    out = np.flatnonzero(problem.is_out(candidates))
-    return candidates[out[0]] if len(out) else None
+    drawn = drawn[problem.is_out(drawn)]
+    away = np.linalg.norm((drawn - problem.work) * joint_scale(space), axis=1)
+    nearest = drawn[np.argsort(away, kind="stable")[:_OUTSIDE_GOALS]]
+    return np.concatenate([postures[problem.is_out(postures)], nearest])
 
 
 def _until_out(path: FloatArray, problem: Exit) -> FloatArray:
