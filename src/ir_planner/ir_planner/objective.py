@@ -1,21 +1,29 @@
 """What a movement is judged by, and the stretch of its duration that serves it best.
 
-movement_cost: W of eq. (9); time: T; energy: E at the mains; time_and_energy: J = E + time_value x T.
+movement_cost: W of eq. (9); time: T; energy: E at the mains; time_and_energy: J = E of the drives + time_value x T,
+without the base load of the controller, which is part of what a second is worth.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
+from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
 from ir_planner.blending import stretched
 from ir_planner.energy import movement_energy
+from ir_planner.movement_cost import path_cost
 from ir_planner.scene import PlanningScene
 
 FloatArray = NDArray[np.float64]
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported
+_DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it moves
+_TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
+_BESIDE = 5e-3  # weight of what breaks ties
 
 
 def objective_value(report: TrajectoryReport, objective: str, time_value: float) -> float:
@@ -24,15 +32,42 @@ def objective_value(report: TrajectoryReport, objective: str, time_value: float)
         "movement_cost": report.movement_cost * (1.0 + 1e-6 * report.duration),
         "time": report.duration,
         "energy": report.energy,
-        "time_and_energy": report.energy + time_value * report.duration,
+        "time_and_energy": report.energy - report.base_energy + time_value * report.duration,
     }
     return values[objective]
 
 
+@dataclass(frozen=True, eq=False)
+class ObjectiveWeights:
+    """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about what a second of
+    movement costs in all.
+    """
+
+    energy: float
+    time: float
+    travel: FloatArray
+    power: float
+
+
+def objective_weights(options: PlanOptions, scene: PlanningScene, path: FloatArray) -> ObjectiveWeights:
+    """The objective as a sum that a descent can follow; with a wished duration only joules are left to choose."""
+    still = np.zeros(len(scene.weights))
+    if options.duration > 0.0 or options.objective == "energy":
+        return ObjectiveWeights(1.0, scene.base_watts, still, _DRIVES_WATTS + scene.base_watts)
+    if options.objective == "time":
+        return ObjectiveWeights(_BESIDE, _TIME_WATTS, still, _TIME_WATTS)
+    if options.objective == "movement_cost":  # in watts for a path of a second
+        travel = scene.weights * (_TIME_WATTS / max(path_cost(scene.weights, path), 1e-9))
+        return ObjectiveWeights(0.0, 10.0 * _BESIDE * _TIME_WATTS, travel, _TIME_WATTS)
+    return ObjectiveWeights(1.0, options.time_value, still, _DRIVES_WATTS + options.time_value)
+
+
 def pace_value(trajectory: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
     """J of a trajectory at the pace it has, or its joules where the objective is not J; sampled coarsely."""
-    joules = movement_energy(trajectory, scene, _COARSE_STEP).total
-    return joules + (time_value * trajectory.duration if objective == "time_and_energy" else 0.0)
+    energy = movement_energy(trajectory, scene, _COARSE_STEP)
+    if objective == "time_and_energy":
+        return energy.total - energy.base + time_value * trajectory.duration
+    return energy.total
 
 
 def best_stretch(fastest: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:

@@ -1,0 +1,209 @@
+"""From a free path to the cheapest movement near it: a cubic B-spline descends on its control points and its
+duration.
+
+Path and pace are chosen together: the cost is the objective's, and what exceeds a bound of speed, acceleration, jerk,
+torque or clearance is punished. The descent runs on a coarse spline first and on finer ones then. What comes out is
+slowed until every limit holds exactly, and its clearance is proved; a pair that comes too near gets more room and the
+descent goes on from there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_kernels import SplineCost, SplineTerms
+from ir_planner.budget import Budget
+from ir_planner.clearance_checks import clearance_violation
+from ir_planner.limit_checks import Violation
+from ir_planner.movement import TimedMovement
+from ir_planner.objective import ObjectiveWeights, objective_weights
+from ir_planner.reporting import evaluate_trajectory
+from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.timing import MotionLimits, torque_use
+from ir_planner.uniform_spline import UniformSpline, along_path, fewest_seconds
+from ir_planner.zones import tcp_inside
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+_SPACING = 0.1  # s between the knots of the coarsest spline
+_FEWEST, _MOST = 12, 64  # control points of the coarsest spline
+_SLOWER = 1.3  # than the path at full speed: where the descent starts
+_STIFFNESS = 4.0  # penalties against the power that the objective is about; ten times that on the finest spline
+_TORQUE_SHARES = (0.98, 0.95, 0.9)
+_MARGIN = 1e-3  # m of clearance beyond S_m that the descent asks for
+_SCALE = 1e-2  # m that lack count like a limit used twice
+_REPAIRS = 5
+_MORE_ROOM = 1e-3  # m more than what lacked
+_REPAIR_EVALUATIONS = 40
+_ZONE_SAMPLES = 4  # per interval
+_TORQUE_SAMPLES = 6  # per interval; the proof comes after
+_FITS = 25
+_EDGES_PER_INTERVAL = 0.25  # work of one evaluation, in certified edges
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Evaluations of the cost on the coarse spline, on the next finer one, and on the finest."""
+
+    coarse: int
+    middle: int
+    fine: int
+
+
+QUICK = Effort(80, 80, 60)
+THOROUGH = Effort(300, 300, 300)
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """A spline on its way down: its level (0: coarse), cost, and the room (R, Z) m that its pairs are to have."""
+
+    spline: UniformSpline
+    level: int
+    cost: float
+    room: FloatArray
+
+
+class Refinement:
+    """Descents for one request: the scene, what counts, and which limits hold."""
+
+    def __init__(
+        self, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = ""
+    ) -> None:
+        self.scene, self.options, self.budget, self.station = scene, options, budget, station
+        self.limits = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
+        plain = scene.thresholds(options.safety_distance) - PROOF_TOLERANCE / 2
+        rows = [plain]
+        if station and scene.allowed(station).any():
+            rows.append(scene.thresholds(options.safety_distance, station) - PROOF_TOLERANCE / 2)
+        self._room = np.stack(rows)
+
+    def drafted(self, path: FloatArray, evaluations: int = QUICK.coarse) -> Draft:
+        """The coarse spline from a free path (M, n), M >= 2, gone down a little: enough to compare ways."""
+        least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
+        count = int(np.clip(np.ceil(least / _SPACING), _FEWEST, _MOST))
+        wished = self.options.duration
+        start = along_path(path, count, wished if wished > 0.0 else _SLOWER * least)
+        return self._descended(Draft(start, 0, np.inf, self._room), path, evaluations)
+
+    def finished(self, draft: Draft, path: FloatArray, effort: Effort = QUICK) -> TimedMovement | None:
+        """The certified movement that a draft ends in; None where it can't be made one."""
+        for evaluations in (effort.middle, effort.fine)[draft.level :]:
+            finer = replace(draft, spline=draft.spline.subdivided(), level=draft.level + 1)
+            draft = self._descended(finer, path, evaluations)
+        for _ in range(_REPAIRS + 1):
+            found = self._certified(draft, path)
+            if not isinstance(found, Violation):
+                return found
+            if found.what != "clearance" or found.pair is None:
+                return None
+            draft = self._descended(self._with_more_room(draft, found), path, _REPAIR_EVALUATIONS)
+        return None
+
+    def _descended(self, draft: Draft, path: FloatArray, evaluations: int) -> Draft:
+        self.budget.check()
+        spline = draft.spline
+        found = self._cost(draft, path).descend(
+            spline.control,
+            spline.interval,
+            self._rows(spline),
+            fixed_interval=self.options.duration > 0.0,
+            evaluations=evaluations,
+        )
+        self.budget.spend(int(np.ceil(found.evaluations * spline.intervals * _EDGES_PER_INTERVAL)))
+        return replace(draft, spline=UniformSpline(found.control, found.interval), cost=found.value)
+
+    def _cost(self, draft: Draft, path: FloatArray) -> SplineCost:
+        scene, robot = self.scene, self.scene.cell.robot
+        weights: ObjectiveWeights = objective_weights(self.options, scene, path)
+        stiffness = _STIFFNESS * weights.power * (10.0 if draft.level == 2 else 1.0)
+        terms = SplineTerms(
+            self.limits.velocity,
+            self.limits.acceleration,
+            self.limits.jerk,
+            robot.position_min,
+            robot.position_max,
+            weights.travel,
+            draft.room,
+            torque_share=_TORQUE_SHARES[0],
+            energy_value=weights.energy,
+            time_value=weights.time,
+            capacity_energy=scene.dc_bus.capacity_energy,
+            regeneration=scene.dc_bus.regeneration,
+            clearance_margin=_MARGIN,
+            clearance_scale=_SCALE,
+            penalty=stiffness,
+            clearance_penalty=stiffness,
+        )
+        return SplineCost(scene.collision, scene.dynamics, terms)
+
+    def _rows(self, spline: UniformSpline) -> IntArray:
+        """Which thresholds hold in each interval: the station's where the tcp stays in the zone."""
+        if len(self._room) == 1:
+            return np.zeros(spline.intervals, np.int32)
+        q, _, _ = spline.samples(_ZONE_SAMPLES)
+        inside = tcp_inside(q, self.scene, self.station, self.options.safety_distance)
+        inside = inside.reshape(spline.intervals, -1).all(axis=1)
+        until = np.append(inside[1:], inside[-1])  # the end of an interval is the beginning of the next
+        return np.asarray(inside & until, np.int32)
+
+    def _with_more_room(self, draft: Draft, found: Violation) -> Draft:
+        assert found.pair is not None  # asked before
+        names = (found.pair.body_a, found.pair.body_b)
+        room = draft.room.copy()
+        for z, pair in enumerate(self.scene.collision.pairs):
+            if (pair.body_a, pair.body_b) == names:
+                room[:, z] += max(found.excess, 0.0) + _MORE_ROOM
+        return replace(draft, room=room)
+
+    def _certified(self, draft: Draft, path: FloatArray) -> TimedMovement | Violation | None:
+        """The movement, or what is in its way; None where its torque does not suffice."""
+        names, s_m = self.scene.cell.robot.joint_names, self.options.safety_distance
+        for share in _TORQUE_SHARES:
+            self.budget.check()
+            trajectory = self._slowed(draft.spline, self.limits.with_torque_share(share), names)
+            if trajectory is None:
+                return None
+            blocked = clearance_violation(trajectory, self.scene, s_m, self.station)
+            if blocked is not None:
+                return blocked
+            evaluation = evaluate_trajectory(trajectory, self.scene, s_m, self.station)
+            violation = evaluation.verification.violation
+            if violation is None:
+                return TimedMovement(path, trajectory, evaluation)
+            if violation.what != "torque":
+                return violation
+        return None
+
+    def _slowed(
+        self, spline: UniformSpline, limits: MotionLimits, names: tuple[str, ...]
+    ) -> JointTrajectory | None:
+        """The motion as it is sent, as fast as it is or as much slower as the limits ask for; None where that is not
+        enough, or slower than the wished duration.
+        """
+        fitted = within_limits(spline, limits, self.scene)
+        if fitted is None or (self.options.duration > 0.0 and fitted.interval > spline.interval):
+            return None
+        return fitted.trajectory(names)
+
+
+def within_limits(
+    spline: UniformSpline, limits: MotionLimits, scene: PlanningScene
+) -> UniformSpline | None:
+    """The same path at the same pace or slower, within the limits; torque at samples. None where no pace carries it."""
+    for _ in range(_FITS):
+        top = spline.extremes()
+        torque = torque_use(scene.dynamics, *spline.samples(_TORQUE_SAMPLES)).max() / limits.torque_share
+        use = max(
+            float((top.velocity / limits.velocity).max()),
+            float((top.acceleration / limits.acceleration).max()) ** (1 / 2),
+            float((top.jerk / limits.jerk).max()) ** (1 / 3),
+            float(torque) ** (1 / 2),
+        )
+        if use <= 1.0:
+            return spline
+        spline = UniformSpline(spline.control, spline.interval * use * 1.0005)
+    return None

@@ -1,0 +1,100 @@
+"""Motions along uniform cubic B-splines: control points with one interval of time between all knots.
+
+Three equal control points at an end mean rest there. Acceleration is linear and jerk constant between knots, so a
+point per knot with position, velocity and acceleration is the motion exactly, and its largest values are closed forms.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tops:
+    """Largest |qd|, |qdd| and |qddd| of a motion, each (n,)."""
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class UniformSpline:
+    """control (K, n) rad, K >= 7; interval [s] between the K - 2 knots."""
+
+    control: FloatArray
+    interval: float
+
+    @property
+    def intervals(self) -> int:
+        """Number of polynomials."""
+        return len(self.control) - 3
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.intervals * self.interval
+
+    def knots(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """q, qd, qdd (K - 2, n) at the knots; exactly at rest at both ends."""
+        c, h = self.control, self.interval
+        q = (c[:-2] + 4.0 * c[1:-1] + c[2:]) / 6.0
+        q[0], q[-1] = c[0], c[-1]
+        return q, (c[2:] - c[:-2]) / (2.0 * h), (c[:-2] - 2.0 * c[1:-1] + c[2:]) / h**2
+
+    def samples(self, per_interval: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """q, qd, qdd (S * per_interval, n) at evenly spaced instants, the beginnings of the intervals included."""
+        q, qd, qdd = (values[:, None, :] for values in self.knots())
+        t = (np.arange(per_interval) / per_interval * self.interval)[None, :, None]
+        jerk = np.diff(qdd, axis=0) / self.interval
+        a, v, s = qdd[:-1] + t * jerk, qd[:-1], q[:-1]
+        speed = v + t * (qdd[:-1] + 0.5 * t * jerk)
+        place = s + t * (v + t * (0.5 * qdd[:-1] + t * jerk / 6.0))
+        n = self.control.shape[1]
+        return place.reshape(-1, n), speed.reshape(-1, n), a.reshape(-1, n)
+
+    def extremes(self) -> Tops:
+        """Largest values anywhere."""
+        _, qd, qdd = self.knots()
+        jerk = np.diff(qdd, axis=0) / self.interval
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = -qdd[:-1] / jerk  # where the speed turns inside an interval
+        turn = np.where((turn > 0.0) & (turn < self.interval), turn, 0.0)
+        inside = qd[:-1] + turn * (qdd[:-1] + 0.5 * turn * jerk)
+        speed = np.maximum(np.abs(qd).max(axis=0), np.abs(inside).max(axis=0))
+        return Tops(speed, np.abs(qdd).max(axis=0), np.abs(jerk).max(axis=0))
+
+    def subdivided(self) -> "UniformSpline":
+        """The same motion with a knot more in the middle of every interval."""
+        c = self.control
+        finer = np.empty((2 * len(c) - 3, c.shape[1]))
+        finer[0::2] = 0.5 * (c[:-1] + c[1:])
+        finer[1::2] = 0.125 * (c[:-2] + 6.0 * c[1:-1] + c[2:])
+        return UniformSpline(finer, 0.5 * self.interval)
+
+    def trajectory(self, joint_names: tuple[str, ...]) -> JointTrajectory:
+        """The motion as it is sent, a point per knot; the interval is rounded up to a nanosecond."""
+        step = int(np.ceil(self.interval * 1e9 - 1e-3))
+        q, qd, qdd = UniformSpline(self.control, step * 1e-9).knots()
+        return JointTrajectory(joint_names, np.arange(len(q), dtype=np.int64) * step, q, qd, qdd)
+
+
+def along_path(path: FloatArray, count: int, duration: float) -> UniformSpline:
+    """Spline with `count` control points between its ends along a path (M, n), slow at both ends of it."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    share = np.arange(1, count + 1) / (count + 1)
+    at = share * share * (3.0 - 2.0 * share) * way[-1]
+    inner = np.stack([np.interp(at, way, path[:, j]) for j in range(path.shape[1])], axis=1)
+    control = np.concatenate([np.repeat(path[:1], 3, axis=0), inner, np.repeat(path[-1:], 3, axis=0)])
+    return UniformSpline(control, duration / (count + 3))
+
+
+def fewest_seconds(path: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> float:
+    """A guess that is seldom too long: a path (M, n) at full speed, or from rest to rest as its longest joint."""
+    steps = np.abs(np.diff(path, axis=0))
+    at_speed = float((steps / velocity).max(axis=1).sum())
+    return max(at_speed, 2.0 * float(np.sqrt(steps.sum(axis=0) / acceleration).max()))
