@@ -16,14 +16,16 @@ Clock = Callable[[], float]
 class Budget:
     """Work left for one request.
 
-    `max_iterations`: edges that searches may certify. `deadline` [s] on `clock`. `cancelled` is asked at
-    every step.
+    `max_iterations`: edges that searches may certify; the evaluations of a descent count as edges too.
+    `deadline` [s] on `clock`. `cancelled` is asked at every step. `improvement`: how much of the work may go
+    into better answers once there is one.
     """
 
     max_iterations: int
     deadline: float
     clock: Clock
     cancelled: Callable[[], bool] = lambda: False
+    improvement: int = 2**62
     iterations: int = field(default=0, init=False)
     truncated: bool = field(default=False, init=False)
 

@@ -337,7 +337,9 @@ class Planner:
 
     def _budget(self, options: PlanOptions, cancelled: Callable[[], bool], movements: int = 1) -> Budget:
         work = (options.max_iterations or self.settings.max_iterations) * movements
-        return Budget(work, self.clock() + options.planning_time * movements, self.clock, cancelled)
+        improvement = options.max_iterations or self.settings.improvement_iterations
+        deadline = self.clock() + options.planning_time * movements
+        return Budget(work, deadline, self.clock, cancelled, improvement)
 
 
 def _noted(info: PlanningInfo, note: str) -> PlanningInfo:

@@ -1,9 +1,9 @@
 """Regional movement: from one free configuration to another, round everything, at least cost.
 
-First the straight movement of all joints (PTP, cost W of eq. 9). Where it collides: simple detours, and as
-the last resort two trees. The cheapest few by W are polished, timed and certified, and the objective
-decides among them. Nothing found is an answer too: which pair is in the way, where, by how much, and what
-was tried.
+First the straight movement of all joints (PTP, cost W of eq. 9). Where it collides: simple detours, the tool
+drawn back, and two trees. From the first free way on the answer gets better with work: other ways round are
+looked for, and the cheapest go down by gradient to the best path and pace near them, certified. Nothing
+found is an answer too: which pair is in the way, where, by how much, and what was tried.
 """
 
 from collections.abc import Callable
@@ -20,21 +20,25 @@ from numpy.typing import NDArray
 from ir_planner.budget import Budget
 from ir_planner.clearance import pair_value
 from ir_planner.detours import drawn_back, over_postures, scattered
-from ir_planner.errors import TimingError
 from ir_planner.free_space import FreeSpace
 from ir_planner.journal import Journal
-from ir_planner.movement import TimedMovement, timed_movement
+from ir_planner.movement import TimedMovement
 from ir_planner.movement_cost import path_cost
-from ir_planner.objective import objective_value
 from ir_planner.polish import fewest_corners, pulled
+from ir_planner.portfolio import Portfolio
+from ir_planner.refinement import Refinement
 from ir_planner.retreat import retreating_paths
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.timing import STILL
 from ir_planner.tree import connect
 
 FloatArray = NDArray[np.float64]
 Search = Callable[[FloatArray, FloatArray, FreeSpace, int], list[FloatArray]]
 _SCATTERED = 160
-_REFINED = 3  # ways round that are polished, timed and compared
+_WAYS = 3  # different ways round of one search
+_FINISHED = 2  # drafts that are finished in one round
+_TIMED_BY_LAWS = 3
+_ROUNDS = 10_000  # the work ends them
 _DIFFERENT = 0.15  # rad: ways whose vias are nearer are one way
 
 
@@ -73,29 +77,85 @@ def search_regional(
     blocked = end_in_collision(start, goal, space, options.safety_distance)
     if blocked is not None:
         return blocked, None
-    for name, search in _searches(options.planner_id):
+    portfolio = Portfolio(space, Refinement(scene, options, journal.budget), journal)
+    ways = _first_ways(start, goal, space, options, journal)
+    if ways and np.abs(goal - start).max() >= STILL and not _by_laws(options):
+        _improve(start, goal, ways, portfolio, options)
+    if ways and portfolio.best is None:
+        with journal.stage("straight steps") as notes:
+            cheapest = sorted(ways, key=lambda way: path_cost(scene.weights, way[1]))
+            shorter = [(method, _straightened(path, space)) for method, path in cheapest[:_TIMED_BY_LAWS]]
+            portfolio.time_by_laws(shorter)
+            notes.append("certified" if portfolio.best else "nothing certified")
+    if portfolio.best is None:
+        return _blocked_status(start, goal, space, options, journal), None
+    journal.planner_id = portfolio.method
+    return Status.success(), portfolio.best
+
+
+def _by_laws(options: PlanOptions) -> bool:
+    """Whether the movement is to keep to straight steps: PTP by name, or joints with a time each of their own."""
+    return options.planner_id == "direct" or options.timing == "asynchronous"
+
+
+def _first_ways(
+    start: FloatArray, goal: FloatArray, space: FreeSpace, options: PlanOptions, journal: Journal
+) -> list[tuple[str, FloatArray]]:
+    """The first free ways, by the first search that finds any."""
+    for name, search in SEARCHES.items():
+        if options.planner_id not in ("", name):
+            continue
         with journal.stage(name) as notes:
             paths = search(start, goal, space, options.seed)
-            best = _best_of(paths, scene, options, journal)
-            notes.append(f"{len(paths)} free" if paths else "nothing free")
-            if best is not None and best.note:
-                notes.append(best.note)
-        if best is not None:
-            journal.planner_id = name
-            return Status.success(), best
-        if journal.budget.truncated:
+            points = f"{len(paths)} free, {len(paths[0])} points" if paths else ""
+            notes.append(f"first feasible: {points}" if paths else "nothing free")
+        if paths:
+            return [(name, path) for path in paths]
+        if journal.budget.exhausted:
             break
-    return _blocked_status(start, goal, space, options, journal), None
+    return []
 
 
-def _searches(planner_id: str) -> tuple[tuple[str, Search], ...]:
-    known: tuple[tuple[str, Search], ...] = (
-        ("direct", direct),
-        ("detours", detours),
-        ("retreat", retreat),
-        ("tree", tree),
-    )
-    return tuple(entry for entry in known if planner_id in ("", entry[0]))
+def _improve(
+    start: FloatArray,
+    goal: FloatArray,
+    ways: list[tuple[str, FloatArray]],
+    portfolio: Portfolio,
+    options: PlanOptions,
+) -> None:
+    """Refine the first ways, look for other ways round, and refine the best of all until the work is spent."""
+    journal = portfolio.journal
+    until = journal.budget.iterations + journal.budget.improvement
+
+    def more() -> bool:
+        return journal.budget.iterations < until and not journal.budget.exhausted
+
+    with journal.stage("refine") as notes:
+        portfolio.add(ways[0][0], [way for _, way in ways])
+        notes.append(f"{portfolio.finish_best(1)} certified")
+    others = [name for name in EXPLORERS if options.planner_id in ("", name)]
+    for turn in range(_ROUNDS):
+        for name in others:
+            if not more():
+                return
+            with journal.stage(f"{name} again" if turn else f"other ways: {name}") as notes:
+                found = SEARCHES[name](start, goal, portfolio.space, _seed(options.seed, turn, name))
+                notes.append(f"{len(found)} free, {portfolio.add(name, found)} new")
+        with journal.stage("refine") as notes:
+            notes.append(f"{portfolio.finish_best(_FINISHED) if more() else 0} certified")
+            if more():
+                portfolio.deepen()
+
+
+def _seed(seed: int, turn: int, name: str) -> int:
+    """Another seed for every search of a request."""
+    words = [seed % 2**63, turn, *name.encode()]
+    return int(np.random.SeedSequence(words).generate_state(1, np.uint64)[0] >> 1)
+
+
+def _straightened(path: FloatArray, space: FreeSpace) -> FloatArray:
+    weights = space.scene.weights
+    return pulled(fewest_corners(path, space, weights), space, weights) if len(path) > 2 else path
 
 
 def direct(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
@@ -105,8 +165,8 @@ def direct(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> 
 
 
 def detours(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """Free simple detours: the cheapest few by W that are different ways, polished."""
-    cell, weights = space.scene.cell, space.scene.weights
+    """Free simple detours: the cheapest few by W that are different ways."""
+    cell = space.scene.cell
     postures = [np.array(cell.park), np.array(cell.machine_home)]
     rng = np.random.default_rng(seed)
     candidates = [
@@ -116,68 +176,35 @@ def detours(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) ->
     ]
     candidates = [np.clip(path, space.low, space.high) for path in candidates]
     free = space.paths_free(candidates)
-    ways = [path for path, is_free in zip(candidates, free, strict=True) if is_free]
-    return _polished(_different(sorted(ways, key=lambda path: path_cost(weights, path))), space)
+    return _different([path for path, is_free in zip(candidates, free, strict=True) if is_free], space)
 
 
 def retreat(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """Free ways that first draw the tool back: the cheapest few that are different, polished."""
-    weights = space.scene.weights
-    ways = retreating_paths(start, goal, space, np.random.default_rng(seed))
-    return _polished(_different(sorted(ways, key=lambda path: path_cost(weights, path))), space)
+    """Free ways that first draw the tool back: the cheapest few that are different."""
+    return _different(retreating_paths(start, goal, space, np.random.default_rng(seed)), space)
 
 
 def tree(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """A free path found by two trees, polished."""
+    """A free path found by two trees."""
     path = connect(start, goal[None], space, seed)
-    if path is None:
-        return []
-    for _ in range(3):
-        shorter = fewest_corners(path, space, space.scene.weights)
-        done = path_cost(space.scene.weights, shorter) > 0.97 * path_cost(space.scene.weights, path)
-        path = shorter
-        if done or space.budget.exhausted:
-            break
-    return _polished([path], space)
+    return [] if path is None else [path]
 
 
-def _polished(paths: list[FloatArray], space: FreeSpace) -> list[FloatArray]:
+SEARCHES: dict[str, Search] = {"direct": direct, "detours": detours, "retreat": retreat, "tree": tree}
+EXPLORERS = ("detours", "tree")  # that find other ways round with another seed
+
+
+def _different(ways: list[FloatArray], space: FreeSpace) -> list[FloatArray]:
+    """The cheapest few ways by W that are not the same way round."""
     weights = space.scene.weights
-    return [pulled(fewest_corners(path, space, weights), space, weights) for path in paths]
-
-
-def _different(paths: list[FloatArray]) -> list[FloatArray]:
-    """The first few paths that are not the same way round."""
     chosen: list[FloatArray] = []
-    for path in paths:
+    for path in sorted(ways, key=lambda path: path_cost(weights, path)):
         middle = path[len(path) // 2]
         if all(np.abs(middle - other[len(other) // 2]).max() > _DIFFERENT for other in chosen):
             chosen.append(path)
-        if len(chosen) == _REFINED:
+        if len(chosen) == _WAYS:
             break
     return chosen
-
-
-def _best_of(
-    paths: list[FloatArray], scene: PlanningScene, options: PlanOptions, journal: Journal
-) -> TimedMovement | None:
-    """The certified movement with the best objective over free paths."""
-    best: TimedMovement | None = None
-    for path in paths:
-        try:
-            found = timed_movement(path, scene, options, journal.budget)
-        except TimingError as error:
-            journal.reject(f"torque: {error}")
-            continue
-        if found.violation is not None:
-            journal.reject(f"not proved: {found.violation.what}")
-            continue
-        value = objective_value(found.evaluation.report, options.objective, options.time_value)
-        if best is None or value < objective_value(
-            best.evaluation.report, options.objective, options.time_value
-        ):
-            best = found
-    return best
 
 
 def end_in_collision(

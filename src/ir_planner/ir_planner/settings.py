@@ -12,9 +12,15 @@ class PlannerSettings:
     """Budgets, memory and what the drives' bus does with braking energy."""
 
     max_iterations: int = setting(
-        60_000,
+        400_000,
         "Certified edges a request may cost where it doesn't say (max_iterations 0).",
         minimum=1,
+        maximum=100_000_000,
+    )
+    improvement_iterations: int = setting(
+        12_000,
+        "How many of them go into better movements once there is one, where the request doesn't say.",
+        minimum=0,
         maximum=100_000_000,
     )
     regeneration: str = setting(
