@@ -70,6 +70,16 @@ def pace_value(trajectory: JointTrajectory, scene: PlanningScene, objective: str
     return energy.total
 
 
+def trajectory_value(trajectory: JointTrajectory, scene: PlanningScene, options: PlanOptions) -> float:
+    """What is minimised, for comparing movements: energies and ways are sampled coarsely."""
+    if options.objective == "time":
+        return trajectory.duration
+    if options.objective == "movement_cost":
+        times = np.arange(trajectory.times[0], trajectory.times[-1], _COARSE_STEP)
+        return path_cost(scene.weights, trajectory.sample(times).q) * (1.0 + 1e-6 * trajectory.duration)
+    return pace_value(trajectory, scene, options.objective, options.time_value)
+
+
 def best_stretch(fastest: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
     """Factor >= 1 on the duration of the fastest movement that minimises the objective."""
     if objective in ("time", "movement_cost"):

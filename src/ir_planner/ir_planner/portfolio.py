@@ -16,7 +16,8 @@ from ir_planner.journal import Journal
 from ir_planner.movement import TimedMovement, timed_movement
 from ir_planner.objective import objective_value
 from ir_planner.polish import fewest_corners
-from ir_planner.refinement import QUICK, THOROUGH, Draft, Effort, Refinement
+from ir_planner.refinement import QUICK, THOROUGH, Draft, Effort, Refined, Refinement
+from ir_planner.reporting import evaluate_trajectory
 
 FloatArray = NDArray[np.float64]
 _SAME = 0.12  # rad: drafts that are nearer to each other along their way are one way round
@@ -35,13 +36,12 @@ class Candidate:
 
 
 class Portfolio:
-    """The ways of one request and the best movement so far."""
+    """The ways of one request, and the movements that came of them: the best first."""
 
     def __init__(self, space: FreeSpace, refinement: Refinement, journal: Journal) -> None:
         self.space, self.refinement, self.journal = space, refinement, journal
         self.candidates: list[Candidate] = []
-        self.best: TimedMovement | None = None
-        self.method = ""
+        self.found: list[tuple[str, Refined]] = []
 
     def add(self, method: str, ways: list[FloatArray]) -> int:
         """Draft ways (M, n); the number of them that are new."""
@@ -63,7 +63,7 @@ class Portfolio:
         done = 0
         wanted = [c for c in self.candidates if c.finished == 0]
         for candidate in wanted[:count]:
-            if self.best is not None and candidate.draft.cost > _HOPELESS * self.candidates[0].draft.cost:
+            if self.found and candidate.draft.cost > _HOPELESS * self.candidates[0].draft.cost:
                 break
             done += self._finish(candidate, effort)
         return done
@@ -83,22 +83,25 @@ class Portfolio:
         if movement is None:
             self.journal.reject("not certified after refinement")
             return False
-        self.take(candidate.method, movement)
+        self.found.append((candidate.method, movement))
+        self.found.sort(key=lambda entry: entry[1].value)
         return True
 
-    def take(self, method: str, movement: TimedMovement) -> None:
-        """Keep a certified movement if it is the best so far."""
-        if self.best is None or self.value(movement) < self.value(self.best):
-            self.best, self.method = movement, method
-
-    def value(self, movement: TimedMovement) -> float:
-        """The objective."""
-        options = self.refinement.options
-        return objective_value(movement.evaluation.report, options.objective, options.time_value)
-
-    def time_by_laws(self, ways: list[tuple[str, FloatArray]]) -> None:
-        """Straight steps with blended corners instead: for asynchronous joints, and where no descent was certified."""
+    def best(self) -> tuple[str, TimedMovement] | None:
+        """The best movement with its method, verified as it is sent and measured."""
         scene, options = self.space.scene, self.refinement.options
+        for method, refined in self.found:
+            evaluation = evaluate_trajectory(refined.trajectory, scene, options.safety_distance)
+            movement = TimedMovement(refined.path, refined.trajectory, evaluation)
+            if movement.violation is None:
+                return method, movement
+            self.journal.reject(f"not proved: {movement.violation.what}")
+        return None
+
+    def timed_by_laws(self, ways: list[tuple[str, FloatArray]]) -> tuple[str, TimedMovement] | None:
+        """Straight steps with blended corners: for asynchronous joints, and where no descent was certified."""
+        scene, options = self.space.scene, self.refinement.options
+        best: tuple[str, TimedMovement] | None = None
         for method, path in ways:
             try:
                 movement = timed_movement(path, scene, options, self.journal.budget)
@@ -107,8 +110,13 @@ class Portfolio:
                 continue
             if movement.violation is not None:
                 self.journal.reject(f"not proved: {movement.violation.what}")
-                continue
-            self.take(method, movement)
+            elif best is None or self._value(movement) < self._value(best[1]):
+                best = method, movement
+        return best
+
+    def _value(self, movement: TimedMovement) -> float:
+        options = self.refinement.options
+        return objective_value(movement.evaluation.report, options.objective, options.time_value)
 
 
 def _alike(a: Draft, b: Draft) -> bool:

@@ -19,7 +19,7 @@ from ir_planner.budget import Budget
 from ir_planner.clearance_checks import clearance_violation
 from ir_planner.limit_checks import Violation
 from ir_planner.movement import TimedMovement
-from ir_planner.objective import ObjectiveWeights, objective_weights
+from ir_planner.objective import ObjectiveWeights, objective_weights, trajectory_value
 from ir_planner.reporting import evaluate_trajectory
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.timing import MotionLimits, torque_use
@@ -67,6 +67,17 @@ class Draft:
     room: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A movement near the free path (M, n) that it came from, its limits and its clearance proved; value: of the
+    objective.
+    """
+
+    path: FloatArray
+    trajectory: JointTrajectory
+    value: float
+
+
 class Refinement:
     """Descents for one request: the scene, what counts, and which limits hold."""
 
@@ -89,8 +100,8 @@ class Refinement:
         start = along_path(path, count, wished if wished > 0.0 else _SLOWER * least)
         return self._descended(Draft(start, 0, np.inf, self._room), path, evaluations)
 
-    def finished(self, draft: Draft, path: FloatArray, effort: Effort = QUICK) -> TimedMovement | None:
-        """The certified movement that a draft ends in; None where it can't be made one."""
+    def finished(self, draft: Draft, path: FloatArray, effort: Effort = QUICK) -> Refined | None:
+        """The proved movement that a draft ends in; None where it can't be made one."""
         for evaluations in (effort.middle, effort.fine)[draft.level :]:
             finer = replace(draft, spline=draft.spline.subdivided(), level=draft.level + 1)
             draft = self._descended(finer, path, evaluations)
@@ -159,35 +170,30 @@ class Refinement:
                 room[:, z] += max(found.excess, 0.0) + _MORE_ROOM
         return replace(draft, room=room)
 
-    def _certified(self, draft: Draft, path: FloatArray) -> TimedMovement | Violation | None:
+    def _certified(self, draft: Draft, path: FloatArray) -> Refined | Violation | None:
         """The movement, or what is in its way; None where its torque does not suffice."""
-        names, s_m = self.scene.cell.robot.joint_names, self.options.safety_distance
+        scene, options = self.scene, self.options
         for share in _TORQUE_SHARES:
             self.budget.check()
-            trajectory = self._slowed(draft.spline, self.limits.with_torque_share(share), names)
+            trajectory = self._slowed(draft.spline, self.limits.with_torque_share(share))
             if trajectory is None:
                 return None
-            blocked = clearance_violation(trajectory, self.scene, s_m, self.station)
+            blocked = clearance_violation(trajectory, scene, options.safety_distance, self.station)
             if blocked is not None:
                 return blocked
-            evaluation = evaluate_trajectory(trajectory, self.scene, s_m, self.station)
-            violation = evaluation.verification.violation
-            if violation is None:
-                return TimedMovement(path, trajectory, evaluation)
-            if violation.what != "torque":
-                return violation
+            bounds = scene.dynamics.torque_bounds(*trajectory.coefficients())
+            if np.max(bounds.upper) <= 1.0:
+                return Refined(path, trajectory, trajectory_value(trajectory, scene, options))
         return None
 
-    def _slowed(
-        self, spline: UniformSpline, limits: MotionLimits, names: tuple[str, ...]
-    ) -> JointTrajectory | None:
+    def _slowed(self, spline: UniformSpline, limits: MotionLimits) -> JointTrajectory | None:
         """The motion as it is sent, as fast as it is or as much slower as the limits ask for; None where that is not
         enough, or slower than the wished duration.
         """
         fitted = within_limits(spline, limits, self.scene)
         if fitted is None or (self.options.duration > 0.0 and fitted.interval > spline.interval):
             return None
-        return fitted.trajectory(names)
+        return fitted.trajectory(self.scene.cell.robot.joint_names)
 
 
 def within_limits(
@@ -207,3 +213,16 @@ def within_limits(
             return spline
         spline = UniformSpline(spline.control, spline.interval * use * 1.0005)
     return None
+
+
+def refined_movement(
+    path: FloatArray, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = ""
+) -> TimedMovement | None:
+    """The certified movement near a free path (M, n); None where the descent ends in none."""
+    refinement = Refinement(scene, options, budget, station)
+    found = refinement.finished(refinement.drafted(path), path)
+    if found is None:
+        return None
+    evaluation = evaluate_trajectory(found.trajectory, scene, options.safety_distance, station)
+    movement = TimedMovement(path, found.trajectory, evaluation)
+    return movement if movement.violation is None else None

@@ -79,18 +79,22 @@ def search_regional(
         return blocked, None
     portfolio = Portfolio(space, Refinement(scene, options, journal.budget), journal)
     ways = _first_ways(start, goal, space, options, journal)
+    best: tuple[str, TimedMovement] | None = None
     if ways and np.abs(goal - start).max() >= STILL and not _by_laws(options):
         _improve(start, goal, ways, portfolio, options)
-    if ways and portfolio.best is None:
+        best = portfolio.best()
+    if ways and best is None:
         with journal.stage("straight steps") as notes:
             cheapest = sorted(ways, key=lambda way: path_cost(scene.weights, way[1]))
             shorter = [(method, _straightened(path, space)) for method, path in cheapest[:_TIMED_BY_LAWS]]
-            portfolio.time_by_laws(shorter)
-            notes.append("certified" if portfolio.best else "nothing certified")
-    if portfolio.best is None:
+            best = portfolio.timed_by_laws(shorter)
+            notes.append("certified" if best else "nothing certified")
+            if best is not None and best[1].note:
+                notes.append(best[1].note)
+    if best is None:
         return _blocked_status(start, goal, space, options, journal), None
-    journal.planner_id = portfolio.method
-    return Status.success(), portfolio.best
+    journal.planner_id, movement = best
+    return Status.success(), movement
 
 
 def _by_laws(options: PlanOptions) -> bool:
