@@ -49,13 +49,8 @@ def planner_of(cell: str) -> Planner:
 
 
 def asked(task: Task, seed: int = 0) -> PlanOptions:
-    """The request's options: J as the objective, as near as a request comes to it.
-
-    A request's joules contain the base load, and with it base watts x T; so the watts that a second is worth
-    are those of J less the base load.
-    """
-    worth = max(TIME_VALUE - task.scene.base_watts, 0.0)
-    return PlanOptions(seed=seed, safety_distance=task.margin, planning_time=PLANNING_TIME, time_value=worth)
+    """The request's options: J as the objective."""
+    return PlanOptions(seed=seed, safety_distance=task.margin, planning_time=PLANNING_TIME, time_value=TIME_VALUE)
 
 
 def first_feasible(info: PlanningInfo) -> float:

@@ -74,7 +74,8 @@ def test_a_tunnel_is_left_the_way_the_tool_points(
     plan = plan_regional(np.array(asked.start), np.array(asked.goal), scene, options, budget)
     assert plan.status.ok, plan.status.message
     assert plan.info.planner_id == "retreat"
-    assert [stage.name for stage in plan.info.stages] == ["direct", "detours", "retreat"]
+    first = next(stage for stage in plan.info.stages if stage.note.startswith("first feasible"))
+    assert first.name == "retreat"
     assert plan.report.certified
     assert plan.trajectory is not None
     assert clearance_along(plan.trajectory, scene) > 0.02 - PROOF_TOLERANCE
@@ -143,13 +144,13 @@ def test_where_no_way_leads_the_pair_the_place_and_what_was_tried_are_named(
 ) -> None:
     cell = cell_from_yaml(CAGE)
     scene = scene_with(cell, load_text(cell), load_power_data())
-    budget = Budget(400, time.monotonic() + 60.0, time.monotonic)
+    budget = Budget(2000, time.monotonic() + 60.0, time.monotonic)
     home, across = degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0)
     plan = plan_regional(home, across, scene, options, budget)
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert "tree (nothing free)" in plan.status.message
     assert any(name in plan.status.message for name in ("left", "right"))
-    assert plan.info.iterations >= 400
+    assert plan.info.iterations >= 2000
     assert not plan.info.truncated
 
 

@@ -52,6 +52,8 @@ __all__ = [
     "MotionExtrema",
     "Pair",
     "SphericalWristIk",
+    "SplineCost",
+    "SplineTerms",
     "TorqueBounds",
     "Witnesses",
     "ccd",

@@ -217,6 +217,17 @@ def _guilty_corners(
     return guilty
 
 
+def check_duration(duration: float, options: PlanOptions) -> None:
+    """Raise RequestError where a movement would last longer than any may."""
+    if duration > DURATION_MAX:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"velocity_scaling {options.velocity_scaling:g} and acceleration_scaling "
+            f"{options.acceleration_scaling:g} make a movement of {duration:.4g} s: "
+            f"it must be at most {DURATION_MAX:g} s",
+        )
+
+
 def stretched_to_wish(
     quickest: JointTrajectory, scene: PlanningScene, options: PlanOptions
 ) -> JointTrajectory:
@@ -224,13 +235,7 @@ def stretched_to_wish(
 
     Raises RequestError when the wished duration is shorter than the fastest, or that longer than any may be.
     """
-    if quickest.duration > DURATION_MAX:
-        raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"velocity_scaling {options.velocity_scaling:g} and acceleration_scaling "
-            f"{options.acceleration_scaling:g} make a movement of {quickest.duration:.4g} s: "
-            f"it must be at most {DURATION_MAX:g} s",
-        )
+    check_duration(quickest.duration, options)
     if options.duration > 0.0:
         if options.duration < quickest.duration * (1.0 - _DURATION_SLACK):
             raise RequestError(

@@ -1,7 +1,7 @@
 """What a movement is judged by, and the stretch of its duration that serves it best.
 
-movement_cost: W of eq. (9); time: T; energy: E at the mains; time_and_energy: J = E of the drives + time_value x T,
-without the base load of the controller, which is part of what a second is worth.
+movement_cost: W of eq. (9); time: T; energy: E at the mains; time_and_energy: J = E of the drives +
+time_value x T, without the base load of the controller, which is part of what a second is worth.
 """
 
 from dataclasses import dataclass
@@ -39,8 +39,8 @@ def objective_value(report: TrajectoryReport, objective: str, time_value: float)
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveWeights:
-    """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about what a second of
-    movement costs in all.
+    """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about what a
+    second of movement costs in all.
     """
 
     energy: float
@@ -50,7 +50,9 @@ class ObjectiveWeights:
 
 
 def objective_weights(options: PlanOptions, scene: PlanningScene, path: FloatArray) -> ObjectiveWeights:
-    """The objective as a sum that a descent can follow; with a wished duration only joules are left to choose."""
+    """The objective as a sum that a descent can follow; with a wished duration only joules are left to
+    choose.
+    """
     still = np.zeros(len(scene.weights))
     if options.duration > 0.0 or options.objective == "energy":
         return ObjectiveWeights(1.0, scene.base_watts, still, _DRIVES_WATTS + scene.base_watts)

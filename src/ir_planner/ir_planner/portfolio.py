@@ -1,8 +1,9 @@
 """Ways round, found by several searches side by side, each gone down to the cheapest movement near it.
 
-A way is a free path of straight steps. Each new one is shortened and drafted: a short descent on a coarse spline tells
-what it may come to, and ways that have come to the same place count once. The cheapest drafts are finished, which is
-where the clearance is proved; the best finished movement is the answer, and more work makes it better.
+A way is a free path of straight steps. Each new one is shortened and drafted: a short descent on a coarse
+spline tells what it may come to, and ways that have come to the same place count once. The cheapest drafts
+are finished, which is where the clearance is proved; the best finished movement is the answer, and more work
+makes it better.
 """
 
 from dataclasses import dataclass
@@ -99,7 +100,9 @@ class Portfolio:
         return None
 
     def timed_by_laws(self, ways: list[tuple[str, FloatArray]]) -> tuple[str, TimedMovement] | None:
-        """Straight steps with blended corners: for asynchronous joints, and where no descent was certified."""
+        """Straight steps with blended corners: for asynchronous joints, and where no descent was
+        certified.
+        """
         scene, options = self.space.scene, self.refinement.options
         best: tuple[str, TimedMovement] | None = None
         for method, path in ways:

@@ -1,10 +1,10 @@
 """From a free path to the cheapest movement near it: a cubic B-spline descends on its control points and its
 duration.
 
-Path and pace are chosen together: the cost is the objective's, and what exceeds a bound of speed, acceleration, jerk,
-torque or clearance is punished. The descent runs on a coarse spline first and on finer ones then. What comes out is
-slowed until every limit holds exactly, and its clearance is proved; a pair that comes too near gets more room and the
-descent goes on from there.
+Path and pace are chosen together: the cost is the objective's, and what exceeds a bound of speed,
+acceleration, jerk, torque or clearance is punished. The descent runs on a coarse spline first and on finer
+ones then. What comes out is slowed until every limit holds exactly, and its clearance is proved; a pair that
+comes too near gets more room and the descent goes on from there.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from ir_kernels import SplineCost, SplineTerms
 from ir_planner.budget import Budget
 from ir_planner.clearance_checks import clearance_violation
 from ir_planner.limit_checks import Violation
-from ir_planner.movement import TimedMovement
+from ir_planner.movement import TimedMovement, check_duration, distinct, timed_movement
 from ir_planner.objective import ObjectiveWeights, objective_weights, trajectory_value
 from ir_planner.reporting import evaluate_trajectory
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
@@ -28,10 +28,13 @@ from ir_planner.zones import tcp_inside
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+BoolArray = NDArray[np.bool_]
 _SPACING = 0.1  # s between the knots of the coarsest spline
 _FEWEST, _MOST = 12, 64  # control points of the coarsest spline
 _SLOWER = 1.3  # than the path at full speed: where the descent starts
-_STIFFNESS = 4.0  # penalties against the power that the objective is about; ten times that on the finest spline
+_STIFFNESS = (
+    4.0  # penalties against the power that the objective is about; ten times that on the finest spline
+)
 _TORQUE_SHARES = (0.98, 0.95, 0.9)
 _MARGIN = 1e-3  # m of clearance beyond S_m that the descent asks for
 _SCALE = 1e-2  # m that lack count like a limit used twice
@@ -59,7 +62,9 @@ THOROUGH = Effort(300, 300, 300)
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A spline on its way down: its level (0: coarse), cost, and the room (R, Z) m that its pairs are to have."""
+    """A spline on its way down: its level (0: coarse), cost, and the room (R, Z) m that its pairs are to
+    have.
+    """
 
     spline: UniformSpline
     level: int
@@ -69,8 +74,8 @@ class Draft:
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """A movement near the free path (M, n) that it came from, its limits and its clearance proved; value: of the
-    objective.
+    """A movement near the free path (M, n) that it came from, its limits and its clearance proved; value: of
+    the objective.
     """
 
     path: FloatArray
@@ -81,9 +86,7 @@ class Refined:
 class Refinement:
     """Descents for one request: the scene, what counts, and which limits hold."""
 
-    def __init__(
-        self, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = ""
-    ) -> None:
+    def __init__(self, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = "") -> None:
         self.scene, self.options, self.budget, self.station = scene, options, budget, station
         self.limits = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
         plain = scene.thresholds(options.safety_distance) - PROOF_TOLERANCE / 2
@@ -95,6 +98,7 @@ class Refinement:
     def drafted(self, path: FloatArray, evaluations: int = QUICK.coarse) -> Draft:
         """The coarse spline from a free path (M, n), M >= 2, gone down a little: enough to compare ways."""
         least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
+        check_duration(least, self.options)
         count = int(np.clip(np.ceil(least / _SPACING), _FEWEST, _MOST))
         wished = self.options.duration
         start = along_path(path, count, wished if wished > 0.0 else _SLOWER * least)
@@ -157,9 +161,9 @@ class Refinement:
             return np.zeros(spline.intervals, np.int32)
         q, _, _ = spline.samples(_ZONE_SAMPLES)
         inside = tcp_inside(q, self.scene, self.station, self.options.safety_distance)
-        inside = inside.reshape(spline.intervals, -1).all(axis=1)
-        until = np.append(inside[1:], inside[-1])  # the end of an interval is the beginning of the next
-        return np.asarray(inside & until, np.int32)
+        whole: BoolArray = np.asarray(inside.reshape(spline.intervals, -1).all(axis=1))
+        until = np.append(whole[1:], whole[-1])  # the end of an interval is the beginning of the next
+        return np.asarray(whole & until, np.int32)
 
     def _with_more_room(self, draft: Draft, found: Violation) -> Draft:
         assert found.pair is not None  # asked before
@@ -187,19 +191,21 @@ class Refinement:
         return None
 
     def _slowed(self, spline: UniformSpline, limits: MotionLimits) -> JointTrajectory | None:
-        """The motion as it is sent, as fast as it is or as much slower as the limits ask for; None where that is not
-        enough, or slower than the wished duration.
+        """The motion as it is sent, as fast as it is or as much slower as the limits ask for; None where that
+        is not enough, or slower than the wished duration.
         """
         fitted = within_limits(spline, limits, self.scene)
+        if fitted is not None:
+            check_duration(fitted.duration, self.options)
         if fitted is None or (self.options.duration > 0.0 and fitted.interval > spline.interval):
             return None
         return fitted.trajectory(self.scene.cell.robot.joint_names)
 
 
-def within_limits(
-    spline: UniformSpline, limits: MotionLimits, scene: PlanningScene
-) -> UniformSpline | None:
-    """The same path at the same pace or slower, within the limits; torque at samples. None where no pace carries it."""
+def within_limits(spline: UniformSpline, limits: MotionLimits, scene: PlanningScene) -> UniformSpline | None:
+    """The same path at the same pace or slower, within the limits; torque at samples. None where no pace
+    carries it.
+    """
     for _ in range(_FITS):
         top = spline.extremes()
         torque = torque_use(scene.dynamics, *spline.samples(_TORQUE_SAMPLES)).max() / limits.torque_share
@@ -215,14 +221,21 @@ def within_limits(
     return None
 
 
-def refined_movement(
+def movement_over(
     path: FloatArray, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = ""
-) -> TimedMovement | None:
-    """The certified movement near a free path (M, n); None where the descent ends in none."""
-    refinement = Refinement(scene, options, budget, station)
-    found = refinement.finished(refinement.drafted(path), path)
-    if found is None:
-        return None
-    evaluation = evaluate_trajectory(found.trajectory, scene, options.safety_distance, station)
-    movement = TimedMovement(path, found.trajectory, evaluation)
-    return movement if movement.violation is None else None
+) -> TimedMovement:
+    """The movement over a free path (M, n): refined, or in straight steps where that isn't certified or the
+    joints are to take their own time.
+
+    Raises TimingError when a torque does not suffice, RequestError when the wished duration is too short.
+    """
+    path = distinct(path)
+    if len(path) > 1 and options.timing == "synchronous":
+        refinement = Refinement(scene, options, budget, station)
+        found = refinement.finished(refinement.drafted(path), path)
+        if found is not None:
+            evaluation = evaluate_trajectory(found.trajectory, scene, options.safety_distance, station)
+            movement = TimedMovement(path, found.trajectory, evaluation)
+            if movement.violation is None:
+                return movement
+    return timed_movement(path, scene, options, budget, station)

@@ -98,7 +98,9 @@ def search_regional(
 
 
 def _by_laws(options: PlanOptions) -> bool:
-    """Whether the movement is to keep to straight steps: PTP by name, or joints with a time each of their own."""
+    """Whether the movement is to keep to straight steps: PTP by name, or joints with a time each of their
+    own.
+    """
     return options.planner_id == "direct" or options.timing == "asynchronous"
 
 
@@ -127,7 +129,9 @@ def _improve(
     portfolio: Portfolio,
     options: PlanOptions,
 ) -> None:
-    """Refine the first ways, look for other ways round, and refine the best of all until the work is spent."""
+    """Refine the first ways, look for other ways round, and refine the best of all until the work is
+    spent.
+    """
     journal = portfolio.journal
     until = journal.budget.iterations + journal.budget.improvement
 

@@ -17,8 +17,9 @@ from ir_planner.blending import stretched
 from ir_planner.budget import Budget
 from ir_planner.errors import TimingError
 from ir_planner.free_space import FreeSpace
-from ir_planner.movement import TimedMovement, timed_movement
+from ir_planner.movement import TimedMovement
 from ir_planner.objective import best_stretch
+from ir_planner.refinement import movement_over
 from ir_planner.reporting import evaluate_trajectory
 from ir_planner.scene import PlanningScene
 from ir_planner.spline_timing import time_spline
@@ -118,7 +119,7 @@ def timed_service(
     """
     points = line.points[::-1] if entry else line.points
     if len(points) < 3 or not line.straight:
-        return timed_movement(points, scene, options, budget, station)
+        return movement_over(points, scene, options, budget, station)
     names = scene.cell.robot.joint_names
     for share in _TORQUE_SHARES:
         budget.check()
@@ -136,7 +137,7 @@ def timed_service(
             break
         if violation.what == "clearance":
             # the spline leaves the certified polyline where points lie far apart: stop at none, but cut less
-            return timed_movement(points, scene, options, budget, station)
+            return movement_over(points, scene, options, budget, station)
     if violation is not None and violation.what != "torque":
         raise TimingError(violation.sentence, 0)
     return TimedMovement(np.array(points), trajectory, evaluation)

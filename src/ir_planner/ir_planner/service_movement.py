@@ -22,8 +22,9 @@ from ir_planner.errors import RequestError, TimingError
 from ir_planner.free_space import FreeSpace
 from ir_planner.inverse_kinematics import free_configurations, no_configuration
 from ir_planner.journal import Journal
-from ir_planner.movement import TimedMovement, timed_movement
+from ir_planner.movement import TimedMovement
 from ir_planner.objective import objective_value
+from ir_planner.refinement import movement_over
 from ir_planner.regional import too_near
 from ir_planner.scene import PlanningScene
 from ir_planner.service_settings import WithdrawalSettings
@@ -149,7 +150,7 @@ def _timed(
     """The certified movement over a way, or None with its reason counted."""
     points = way.points[::-1] if request.direction == ENTRY else way.points
     try:
-        movement = timed_movement(points, scene, options, journal.budget, request.station.name)
+        movement = movement_over(points, scene, options, journal.budget, request.station.name)
     except TimingError as error:
         journal.reject(f"torque: {error}")
         return None

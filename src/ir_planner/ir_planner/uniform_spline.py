@@ -1,7 +1,8 @@
 """Motions along uniform cubic B-splines: control points with one interval of time between all knots.
 
-Three equal control points at an end mean rest there. Acceleration is linear and jerk constant between knots, so a
-point per knot with position, velocity and acceleration is the motion exactly, and its largest values are closed forms.
+Three equal control points at an end mean rest there. Acceleration is linear and jerk constant between knots,
+so a point per knot with position, velocity and acceleration is the motion exactly, and its largest values are
+closed forms.
 """
 
 from dataclasses import dataclass
@@ -47,7 +48,9 @@ class UniformSpline:
         return q, (c[2:] - c[:-2]) / (2.0 * h), (c[:-2] - 2.0 * c[1:-1] + c[2:]) / h**2
 
     def samples(self, per_interval: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """q, qd, qdd (S * per_interval, n) at evenly spaced instants, the beginnings of the intervals included."""
+        """q, qd, qdd (S * per_interval, n) at evenly spaced instants, the beginnings of the intervals
+        included.
+        """
         q, qd, qdd = (values[:, None, :] for values in self.knots())
         t = (np.arange(per_interval) / per_interval * self.interval)[None, :, None]
         jerk = np.diff(qdd, axis=0) / self.interval
@@ -74,6 +77,7 @@ class UniformSpline:
         finer = np.empty((2 * len(c) - 3, c.shape[1]))
         finer[0::2] = 0.5 * (c[:-1] + c[1:])
         finer[1::2] = 0.125 * (c[:-2] + 6.0 * c[1:-1] + c[2:])
+        finer[:3], finer[-3:] = c[0], c[-1]  # rounding must not move the ends
         return UniformSpline(finer, 0.5 * self.interval)
 
     def trajectory(self, joint_names: tuple[str, ...]) -> JointTrajectory:
@@ -94,7 +98,9 @@ def along_path(path: FloatArray, count: int, duration: float) -> UniformSpline:
 
 
 def fewest_seconds(path: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> float:
-    """A guess that is seldom too long: a path (M, n) at full speed, or from rest to rest as its longest joint."""
+    """A guess that is seldom too long: a path (M, n) at full speed, or from rest to rest as its longest
+    joint.
+    """
     steps = np.abs(np.diff(path, axis=0))
     at_speed = float((steps / velocity).max(axis=1).sum())
     return max(at_speed, 2.0 * float(np.sqrt(steps.sum(axis=0) / acceleration).max()))
