@@ -38,6 +38,7 @@ _SCATTERED = 160
 _WAYS = 3  # different ways round of one search
 _FINISHED = 2  # drafts that are finished in one round
 _TIMED_BY_LAWS = 3
+_SHORT_TREE = 4000  # edges
 _ROUNDS = 10_000  # the work ends them
 _DIFFERENT = 0.15  # rad: ways whose vias are nearer are one way
 
@@ -108,7 +109,7 @@ def _first_ways(
     start: FloatArray, goal: FloatArray, space: FreeSpace, options: PlanOptions, journal: Journal
 ) -> list[tuple[str, FloatArray]]:
     """The first free ways, by the first search that finds any."""
-    for name, search in SEARCHES.items():
+    for name, search in SEARCHES:
         if options.planner_id not in ("", name):
             continue
         with journal.stage(name) as notes:
@@ -141,13 +142,13 @@ def _improve(
     with journal.stage("refine") as notes:
         portfolio.add(ways[0][0], [way for _, way in ways])
         notes.append(f"{portfolio.finish_best(1)} certified")
-    others = [name for name in EXPLORERS if options.planner_id in ("", name)]
+    others = [entry for entry in EXPLORERS if options.planner_id in ("", entry[0])]
     for turn in range(_ROUNDS):
-        for name in others:
+        for name, search in others:
             if not more():
                 return
             with journal.stage(f"{name} again" if turn else f"other ways: {name}") as notes:
-                found = SEARCHES[name](start, goal, portfolio.space, _seed(options.seed, turn, name))
+                found = search(start, goal, portfolio.space, _seed(options.seed, turn, name))
                 notes.append(f"{len(found)} free, {portfolio.add(name, found)} new")
         with journal.stage("refine") as notes:
             notes.append(f"{portfolio.finish_best(_FINISHED) if more() else 0} certified")
@@ -193,13 +194,27 @@ def retreat(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) ->
 
 
 def tree(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """A free path found by two trees."""
+    """A free path found by two trees, however long it takes."""
     path = connect(start, goal[None], space, seed)
     return [] if path is None else [path]
 
 
-SEARCHES: dict[str, Search] = {"direct": direct, "detours": detours, "retreat": retreat, "tree": tree}
-EXPLORERS = ("detours", "tree")  # that find other ways round with another seed
+def short_tree(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
+    """The same while it is quick."""
+    path = connect(start, goal[None], space, seed, _SHORT_TREE)
+    return [] if path is None else [path]
+
+
+# in the order in which a first way is looked for; name and search
+SEARCHES: tuple[tuple[str, Search], ...] = (
+    ("direct", direct),
+    ("tree", short_tree),
+    ("detours", detours),
+    ("retreat", retreat),
+    ("tree", tree),
+)
+# that find other ways round with another seed
+EXPLORERS: tuple[tuple[str, Search], ...] = (("detours", detours), ("tree", short_tree))
 
 
 def _different(ways: list[FloatArray], space: FreeSpace) -> list[FloatArray]:

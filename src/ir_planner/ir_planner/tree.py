@@ -24,9 +24,11 @@ def joint_scale(space: FreeSpace) -> FloatArray:
     return np.asarray(np.maximum(np.sqrt(weights / weights[0]), _LEAST_SCALE))
 
 
-def connect(start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int) -> FloatArray | None:
-    """A free path (M, n) from start (n,) to one of goals (G, n), or None when the budget ended before one was
-    found.
+def connect(
+    start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, most: int = 2**62
+) -> FloatArray | None:
+    """A free path (M, n) from start (n,) to one of goals (G, n), or None when the budget, or `most` edges,
+    ended before one was found.
 
     Raises CancelledError when asked to stop, ir_kernels.InputError where start, or every goal, isn't free.
     """
@@ -34,9 +36,9 @@ def connect(start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int) -
     search = BidirectionalTree(
         space.scene.collision, start, goals, space.threshold, space.low, space.high, joint_scale(space), seed
     )
-    while not budget.exhausted:
+    while not budget.exhausted and search.edges < most:
         before = search.edges
-        found = search.grow(min(_SLICE, budget.max_iterations - budget.iterations))
+        found = search.grow(min(_SLICE, budget.max_iterations - budget.iterations, most - before))
         budget.spend(search.edges - before)
         if found:
             return search.path
