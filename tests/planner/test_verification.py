@@ -63,6 +63,22 @@ def test_a_violation_is_found_and_named(
     assert found.status.code == StatusCode.INVALID_MOTION_PLAN
 
 
+def test_a_start_that_is_not_at_rest_hides_no_later_collision(demo_scene: PlanningScene) -> None:
+    trajectory = moved(1, 70.0, 5.0, accelerations=ROLLING[::-1])
+    found = verify(trajectory, demo_scene, 0.02)
+    assert found.violation is not None
+    assert found.violation.what == "acceleration at rest"
+    times = [violation.time for violation in (found.violation, *found.others)]
+    assert times == sorted(times)
+    clearance = next(violation for violation in found.others if violation.what == "clearance")
+    first, also = found.status.message.split("; also: ")
+    assert first == found.violation.sentence
+    assert clearance.sentence in also
+    alone = verify(moved(1, 70.0, 5.0), demo_scene, 0.02)
+    assert alone.others == ()
+    assert "also" not in alone.status.message
+
+
 def test_a_collision_between_two_points_is_found() -> None:
     """Both points are free; the pillar stands between them."""
     cell = load_cell("open")

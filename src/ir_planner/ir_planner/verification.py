@@ -1,6 +1,6 @@
 """What holds along a trajectory, for every instant of its interpolant: limits by exact extremes of the
-polynomials, torque by guaranteed bounds, clearance by a certificate. The first violation is named with
-place, limit and excess.
+polynomials, torque by guaranteed bounds, clearance by a certificate. The first violation of every kind is
+named with place, limit and excess.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,9 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """violation None: everything is proved. Largest used shares of the limits, each (n,)."""
+    """violation: the first one, None: everything is proved; others: the first of every other kind, in the
+    order of their times. Largest used shares of the limits, each (n,).
+    """
 
     violation: Violation | None
     velocity: FloatArray
@@ -37,6 +39,7 @@ class Verification:
     jerk: FloatArray
     torque: FloatArray
     travel: FloatArray
+    others: tuple[Violation, ...] = ()
 
     @property
     def certified(self) -> bool:
@@ -45,10 +48,14 @@ class Verification:
 
     @property
     def status(self) -> Status:
-        """SUCCESS or INVALID_MOTION_PLAN with the first violation."""
+        """SUCCESS, or INVALID_MOTION_PLAN with the first violation and, after "also:", the other kinds: a
+        small one at the start hides no collision.
+        """
         if self.violation is None:
             return Status.success()
-        return Status(StatusCode.INVALID_MOTION_PLAN, self.violation.sentence)
+        also = "; ".join(other.sentence for other in self.others)
+        sentence = f"{self.violation.sentence}; also: {also}" if also else self.violation.sentence
+        return Status(StatusCode.INVALID_MOTION_PLAN, sentence)
 
 
 def verify(
@@ -72,11 +79,16 @@ def verify(
         *(share_violation(name, values, trajectory, robot.joint_names) for name, values in share.items()),
         clearance_violation(trajectory, scene, safety_distance, station),
     ]
-    violations = [violation for violation in found if violation is not None]
-    first = min(violations, key=lambda violation: violation.time) if violations else None
+    violations = sorted((v for v in found if v is not None), key=lambda violation: violation.time)
     top = {name: values.max(axis=0, initial=0.0) for name, values in share.items()}
     return Verification(
-        first, top["velocity"], top["acceleration"], top["jerk"], torque, largest.travel.sum(axis=0)
+        violations[0] if violations else None,
+        top["velocity"],
+        top["acceleration"],
+        top["jerk"],
+        torque,
+        largest.travel.sum(axis=0),
+        tuple(violations[1:]),
     )
 
 
