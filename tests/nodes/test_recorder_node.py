@@ -104,6 +104,31 @@ def test_patterns_choose_other_topics(
     stop(call)
 
 
+def test_wanted_topics_that_nobody_publishes_are_named_and_recorded_when_they_come(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    here = ros_node.create_publisher(Float64, "/here", 10)
+    wait_for(lambda: ("/here", ["std_msgs/msg/Float64"]) in recorder.get_topic_names_and_types())
+    wanted = ["/here", "late", "/elsewhere/*"]
+    started = start(call, tmp_path / "wanted.mcap", topics=wanted)
+    assert started.status.code == StatusCode.SUCCESS
+    assert started.status.message.endswith("no publisher is seen yet of /late, /elsewhere/*")
+    wait_for(here.get_subscription_count)
+    late = ros_node.create_publisher(Float64, "/late", 10)
+    wait_for(late.get_subscription_count)
+    stopped = stop(call)
+    assert stopped.status.code == StatusCode.SUCCESS
+    assert stopped.status.message.endswith("no publisher was seen of /elsewhere/*")
+
+
+def test_a_missing_directory_is_named_and_not_made(recorder: RecorderNode, call: Any, tmp_path: Path) -> None:
+    refused = start(call, tmp_path / "no" / "such" / "a.mcap")
+    assert refused.status.code == StatusCode.FAILURE
+    assert f"there is no directory {tmp_path / 'no' / 'such'}" in refused.status.message
+    assert list(tmp_path.iterdir()) == []
+    assert start(call, tmp_path / "a.mcap").status.code == StatusCode.SUCCESS
+
+
 def test_a_taken_path_is_refused_and_the_node_lives_on(
     recorder: RecorderNode, call: Any, tmp_path: Path
 ) -> None:

@@ -76,6 +76,13 @@ class RecorderNode(Node):
         return self._session is not None and self._session.cell_attached
 
     @property
+    def unmet(self) -> tuple[str, ...]:
+        """Wanted topics and patterns of the running recording that nobody has published yet."""
+        if self._session is None:
+            return ()
+        return self._selection.unmet((*self._listener, *self._passed_over))
+
+    @property
     def failure(self) -> str:
         """Why the last recording ended on its own, "" when it didn't."""
         return self._failure
@@ -96,7 +103,7 @@ class RecorderNode(Node):
         if files is not None:
             self._attach(files)
         self._discover()
-        self.get_logger().info(f"recording into {writer.path}")
+        self.get_logger().info(f"recording into {writer.path}{_without_publisher(self.unmet, 'is seen yet')}")
         return str(writer.path)
 
     def finish(self) -> Any:
@@ -130,11 +137,14 @@ class RecorderNode(Node):
             response.status.message = str(error)
         else:
             response.status.code = int(StatusCode.SUCCESS)
-            response.status.message = f"recording into {response.path}"
+            response.status.message = (
+                f"recording into {response.path}{_without_publisher(self.unmet, 'is seen yet')}"
+            )
         return response
 
     def _on_stop(self, request: Any, response: Any) -> Any:
         response.status.source = self.get_name()
+        unmet = self.unmet
         try:
             summary = self.finish()
         except WriteError as error:
@@ -145,7 +155,8 @@ class RecorderNode(Node):
             response.status.message = self._failure or "nothing is being recorded"
             return response
         response.status.code = int(StatusCode.SUCCESS)
-        response.status.message = f"{summary.messages} messages over {summary.seconds:.1f} s"
+        seconds = f"{summary.messages} messages over {summary.seconds:.1f} s"
+        response.status.message = f"{seconds}{_without_publisher(unmet, 'was seen')}"
         response.path = str(summary.path)
         response.messages, response.seconds = summary.messages, summary.seconds
         return response
@@ -237,6 +248,11 @@ class RecorderNode(Node):
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)
+
+
+def _without_publisher(topics: Sequence[str], when: str) -> str:
+    """The end of a sentence: which wanted topics nobody publishes."""
+    return f"; no publisher {when} of {', '.join(topics)}" if topics else ""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

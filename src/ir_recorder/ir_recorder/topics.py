@@ -7,7 +7,7 @@ can't be read back without ROS.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -43,6 +43,12 @@ class TopicSelection:
             return False
         name = topic[len(prefix) :]
         return name in SHARED or name.split("/", 1)[0] in NODES
+
+    def unmet(self, topics: Iterable[str]) -> tuple[str, ...]:
+        """The wanted names and patterns, as absolute ones, that none of `topics` meets."""
+        present = tuple(topics)
+        patterns = (self._absolute(pattern) for pattern in self.wanted)
+        return tuple(p for p in patterns if not any(fnmatchcase(topic, p) for topic in present))
 
     def _absolute(self, pattern: str) -> str:
         if pattern.startswith(("/", "*")):

@@ -169,8 +169,9 @@ def checked_path(path: str | Path) -> Path:
 
 
 def _open(path: Path, overwrite: bool) -> BinaryIO:
+    if not path.parent.is_dir():
+        raise PathError(f"{path} can't be written: there is no directory {path.parent}; make it first")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         return open(path, "wb" if overwrite else "xb")
     except FileExistsError as error:
         raise PathError(f"{path} is there already; choose another path or set overwrite") from error

@@ -4,7 +4,7 @@ message.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from operator import attrgetter
@@ -65,6 +65,9 @@ class Listener:
 
     def __len__(self) -> int:
         return len(self._subscriptions)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._subscriptions)
 
     def offers(self, topic: str) -> tuple[QosOffer, ...]:
         """What the topic's publishers offer now."""
