@@ -91,6 +91,8 @@ class Planner:
         self.interaction = interaction or InteractionSettings()
         self.withdrawal = withdrawal or WithdrawalSettings()
         self._cell: Cell | None = None
+        # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
+        self._scenes: dict[tuple[str, str], tuple[Cell, PlanningScene]] = {}
         self.trajectories: Store[JointTrajectory] = Store(
             "trajectory", self.settings.stored_trajectories, lambda trajectory: trajectory.trajectory_id
         )
@@ -139,7 +141,12 @@ class Planner:
         tool.
         """
         cell = self.cell
-        return scene_with(cell, load or load_text(cell), self.power, self.settings.regeneration)  # type: ignore[arg-type]
+        key = load or load_text(cell), self.settings.regeneration
+        known, scene = self._scenes.get(key, (None, None))
+        if scene is None or known is not cell:
+            scene = scene_with(cell, key[0], self.power, self.settings.regeneration)  # type: ignore[arg-type]
+            self._scenes[key] = cell, scene
+        return scene
 
     # -- questions -------------------------------------------------------------------------------------------
 

@@ -1,14 +1,17 @@
 """Exact extremes of a trajectory between its points: what a limit is compared with.
 
-A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, 6). An extreme
-of a polynomial lies at an end or at a root of its derivative; roots are bracketed between the roots of the
-next derivative, down to a line, so none is missed and no sampling takes part.
+A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, K). Extremes are
+those of the compiled core. The way a joint goes is that between its ends, or where it turns in between, that
+between its turning points: they are bracketed between the roots of the next derivative, down to a line, so
+none is missed and no sampling takes part.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ir_kernels import Extrema, polynomial_extrema
 
 FloatArray = NDArray[np.float64]
 _HALVINGS = 30  # a root to 1e-9 of the segment: the value at an extreme is off by its square
@@ -69,33 +72,43 @@ def roots_between(polynomial: FloatArray, turning: FloatArray) -> FloatArray:
 
 
 def extremes(coefficients: FloatArray, durations: FloatArray) -> Extremes:
-    """Extremes of the trajectory with `coefficients` (S, n, 6) and `durations` (S,) s."""
-    segments, joints = coefficients.shape[:2]
-    scale = durations[:, None, None] ** np.arange(6)
-    position = (coefficients * scale).reshape(-1, 6)
-    per_second = np.repeat(1.0 / durations, joints) if segments else np.zeros(0)
+    """Extremes of the trajectory with `coefficients` (S, n, K) and `durations` (S,) s."""
+    if len(durations) == 0:
+        nothing = np.zeros(coefficients.shape[:2])
+        return Extremes(nothing, nothing, nothing, nothing, nothing, nothing)
+    position, speed, change, jerk = (polynomial_extrema(coefficients, durations, k) for k in range(4))
+    powers = durations[:, None, None] ** np.arange(coefficients.shape[2])
+    travel = np.abs((coefficients[:, :, 1:] * powers[:, :, 1:]).sum(axis=2))
+    turning = (speed.minimum < 0.0) & (speed.maximum > 0.0)
+    if turning.any():
+        travel[turning] = _turning_travel((coefficients * powers)[turning])
+    return Extremes(
+        lowest=position.minimum,
+        highest=position.maximum,
+        velocity=_size(speed),
+        acceleration=_size(change),
+        jerk=_size(jerk),
+        travel=travel,
+    )
+
+
+def _size(found: Extrema) -> FloatArray:
+    return np.asarray(np.maximum(np.abs(found.minimum), np.abs(found.maximum)))
+
+
+def _turning_travel(position: FloatArray) -> FloatArray:
+    """Way (P,) there and back of polynomials (P, K) over u in [0, 1]."""
     chain = [position]
-    for _ in range(4):
+    for _ in range(position.shape[1] - 2):
         chain.append(derivative(chain[-1]))
-    snap = chain[4]  # a line: its root in closed form
+    line = chain[-1]  # its root in closed form
     with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.where(snap[:, 1] != 0.0, -snap[:, 0] / snap[:, 1], 0.0)
+        root = np.where(line[:, 1] != 0.0, -line[:, 0] / line[:, 1], 0.0)
     points = np.clip(np.nan_to_num(root), 0.0, 1.0)[:, None]
-    largest: list[FloatArray] = []
-    for order in (3, 2, 1):
-        ends = _with_ends(points)
-        largest.append(np.max(np.abs(evaluate(chain[order], ends)), axis=1) * per_second**order)
+    for order in range(len(chain) - 2, 0, -1):
         points = roots_between(chain[order], points)
     along = evaluate(position, _with_ends(points))
-    shape = (segments, joints)
-    return Extremes(
-        lowest=along.min(axis=1).reshape(shape),
-        highest=along.max(axis=1).reshape(shape),
-        velocity=largest[2].reshape(shape),
-        acceleration=largest[1].reshape(shape),
-        jerk=largest[0].reshape(shape),
-        travel=np.abs(np.diff(along, axis=1)).sum(axis=1).reshape(shape),
-    )
+    return np.asarray(np.abs(np.diff(along, axis=1)).sum(axis=1))
 
 
 def _with_ends(points: FloatArray) -> FloatArray:

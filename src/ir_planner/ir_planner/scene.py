@@ -109,16 +109,27 @@ class PlanningScene:
         """Distance (Z,) m that each pair must exceed: S_m, or what `station` allows the pair."""
         result = np.full(len(self.collision.pairs), safety_distance)
         for contact in self._contacts(station):
-            names = {contact.body_a, contact.body_b}
-            for z, pair in enumerate(self.collision.pairs):
-                if names == {pair.body_a, pair.body_b}:
-                    result[z] = min(safety_distance, contact.safety_distance)
+            for z in self._numbers_of(contact):
+                result[z] = min(safety_distance, contact.safety_distance)
         return result
 
     def allowed(self, station: str) -> BoolArray:
         """Which pairs (Z,) have a safety distance of their own at `station`; none for ""."""
-        names = [{contact.body_a, contact.body_b} for contact in self._contacts(station)]
-        return np.array([{p.body_a, p.body_b} in names for p in self.collision.pairs], dtype=bool)
+        result = np.zeros(len(self.collision.pairs), dtype=bool)
+        for contact in self._contacts(station):
+            result[self._numbers_of(contact)] = True
+        return result
+
+    @cached_property
+    def _numbers(self) -> dict[frozenset[str], list[int]]:
+        """Numbers of the pairs of two names."""
+        numbers: dict[frozenset[str], list[int]] = {}
+        for z, pair in enumerate(self.collision.pairs):
+            numbers.setdefault(frozenset((pair.body_a, pair.body_b)), []).append(z)
+        return numbers
+
+    def _numbers_of(self, contact: AllowedContact) -> list[int]:
+        return self._numbers.get(frozenset((contact.body_a, contact.body_b)), [])
 
     def _contacts(self, station: str) -> tuple[AllowedContact, ...]:
         return self.station(station).allowed_contacts if station else ()

@@ -6,6 +6,7 @@ robot with itself never grow, so they don't take part.
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,11 @@ class WorkArea:
     @staticmethod
     def of(scene: PlanningScene, station: Station) -> "WorkArea":
         """The work area of the machine that a station belongs to."""
+        return _work_area(scene, station.name)
+
+    @staticmethod
+    def built(scene: PlanningScene, station: Station) -> "WorkArea":
+        """The same, built anew."""
         machine = scene.cell.machine(station.equipment)
         if not machine.enabled:
             return WorkArea(scene, station, None, None, None)
@@ -70,3 +76,8 @@ class WorkArea:
     def left(self, q: FloatArray, safety_distance: float) -> BoolArray:
         """Which configurations (N, n) are outside the zone."""
         return np.asarray(self.zone_distance(q) > safety_distance)
+
+
+@lru_cache(maxsize=32)  # scenes never change, and requests come back to the same stations
+def _work_area(scene: PlanningScene, station: str) -> WorkArea:
+    return WorkArea.built(scene, scene.station(station))
