@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.node_inputs import LastState
+from ir_planner.node_inputs import LastState, measured_velocity, state_of
 from ir_planner.timing import STILL
+from sensor_msgs.msg import JointState
+
+from ir_description import load_cell
 
 
 def test_a_standing_robot_is_one_start_however_its_measurement_trembles() -> None:
@@ -23,8 +28,72 @@ def test_a_standing_robot_is_one_start_however_its_measurement_trembles() -> Non
 
 def test_no_state_and_an_old_one_are_told_apart() -> None:
     state = LastState()
+    assert state.known(0.0, 1.0) is None
     with pytest.raises(RequestError, match="no joint_states have come yet"):
         state.fresh(0.0, 1.0)
     state.take(np.zeros(6), 0.0)
     with pytest.raises(RequestError, match=r"came 2.5 s ago: it must be at most 1 s"):
         state.fresh(2.5, 1.0)
+
+
+def test_a_moving_robot_is_no_start_but_a_state() -> None:
+    state = LastState()
+    state.take(np.zeros(6), 0.0, np.array([0.0, 0.0, -0.3, 0.001, 0.0, 0.0]))
+    sentence = r"the robot is moving: joint_a3 has a velocity of -0\.3 rad/s, it must be 0 rad/s within 0\.01"
+    with pytest.raises(RequestError, match=sentence) as caught:
+        state.fresh(0.0, 1.0, JOINT_NAMES)
+    assert caught.value.status.code == StatusCode.START_STATE_INVALID
+    with pytest.raises(RequestError, match="the robot is moving"):
+        state.known(0.0, 1.0, JOINT_NAMES)
+    for q in (state.fresh(0.0, 1.0), state.known(0.0, 1.0), state.known(2.0, 1.0, JOINT_NAMES)):
+        assert q is not None
+        assert q.tolist() == [0.0] * 6
+    for velocity in (np.full(6, 0.009), None):
+        state.take(np.zeros(6), 0.0, velocity)
+        assert state.fresh(0.0, 1.0, JOINT_NAMES).tolist() == [0.0] * 6
+
+
+@pytest.mark.parametrize(
+    ("velocity", "told"),
+    [([0.1] * 6, True), ([], False), ([float("nan")] * 6, False), ([0.1] * 5, False)],
+)
+def test_joint_states_without_velocities_do_not_tell_them(velocity: list[float], told: bool) -> None:
+    message = JointState(name=list(JOINT_NAMES), position=[0.0] * 6, velocity=velocity)
+    measured = measured_velocity(message, JOINT_NAMES)
+    assert (measured is not None) == told
+
+
+CELL = load_cell("demo")
+
+
+def given(**fields: list[float]) -> JointState:
+    return JointState(**{"name": list(JOINT_NAMES), "position": list(CELL.park), **fields})
+
+
+@pytest.mark.parametrize(
+    ("message", "sentence"),
+    [
+        (given(velocity=[0.0, float("nan"), 0.0, 0.0, 0.0, 0.0]), r"velocity\[1\] is nan: it must be finite"),
+        (given(velocity=[float("inf")] * 6), r"velocity\[0\] is inf"),
+        (given(velocity=[0.0]), "velocity has 1 values: it must have none or as many as 6 joints"),
+        (given(position=[], name=[], velocity=[0.0] * 6), "position has 0 values"),
+    ],
+)
+def test_velocities_of_a_state_are_looked_at(message: JointState, sentence: str) -> None:
+    for code in (StatusCode.START_STATE_INVALID, StatusCode.INVALID_ROBOT_STATE):
+        with pytest.raises(RequestError, match=sentence) as caught:
+            state_of(message, CELL, code)
+        assert caught.value.status.code == code
+
+
+def test_a_start_or_goal_that_moves_is_refused_and_a_state_that_moves_is_none_the_less_a_state() -> None:
+    names, position = list(JOINT_NAMES)[::-1], list(CELL.park)[::-1]
+    message = given(name=names, position=position, velocity=[0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    sentence = r"start: joint_a6 has a velocity of 0\.5 rad/s, it must be 0 rad/s within 0\.01"
+    with pytest.raises(RequestError, match=sentence):
+        state_of(message, CELL, StatusCode.START_STATE_INVALID, "start")
+    free = state_of(message, CELL, StatusCode.INVALID_ROBOT_STATE)
+    assert free is not None
+    assert free.tolist() == list(CELL.park)
+    slow = given(velocity=[1e-4] * 6, effort=[float("nan")] * 6)
+    assert state_of(slow, CELL, StatusCode.START_STATE_INVALID, "start") is not None

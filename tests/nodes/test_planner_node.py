@@ -83,6 +83,10 @@ def state(q: list[float], names: tuple[str, ...] = JOINT_NAMES) -> JointState:
     return JointState(name=list(names), position=[float(v) for v in q])
 
 
+def moving(speed: float) -> JointState:
+    return JointState(name=list(JOINT_NAMES), position=HOME, velocity=[speed] * 6)
+
+
 def alive(call: Call) -> bool:
     return bool(call(GetCell, "get_cell").status.code == Status.SUCCESS)
 
@@ -180,6 +184,15 @@ def test_the_start_defaults_to_the_last_joint_states(
 
     answer = wait_for(asked, timeout=10.0, what="the state arrives")
     assert list(answer.info.start.position) == pytest.approx(start)
+
+    def refused() -> Any:
+        ros_executor.run(lambda: publisher.publish(moving(0.3)))
+        answer = call(PlanRegionalMovement, "plan_regional_movement", goal="park")
+        return answer.status if answer.status.code == Status.START_STATE_INVALID else None
+
+    assert "the robot is moving: joint_a1" in wait_for(refused, timeout=10.0, what="it moves").message
+    program = call(PlanProgram, "plan_program", stations=["park"]).status
+    assert program.code == Status.START_STATE_INVALID, program.message
 
 
 def test_plan_trajectory_passes_the_reference_points(call: Call) -> None:
@@ -359,6 +372,39 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         {"start": state([NAN, *HOME[1:]]), "goal": "park"},
         -26,
         "finite",
+    ),
+    (
+        "moving start",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": moving(0.3), "goal": "park"},
+        -26,
+        "start: joint_a1 has a velocity of 0.3 rad/s",
+    ),
+    (
+        "nan velocity of a start",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": moving(NAN), "goal": "park"},
+        -26,
+        "velocity[0] is nan",
+    ),
+    (
+        "moving goal",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME), "goal_state": moving(0.3)},
+        -27,
+        "goal_state: joint_a1",
+    ),
+    ("nan velocity of a state", CheckState, "check_state", {"state": moving(NAN)}, -17, "velocity[0] is nan"),
+    (
+        "nan velocity of near",
+        ComputeIk,
+        "compute_ik",
+        {"goal": "gauge_measure", "near": moving(NAN)},
+        -17,
+        "velocity[0] is nan",
     ),
     (
         "unknown joint",

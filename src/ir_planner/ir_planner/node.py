@@ -49,7 +49,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ir_description import DescriptionError
 from ir_kernels import compiled
 from ir_msgs_py import names
-from ir_planner.node_inputs import LastState
+from ir_planner.node_inputs import LastState, measured_velocity
 from ir_planner.node_requests import Requests
 from ir_planner.parameters import PlannerParameters
 from ir_planner.planner import Planner
@@ -171,12 +171,13 @@ class PlannerNode(Node):
         received = self._states.take() if self.planner.has_cell else None
         if received is None:
             return
+        joints = self.planner.cell.robot.joint_names
         try:
-            q = configuration_from_msg(received.message, self.planner.cell.robot.joint_names)
+            q = configuration_from_msg(received.message, joints)
         except InvalidValueError as error:
             self._last_state.problem = str(error)
             return
-        self._last_state.take(q, time.monotonic() - received.age)
+        self._last_state.take(q, time.monotonic() - received.age, measured_velocity(received.message, joints))
 
     def _change_settings(self, settings: PlannerSettings) -> None:
         self.planner.settings = settings

@@ -17,6 +17,7 @@ from ir_msgs_py.ros.conversions import (
     stamped_pose_given,
     trajectory_from_msg,
     trajectory_given,
+    velocity_from_msg,
 )
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -29,6 +30,7 @@ from ir_planner.goals import Goal, one_goal
 from ir_planner.planner import Planner
 
 FloatArray = NDArray[np.float64]
+AT_REST = 0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
 MEASURED = 9  # decimals of rad: finer than any encoder, and less than what counts as movement
 
 
@@ -40,26 +42,40 @@ class LastState:
 
     look: Callable[[], None] = lambda: None
     q: FloatArray | None = None
+    velocity: FloatArray | None = None
     came: float = 0.0
     problem: str = ""
     _lock: Lock = field(default_factory=Lock)
 
-    def take(self, q: FloatArray, now: float) -> None:
-        """A state came. It is kept to MEASURED decimals: a robot that stands is one start, not a new one with
-        every measurement, so the same request gives the same trajectory.
+    def take(self, q: FloatArray, now: float, velocity: FloatArray | None = None) -> None:
+        """A state came; velocity None: it doesn't tell. It is kept to MEASURED decimals: a robot that stands
+        is one start, not a new one with every measurement, so the same request gives the same trajectory.
         """
         with self._lock:
             self.q, self.came = np.round(q, MEASURED) + 0.0, now  # + 0.0: no negative zeros
+            self.velocity = velocity
 
-    def fresh(self, now: float, max_age: float) -> FloatArray:
-        """The state (n,). Raises RequestError when there is none, or an old one."""
+    def known(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray | None:
+        """The last state (n,) however old, None while there is none.
+
+        Raises RequestError where the joints of these names must stand and one that isn't older than max_age
+        [s] moves.
+        """
         self.look()
         with self._lock:
-            q, age = self.q, max(0.0, now - self.came)
+            q, velocity, age = self.q, self.velocity, now - self.came
+        if joints_at_rest and velocity is not None and age <= max_age:
+            check_at_rest(velocity, joints_at_rest, "the robot is moving", StatusCode.START_STATE_INVALID)
+        return q
+
+    def fresh(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray:
+        """The same where it must not be older: raises RequestError when there is none, or an old one."""
+        q = self.known(now, max_age, joints_at_rest)
         if q is None:
             raise RequestError(
                 StatusCode.ROBOT_STATE_STALE, "no joint_states have come yet: give the state in the request"
             )
+        age = now - self.came
         if age > max_age:
             raise RequestError(
                 StatusCode.ROBOT_STATE_STALE,
@@ -70,14 +86,41 @@ class LastState:
         return q
 
 
-def state_of(msg: Any, cell: Cell, code: StatusCode) -> FloatArray | None:
-    """Joint values (n,) rad of a JointState, None where it is empty."""
-    if not configuration_given(msg):
-        return None
+def measured_velocity(msg: Any, joint_names: tuple[str, ...]) -> FloatArray | None:
+    """Velocities (n,) rad/s of joint_states, None where they aren't told: drivers that measure none leave
+    them out or say NaN.
+    """
     try:
-        return configuration_from_msg(msg, cell.robot.joint_names)
+        return velocity_from_msg(msg, joint_names)
+    except InvalidValueError:
+        return None
+
+
+def check_at_rest(velocity: FloatArray, joint_names: tuple[str, ...], what: str, code: StatusCode) -> None:
+    """Raise RequestError where a joint is faster than AT_REST: velocity (n,) rad/s."""
+    j = int(np.argmax(np.abs(velocity)))
+    if abs(velocity[j]) > AT_REST:
+        raise RequestError(
+            code,
+            f"{what}: {joint_names[j]} has a velocity of {velocity[j]:.4g} rad/s, it must be 0 rad/s within "
+            f"{AT_REST:g}; movements start and end at rest",
+        )
+
+
+def state_of(msg: Any, cell: Cell, code: StatusCode, at_rest: str = "") -> FloatArray | None:
+    """Joint values (n,) rad of a JointState, None where it is empty. Velocities must be finite where there
+    are any, and those of a state that `at_rest` names ("start") about 0; efforts are not looked at.
+    """
+    if not configuration_given(msg) and not msg.velocity:
+        return None
+    names = cell.robot.joint_names
+    try:
+        q, velocity = configuration_from_msg(msg, names), velocity_from_msg(msg, names)
     except InvalidValueError as error:
         raise RequestError(code, str(error)) from error
+    if at_rest and velocity is not None:
+        check_at_rest(velocity, names, at_rest, code)
+    return q
 
 
 def pose_of(msg: Any, cell: Cell) -> FloatArray | None:
@@ -94,7 +137,7 @@ def goal_of(request: Any, cell: Cell) -> Goal:
     forms = tuple(name for name in ("goal", "goal_state", "goal_pose") if hasattr(request, name))
     configuration = None
     if "goal_state" in forms:
-        configuration = state_of(request.goal_state, cell, StatusCode.GOAL_STATE_INVALID)
+        configuration = state_of(request.goal_state, cell, StatusCode.GOAL_STATE_INVALID, "goal_state")
     return one_goal(request.goal, configuration, pose_of(request.goal_pose, cell), cell, forms)
 
 

@@ -149,7 +149,7 @@ class Requests:
         cell = self.planner.cell
         options = options_of(request.options, self.draw_seed)
         goal = goal_of(request, cell)
-        start = self._state(request.start, StatusCode.START_STATE_INVALID)
+        start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
         plan = self.planner.plan_regional(start, goal, options)
         return self._movement(plan, response, options.include_points)
 
@@ -195,8 +195,9 @@ class Requests:
     ) -> Status:
         """A whole program; also what the action does."""
         options = options_of(request.options, self.draw_seed)
+        start = self._known_or_home(at_rest=True)
         plan: ProgramPlan = self.planner.plan_program(
-            tuple(request.stations), request.cycle_time, options, self._known_or_home(), progress, cancelled
+            tuple(request.stations), request.cycle_time, options, start, progress, cancelled
         )
         fill_program(response, plan, options.include_points)
         for movement in plan.movements:
@@ -227,13 +228,19 @@ class Requests:
         fill_standby(response, self.planner.standby(request.pause, q, request.load))
         return Status.success()
 
-    def _state(self, msg: Any, code: StatusCode) -> FloatArray:
-        given = state_of(msg, self.planner.cell, code)
+    def _state(self, msg: Any, code: StatusCode, at_rest: str = "") -> FloatArray:
+        cell = self.planner.cell
+        given = state_of(msg, cell, code, at_rest)
         if given is not None:
             return given
-        return self.last_state.fresh(self.now(), self.planner.settings.state_max_age)
+        standing = cell.robot.joint_names if at_rest else ()
+        return self.last_state.fresh(self.now(), self.planner.settings.state_max_age, standing)
 
-    def _known_or_home(self) -> FloatArray:
-        """The last known state, however old; machine home where no robot has told."""
-        q = self.last_state.q
-        return np.array(self.planner.cell.machine_home) if q is None else q
+    def _known_or_home(self, at_rest: bool = False) -> FloatArray:
+        """The last known state, however old; machine home where no robot has told. at_rest: a robot that
+        moves now is refused.
+        """
+        cell = self.planner.cell
+        standing = cell.robot.joint_names if at_rest else ()
+        q = self.last_state.known(self.now(), self.planner.settings.state_max_age, standing)
+        return np.array(cell.machine_home) if q is None else q

@@ -11,6 +11,7 @@ from ir_msgs_py.ros.convert_basics import (
     status_to_msg,
     time_from_msg,
     time_to_msg,
+    velocity_from_msg,
 )
 from ir_msgs_py.ros.convert_pose import (
     NORM_TOLERANCE,
@@ -112,4 +113,5 @@ __all__ = [
     "trajectory_from_msg",
     "trajectory_given",
     "trajectory_to_msg",
+    "velocity_from_msg",
 ]

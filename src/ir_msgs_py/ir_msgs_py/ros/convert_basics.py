@@ -71,6 +71,29 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Float
 
     Raises JointNamesError for foreign, missing or double names, InvalidValueError for the values.
     """
+    names = _checked_names(msg, joint_names)
+    if len(msg.position) != len(names):
+        raise InvalidValueError(f"position has {len(msg.position)} values: {len(names)} joints need as many")
+    return _in_order(msg.position, "position", names, joint_names)
+
+
+def velocity_from_msg(msg: JointState, joint_names: Sequence[str]) -> FloatArray | None:
+    """Joint velocities (n,) [rad/s] in the order of joint_names, None where the message has none.
+
+    Raises as configuration_from_msg.
+    """
+    names = _checked_names(msg, joint_names)
+    if not msg.velocity:
+        return None
+    if len(msg.velocity) != len(names):
+        raise InvalidValueError(
+            f"velocity has {len(msg.velocity)} values: it must have none or as many as {len(names)} joints"
+        )
+    return _in_order(msg.velocity, "velocity", names, joint_names)
+
+
+def _checked_names(msg: JointState, joint_names: Sequence[str]) -> list[str]:
+    """The joints of a message, each expected one once; those of joint_names where it names none."""
     expected = list(joint_names)
     names = list(msg.name) or expected
     known = ", ".join(expected)
@@ -82,7 +105,10 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Float
     for name in expected:
         if name not in names:
             raise JointNamesError(f"joint {name!r} is missing: expected are {known}")
-    if len(msg.position) != len(names):
-        raise InvalidValueError(f"position has {len(msg.position)} values: {len(names)} joints need as many")
-    values = read_only(msg.position, "position", (len(names),))
-    return read_only(values[[names.index(name) for name in expected]], "position", (len(names),))
+    return names
+
+
+def _in_order(values: Sequence[float], what: str, names: list[str], joint_names: Sequence[str]) -> FloatArray:
+    """Finite values of `names` in the order of joint_names."""
+    finite = read_only(values, what, (len(names),))
+    return read_only(finite[[names.index(name) for name in joint_names]], what, (len(names),))
