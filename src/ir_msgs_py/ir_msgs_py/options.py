@@ -17,7 +17,8 @@ class PlanOptions:
 
     planner_id: "" = the node's portfolio. random_seed: draw a seed and echo it. max_iterations: budget in
     work, 0 = the node's default. planning_time: ceiling [s]. safety_distance: S_m [m]. time_value [W] in J
-    = E + time_value x T. duration: wanted [s], 0 = free. velocity_scaling, acceleration_scaling in (0, 1].
+    = energy of the drives + time_value x T, without the base load. duration: wanted [s], 0 = free.
+    velocity_scaling, acceleration_scaling in (0, 1].
     load: load text, "" = what is attached. include_points: put the points into the answer.
     """
 
