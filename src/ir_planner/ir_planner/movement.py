@@ -38,7 +38,7 @@ MakeLaw = Callable[[FloatArray, FloatArray, MotionLimits, Dynamics], Law]
 # how steps are timed, and the share of the acceleration they may use; the fastest first
 _SHAPES: tuple[tuple[MakeLaw, float], ...] = ((fastest, 1.0), (fastest_law, 1.0), (fastest_law, 0.6))
 _CUTS = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.0)
-_DURATION_SLACK = 1e-6
+DURATION_SLACK = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +237,7 @@ def stretched_to_wish(
     """
     check_duration(quickest.duration, options)
     if options.duration > 0.0:
-        if options.duration < quickest.duration * (1.0 - _DURATION_SLACK):
+        if options.duration < quickest.duration * (1.0 - DURATION_SLACK):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"duration is {options.duration:g} s: the shortest within the limits is "

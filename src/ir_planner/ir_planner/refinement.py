@@ -11,14 +11,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
 from ir_kernels import SplineCost, SplineTerms
+from ir_planner.blending import stretched
 from ir_planner.budget import Budget
 from ir_planner.clearance_checks import clearance_violation
+from ir_planner.errors import RequestError
 from ir_planner.limit_checks import Violation
-from ir_planner.movement import TimedMovement, check_duration, distinct, timed_movement
+from ir_planner.movement import (
+    DURATION_SLACK,
+    TimedMovement,
+    check_duration,
+    distinct,
+    timed_movement,
+)
 from ir_planner.objective import ObjectiveWeights, objective_weights, trajectory_value
 from ir_planner.reporting import evaluate_trajectory
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
@@ -94,6 +103,7 @@ class Refinement:
         if station and scene.allowed(station).any():
             rows.append(scene.thresholds(options.safety_distance, station) - PROOF_TOLERANCE / 2)
         self._room = np.stack(rows)
+        self.shortest = np.inf  # s, of movements that were tried for a wished duration
 
     def drafted(self, path: FloatArray, evaluations: int = QUICK.coarse) -> Draft:
         """The coarse spline from a free path (M, n), M >= 2, gone down a little: enough to compare ways."""
@@ -106,6 +116,40 @@ class Refinement:
 
     def finished(self, draft: Draft, path: FloatArray, effort: Effort = QUICK) -> Refined | None:
         """The proved movement that a draft ends in; None where it can't be made one."""
+        found = self._finished(draft, path, effort)
+        if found is None and self.options.duration > 0.0:
+            return self._slowed_to_wish(path)
+        return found
+
+    def _slowed_to_wish(self, path: FloatArray) -> Refined | None:
+        """The fastest movement near a path, at a wished duration that leaves no joules to choose."""
+        hurry = replace(self.options, objective="time", duration=0.0)
+        fastest = Refinement(self.scene, hurry, self.budget, self.station)
+        for effort in (QUICK, THOROUGH):
+            found = fastest.finished(fastest.drafted(path, effort.coarse), path, effort)
+            if found is None:
+                continue
+            self.shortest = min(self.shortest, found.trajectory.duration)
+            if found.trajectory.duration <= self.options.duration * (1.0 + DURATION_SLACK):
+                factor = max(self.options.duration / found.trajectory.duration, 1.0)
+                trajectory = stretched(found.trajectory, factor)
+                blocked = clearance_violation(
+                    trajectory, self.scene, self.options.safety_distance, self.station
+                )
+                if blocked is None:
+                    return Refined(path, trajectory, trajectory_value(trajectory, self.scene, self.options))
+        return None
+
+    def check_wish(self) -> None:
+        """Raise RequestError where the wished duration is shorter than the fastest movement found."""
+        if np.isfinite(self.shortest) and self.shortest > self.options.duration * (1.0 + DURATION_SLACK):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"duration is {self.options.duration:g} s: the shortest within the limits is "
+                f"{self.shortest:.4g} s",
+            )
+
+    def _finished(self, draft: Draft, path: FloatArray, effort: Effort) -> Refined | None:
         for evaluations in (effort.middle, effort.fine)[draft.level :]:
             finer = replace(draft, spline=draft.spline.subdivided(), level=draft.level + 1)
             draft = self._descended(finer, path, evaluations)
@@ -238,4 +282,5 @@ def movement_over(
             movement = TimedMovement(path, found.trajectory, evaluation)
             if movement.violation is None:
                 return movement
+        refinement.check_wish()
     return timed_movement(path, scene, options, budget, station)

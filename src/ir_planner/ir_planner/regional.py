@@ -84,6 +84,8 @@ def search_regional(
     if ways and np.abs(goal - start).max() >= STILL and not _by_laws(options):
         _improve(start, goal, ways, portfolio, options)
         best = portfolio.best()
+        if best is None:
+            portfolio.refinement.check_wish()
     if ways and best is None:
         with journal.stage("straight steps") as notes:
             cheapest = sorted(ways, key=lambda way: path_cost(scene.weights, way[1]))
