@@ -19,6 +19,7 @@ from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import Plc
 from ir_sim_driver.power_modes import PowerModes, Rest
 
+PAUSE_MAX = 604_800.0  # s: a week
 _MAY_PAUSE = (Mode.STAND_ON_MOTORS, Mode.MOVING, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES)
 
 
@@ -44,9 +45,10 @@ class Pauses:
 
     def start(self, pause: float, executing: bool) -> PowerMode:
         """Start_Pause of `pause` [s]: go to the mode that takes least energy. Raises RequestRefusedError."""
-        if not (math.isfinite(pause) and pause > 0.0):
+        if not 0.0 < pause <= PAUSE_MAX:
             raise RequestRefusedError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS, f"pause is {pause:g} s: it must be finite and above 0 s"
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"pause is {pause:g} s: it must be in (0, {PAUSE_MAX:g}] s",
             )
         reason = self._refusal(executing)
         if reason:
