@@ -86,6 +86,44 @@ def test_power_bits_count_only_in_ext(plc, mode):
     assert any(mode.name in sentence for sentence in warnings(plc))
 
 
+@pytest.mark.parametrize("mode", [OperatingMode.T1, OperatingMode.EXT])
+@pytest.mark.parametrize("pause", [False, True])
+@pytest.mark.parametrize("bits", [("ab",), ("hib",), ("ab", "hib"), ("drives_on",)])
+def test_what_is_said_beforehand_is_what_counts_after_the_debounce(plc, mode, pause, bits):
+    plc.set_operating_mode(mode)
+    for bit in bits:
+        plc.set_bit(bit, True)
+    remark = plc.remark(bits[-1], pause)
+    before = plc.rest
+    run(plc, 0.05, pause)
+    said = warnings(plc)
+    assert bool(remark) == bool(said)
+    if remark:
+        assert plc.rest is before
+        assert said[-1].endswith(remark.partition("ignored: ")[2])
+
+
+def test_what_is_taken_back_outside_ext_stays_and_is_said(plc):
+    plc.set_bit("ab", True)
+    run(plc, 0.05)
+    plc.set_operating_mode(OperatingMode.T1)
+    plc.set_bit("ab", False)
+    assert plc.remark("ab") == "PLC bit AB is 0 but ignored: operating mode is T1, must be EXT"
+    run(plc, 0.05)
+    assert plc.rest is Mode.BUS_POWER_OFF
+
+
+def test_a_bit_that_is_stuck_says_so():
+    plc = Plc(PlcSettings(), Notices())
+    run(plc, 0.1)
+    plc.set_all(PlcInputs(ab=True))
+    plc.set_bit("ab", True)
+    assert "ignored until it has been 0" in plc.remark("ab")
+    plc.set_bit("ab", False)
+    plc.set_bit("ab", True)
+    assert plc.remark("ab") == ""
+
+
 def test_power_bits_and_a_profienergy_pause_exclude_each_other(plc):
     plc.set_bit("hib", True)
     run(plc, 0.05, pause=True)

@@ -134,6 +134,16 @@ def test_bus_power_off_by_bits_and_back(make_driver, cell_client, listen, wait_f
     wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
 
 
+def test_a_bit_that_is_ignored_says_so_in_the_answer(make_driver, cell_client):
+    make_driver()
+    assert (
+        cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="T1", value=True)).status.message == ""
+    )
+    answer = cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
+    assert answer.inputs.ab
+    assert answer.status.message == "PLC bit AB is 1 but ignored: operating mode is T1, must be EXT"
+
+
 def test_levels_in_force_are_published_whoever_sets_them(make_driver, cell_client, listen, wait_for):
     driver = make_driver(modbus=True, modbus_port=0)
     in_force = listen(names.PLC_INPUTS_IN_FORCE, PlcInputs, latched=True)

@@ -102,6 +102,22 @@ class Plc:
         self._greeted = True
         self._set(bit, level)
 
+    def remark(self, bit: str, pause_active: bool = False) -> str:
+        """Why the level that `bit` has now will not count as a wish to rest, "" where it will.
+
+        What `step` says with a warning once the level has been there for the debounce.
+        """
+        if bit not in POWER_BITS:
+            return ""
+        level = bool(getattr(self.raw, bit))
+        if level and bit in self._stuck:
+            return f"PLC bit {bit.upper()} is 1 since the controller started: ignored until it has been 0"
+        on = [name for name in POWER_BITS if getattr(self.raw, name) and name not in self._stuck]
+        refusal = self._refusal(on, pause_active)
+        if refusal and (level or (self.rest is not None and self.operating_mode is not OperatingMode.EXT)):
+            return f"PLC bit {bit.upper()} is {int(level)} but ignored: {refusal}"
+        return ""
+
     def set_operating_mode(self, mode: OperatingMode) -> None:
         """Turn the mode switch."""
         self.operating_mode = mode
@@ -163,13 +179,7 @@ class Plc:
         """Decide what AB, HIB and KS mean together; what is refused leaves `rest` as it was."""
         on = [bit for bit in POWER_BITS if getattr(self.levels, bit)]
         names = " and ".join(bit.upper() for bit in on)
-        refusal = ""
-        if self.operating_mode is not OperatingMode.EXT:
-            refusal = f"operating mode is {self.operating_mode.name}, must be EXT"
-        elif pause_active and on:
-            refusal = "a PROFIenergy pause is on, end it first"
-        elif len(on) > 1:
-            refusal = "only one of AB, HIB and KS may be 1"
+        refusal = self._refusal(on, pause_active)
         if not refusal:
             self.rest = Mode.BUS_POWER_OFF if on == ["ab"] else Mode.HIBERNATION if on == ["hib"] else None
             return
@@ -182,3 +192,11 @@ class Plc:
             and _BIT_OF_REST[self.rest] not in on
         ):
             self.rest = None
+
+    def _refusal(self, on: list[str], pause_active: bool) -> str:
+        """Why these power bits don't count, "" where they do."""
+        if self.operating_mode is not OperatingMode.EXT:
+            return f"operating mode is {self.operating_mode.name}, must be EXT"
+        if pause_active and on:
+            return "a PROFIenergy pause is on, end it first"
+        return "only one of AB, HIB and KS may be 1" if len(on) > 1 else ""

@@ -30,9 +30,9 @@ class Services:
         self._load_changed = load_changed
 
     def set_plc_input(self, request: Any, response: Any) -> Any:
-        """Set one bit, or the mode switch by the name of its position."""
+        """Set one bit, or the mode switch by the name of its position; the remark: why it won't count."""
 
-        def work(simulation: Simulation) -> None:
+        def work(simulation: Simulation) -> str:
             plc = simulation.plc
             try:
                 plc.raw.with_bit(request.name, bool(request.value))
@@ -46,6 +46,7 @@ class Services:
             else:
                 plc.set_bit(request.name, bool(request.value))
             response.inputs = plc_inputs_to_msg(plc.raw)
+            return plc.remark(request.name, simulation.pauses.rest is not None)
 
         return self._answer(response, work)
 
