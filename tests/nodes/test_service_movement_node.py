@@ -109,6 +109,8 @@ def test_ccd_finds_what_the_closed_form_has(call: Call) -> None:
     for solution in searched.solutions:
         assert np.abs(complete - np.array(solution.state.position)).max(axis=1).min() < 1e-4
     assert searched.info.seed == 3
+    assert analytic.info.iterations == 0
+    assert 32 <= searched.info.iterations <= 32 * 6  # sweeps of 32 starts
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,28 @@ def test_the_secant_step_of_eq_5_ends_at_the_safety_distance_or_beyond(d: float,
         assert after + share * (d - after) > margin or share == 1.0
 
 
+@pytest.mark.parametrize("starts", [1, 40])
+def test_the_work_of_a_search_is_its_sweeps_of_all_starts(
+    starts: int, scene_of: Callable[[str], PlanningScene]
+) -> None:
+    """At a pose out of reach no start arrives or collides there, so that all of them take every sweep."""
+    scene = scene_of("open")
+    pose = np.eye(4)
+    pose[:3, 3] = 50.0, 0.0, 1.0
+    budget = Budget(10_000, np.inf, lambda: 0.0)
+    chosen, nothing = InteractionSettings(sweeps=2), np.full(len(scene.collision.pairs), -np.inf)
+    searched_configurations(pose, scene, nothing, HOME, starts, 0, chosen, budget)
+    assert budget.iterations == 2 * starts
+
+
+def test_a_search_ends_when_its_work_is_spent(scene_of: Callable[[str], PlanningScene]) -> None:
+    scene = scene_of("demo")
+    pose, threshold = scene.station("lathe_work").pose, scene.thresholds(0.02, "lathe_work")
+    budget = Budget(30, np.inf, lambda: 0.0)
+    searched_configurations(pose, scene, threshold, HOME, 32, 1, InteractionSettings(), budget)
+    assert budget.iterations == 32
+
+
 def test_the_literal_step_is_the_gain_in_metres_and_hardly_moves_where_bodies_touch() -> None:
     threshold = np.array([0.02])
     far = shares_back(np.array([[0.4]]), np.array([[-0.1]]), threshold, LITERAL, 0.05)

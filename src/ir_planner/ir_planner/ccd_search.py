@@ -43,7 +43,10 @@ def descend(
     settings: InteractionSettings,
     budget: Budget,
 ) -> Descent:
-    """Bring the tcp to `pose` (4, 4) from `starts` (P, n), every pair above its threshold (Z,) m."""
+    """Bring the tcp to `pose` (4, 4) from `starts` (P, n), every pair above its threshold (Z,) m.
+
+    Work: one for each sweep of each start over its joints.
+    """
     return _Descent(pose, scene, threshold, settings).run(starts, budget)
 
 
@@ -63,6 +66,7 @@ class _Descent:
         blocked = np.full(len(q), -1)  # the pair that last set a start back
         sweeps = 0
         while len(q) and sweeps < self.settings.sweeps and not budget.exhausted:
+            budget.spend(len(q))
             q, distance, blocked = self._sweep(q, distance, blocked)
             sweeps += 1
             now = self._psi(q)
