@@ -13,6 +13,7 @@ from ir_msgs_py.report import MovementKind
 from ir_msgs_py.status import StatusCode
 from ir_planner.budget import Budget
 from ir_planner.errors import CancelledError, RequestError
+from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 
 from ir_description import Cell, PowerData, load_cell
@@ -175,3 +176,44 @@ def test_automatic_pauses_take_the_cheapest_mode(power: PowerData) -> None:
     plan = planned(cell_from_yaml(text.replace("power_mode: BUS_POWER_OFF", "power_mode: AUTO")), power)
     chosen = [movement.power_mode for movement in plan.movements if movement.duration == 180.0]
     assert chosen == ["BUS_POWER_OFF"]
+
+
+def test_a_program_is_truncated_when_time_runs_out_in_any_of_its_movements(demo_cell: Cell) -> None:
+    """Time stands until the chosen movement is planned, then the ceiling of all of them has passed."""
+    now = [0.0]
+    planner = Planner(lambda: now[0])
+    planner.set_cell("", "demo")
+    stations, start = ("park", "home", "park"), np.array(demo_cell.machine_home)
+
+    def plan(cut: int) -> ProgramPlan:
+        def progress(phase: str, done: int, total: int, cost: float) -> None:
+            assert total == len(stations)
+            now[0] = 1000.0 if phase == "movements" and done >= cut else 0.0
+
+        now[0] = 0.0
+        return planner.plan_program(stations, 0.0, PlanOptions(planning_time=300.0), start, progress)
+
+    whole = plan(len(stations))
+    assert not whole.info.truncated
+    for cut in range(len(stations)):
+        found = plan(cut)
+        assert found.status.ok, found.status.message
+        assert found.info.truncated
+        assert found.info.iterations < whole.info.iterations
+        same = [
+            a.trajectory_id == b.trajectory_id for a, b in zip(found.movements, whole.movements, strict=True)
+        ]
+        assert all(same[:cut])
+
+
+def test_a_program_has_the_work_of_one_movement_for_each_of_its_steps(demo_cell: Cell) -> None:
+    """Each movement goes on while its own work lasts, and what the program reports is the sum."""
+    planner = Planner(lambda: 0.0)
+    planner.set_cell("", "demo")
+    start, most = np.array(demo_cell.machine_home), 20_000
+    one, three = (
+        planner.plan_program(stations, 0.0, PlanOptions(max_iterations=most), start).info.iterations
+        for stations in (("park",), ("park", "home", "park"))
+    )
+    assert one >= most
+    assert three >= 3 * most
