@@ -8,21 +8,27 @@
 #include <limits>
 #include <vector>
 
+#include "lanes.hpp"
+
 namespace ir {
 
 struct Descent {
-  int iterations, evaluations;
+  int evaluations;
   double value;
 };
 
 inline double inner(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0.0;
-  for (std::size_t k = 0; k < a.size(); ++k) sum += a[k] * b[k];
+  Double8 sums{};
+  std::size_t k = 0;
+  for (; k + 8 <= a.size(); k += 8) sums += load<Double8>(&a[k]) * load<Double8>(&b[k]);
+  double sum = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+  for (; k < a.size(); ++k) sum += a[k] * b[k];
   return sum;
 }
 
 // function(x, gradient) -> value; precondition(v): v <- M^-1 v for a positive definite M near the Hessian. Ends after
-// `most` evaluations, or when ten iterations gain less than `tolerance` of the value.
+// `most` evaluations, when ten iterations gain less than `tolerance` of the value, or where there is no way down (nor
+// where the function is not finite).
 template <class Function, class Precondition>
 Descent descend(std::vector<double>& x, Function&& function, Precondition&& precondition, int most, double tolerance) {
   constexpr std::size_t memory = 16;
@@ -33,9 +39,10 @@ Descent descend(std::vector<double>& x, Function&& function, Precondition&& prec
     double inverse;
   };
   std::vector<Pair> pairs;
+  pairs.reserve(memory);
   std::vector<double> g(size), direction(size), next(size), next_g(size), kept, kept_g, scaled(size), alpha(memory), history;
   double value = function(x, g);
-  Descent done{0, 1, value};
+  Descent done{1, value};
   history.push_back(value);
   while (done.evaluations < most) {
     direction = g;
@@ -87,18 +94,18 @@ Descent descend(std::vector<double>& x, Function&& function, Precondition&& prec
       pairs.clear();
       continue;
     }
-    Pair pair{kept, kept_g, 0.0};
-    for (std::size_t i = 0; i < size; ++i) pair.s[i] -= x[i], pair.y[i] -= g[i];
+    for (std::size_t i = 0; i < size; ++i) next[i] = kept[i] - x[i], next_g[i] = kept_g[i] - g[i];
     x.swap(kept);
     g.swap(kept_g);
     value = kept_value;
-    const double sy = inner(pair.s, pair.y);
-    if (sy > 1e-12 * std::sqrt(inner(pair.s, pair.s) * inner(pair.y, pair.y))) {
-      pair.inverse = 1.0 / sy;
-      if (pairs.size() == memory) pairs.erase(pairs.begin());
-      pairs.push_back(std::move(pair));
+    const double sy = inner(next, next_g);
+    if (sy > 1e-12 * std::sqrt(inner(next, next) * inner(next_g, next_g))) {
+      if (pairs.size() < memory) pairs.push_back({std::vector<double>(size), std::vector<double>(size), 0.0});
+      else std::rotate(pairs.begin(), pairs.begin() + 1, pairs.end());  // the oldest becomes the newest
+      pairs.back().s.swap(next);
+      pairs.back().y.swap(next_g);
+      pairs.back().inverse = 1.0 / sy;
     }
-    ++done.iterations;
     history.push_back(value);
     if (history.size() > patience && history[history.size() - 1 - patience] - value < tolerance * std::fabs(value)) break;
   }

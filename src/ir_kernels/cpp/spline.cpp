@@ -1,8 +1,11 @@
 // Binds the refinement of a motion along a uniform cubic B-spline: see ir_kernels/spline.py.
 #include <pybind11/numpy.h>
 
+#include <memory>
+#include <mutex>
 #include <stdexcept>
 
+#include "bending_metric.hpp"
 #include "bindings.hpp"
 #include "descent.hpp"
 #include "spline_cost.hpp"
@@ -44,54 +47,14 @@ ir::SplineTerms terms_of(const py::object& data) {
   return t;
 }
 
-// How a change of the control points counts: bending costs most, and each joint counts in parts of its speed limit.
-// M = (D'D bending + I holding) / scale^2 for each joint, D the second differences of the m inner control points between
-// fixed ends; a banded Cholesky factor solves with it.
-class Metric {
- public:
-  Metric(int m, std::vector<double> scale, double holding) : m_(m), scale_(std::move(scale)), band_(3 * m) {
-    for (int i = 0; i < m; ++i) {
-      band_[3 * i] = 6.0 + holding - (i == 0) - (i == m - 1);
-      band_[3 * i + 1] = i > 0 ? -4.0 : 0.0;
-      band_[3 * i + 2] = i > 1 ? 1.0 : 0.0;
-    }
-    for (int i = 0; i < m; ++i) {  // in place: diagonal, first and second subdiagonal of the factor
-      double* b = &band_[3 * i];
-      if (i > 1) b[2] /= band_[3 * (i - 2)];
-      if (i > 0) b[1] = (b[1] - (i > 1 ? b[2] * band_[3 * (i - 1) + 1] : 0.0)) / band_[3 * (i - 1)];
-      b[0] = std::sqrt(b[0] - b[1] * b[1] - b[2] * b[2]);
-    }
-  }
-  void solve(std::vector<double>& v) const {
-    const int n = static_cast<int>(scale_.size());
-    for (int j = 0; j < n; ++j) {
-      const auto at = [&](int i) -> double& { return v[static_cast<std::size_t>(i) * n + j]; };
-      for (int i = 0; i < m_; ++i) {
-        if (i > 0) at(i) -= band_[3 * i + 1] * at(i - 1);
-        if (i > 1) at(i) -= band_[3 * i + 2] * at(i - 2);
-        at(i) /= band_[3 * i];
-      }
-      for (int i = m_ - 1; i >= 0; --i) {
-        if (i + 1 < m_) at(i) -= band_[3 * (i + 1) + 1] * at(i + 1);
-        if (i + 2 < m_) at(i) -= band_[3 * (i + 2) + 2] * at(i + 2);
-        at(i) /= band_[3 * i];
-      }
-      for (int i = 0; i < m_; ++i) at(i) *= scale_[j] * scale_[j];
-    }
-  }
-
- private:
-  int m_;
-  std::vector<double> scale_, band_;
-};
-
 class SplineCost {
  public:
   SplineCost(const ir::Model& geometry, const dynamics::Core& drives, const py::object& data)
       : pairs_(geometry.pairs()), n_(drives.model.n), terms_(terms_of(data)), geometry_(geometry), drives_(drives) {
     for (const auto* of : {&terms_.velocity, &terms_.acceleration, &terms_.jerk, &terms_.low, &terms_.high, &terms_.travel})
       if (of->size() != static_cast<std::size_t>(n_)) throw std::invalid_argument("terms have to be (n,)");
-    if (geometry.chain.n != n_ || (pairs_ > 0 && (terms_.threshold.empty() || terms_.threshold.size() % pairs_ != 0)))
+    const std::size_t given = terms_.threshold.size();
+    if (geometry.chain.n != n_ || (pairs_ > 0 ? given == 0 || given % pairs_ != 0 : given != 0))
       throw std::invalid_argument("chain, drives and thresholds don't fit together");
   }
 
@@ -103,14 +66,14 @@ class SplineCost {
     double value, of_interval, energy;
     {
       py::gil_scoped_release released;
-      ir::SplineCost cost(geometry_, drives_, terms_);
-      value = cost(control.data(), static_cast<int>(control.shape(0)), row.data(), interval, to, of_interval);
-      energy = cost.energy;
+      const Borrowed cost(*this);
+      value = (*cost)(control.data(), static_cast<int>(control.shape(0)), row.data(), interval, to, of_interval);
+      energy = cost->energy;
     }
     return py::make_tuple(value, gradient, of_interval, energy);
   }
 
-  // control (K, n) with three equal points at both ends, which stay; new control, interval, value, evaluations
+  // control (K, n), of which three points at both ends stay; new control, interval, value, evaluations
   py::tuple descend(const Array& control, const Rows& row, double interval, bool fixed, int most, double tolerance) const {
     check(control, row);
     const int K = static_cast<int>(control.shape(0)), m = K - 6;
@@ -121,29 +84,28 @@ class SplineCost {
     ir::Descent done;
     {
       py::gil_scoped_release released;
-      ir::SplineCost cost(geometry_, drives_, terms_);
-      const std::size_t size = static_cast<std::size_t>(m) * n_, skip = 3 * static_cast<std::size_t>(n_);
-      std::vector<double> x(all + skip, all + skip + size), slopes(control.size());
+      const Borrowed cost(*this);
+      const std::size_t size = static_cast<std::size_t>(m) * n_;
+      double* inner = all + 3 * static_cast<std::size_t>(n_);
+      std::vector<double> x(inner, inner + size), slopes(control.size());
       x.push_back(0.0);  // logarithm of the interval, relative
-      std::vector<double> scale = terms_.velocity;
-      const Metric metric(m, std::move(scale), holding);
+      const ir::BendingMetric metric(m, terms_.velocity, holding);
       const double first = interval;
       const auto function = [&](const std::vector<double>& at, std::vector<double>& gradient) {
-        std::copy_n(at.begin(), size, all + skip);
+        std::copy_n(at.begin(), size, inner);
         const double now = first * std::exp(at[size]);
         double of_interval;
-        const double value = cost(all, K, row.data(), now, slopes.data(), of_interval);
-        std::copy_n(slopes.begin() + static_cast<long>(skip), size, gradient.begin());
+        const double value = (*cost)(all, K, row.data(), now, slopes.data(), of_interval);
+        std::copy_n(slopes.begin() + 3 * n_, size, gradient.begin());
         gradient[size] = fixed ? 0.0 : of_interval * now;
         return value;
       };
       const auto precondition = [&](std::vector<double>& v) {
-        const double last = v[size];
-        metric.solve(v);
-        v[size] = last * interval_weight;
+        metric.solve(v.data());
+        v[size] *= interval_weight;
       };
       done = ir::descend(x, function, precondition, most, tolerance);
-      std::copy_n(x.begin(), size, all + skip);
+      std::copy_n(x.begin(), size, inner);
       interval = first * std::exp(x[size]);
     }
     return py::make_tuple(result, interval, done.value, done.evaluations);
@@ -153,19 +115,52 @@ class SplineCost {
   static constexpr double interval_weight = 4.0;  // of the logarithm of the interval, against (rad/s)^2
   static constexpr double holding = 0.02;         // against bending
 
+  // A workspace that nobody else uses meanwhile; it is kept for the next call.
+  class Borrowed {
+   public:
+    explicit Borrowed(const SplineCost& from) : from_(from) {
+      {
+        const std::lock_guard<std::mutex> lock(from.busy_);
+        if (!from.idle_.empty()) {
+          cost_ = std::move(from.idle_.back());
+          from.idle_.pop_back();
+        }
+      }
+      if (!cost_) cost_ = std::make_unique<ir::SplineCost>(from.geometry_, from.drives_, from.terms_);
+    }
+    ~Borrowed() {
+      try {
+        const std::lock_guard<std::mutex> lock(from_.busy_);
+        from_.idle_.push_back(std::move(cost_));
+      } catch (...) {  // no memory to keep it
+      }
+    }
+    Borrowed(const Borrowed&) = delete;
+    Borrowed& operator=(const Borrowed&) = delete;
+    ir::SplineCost& operator*() const { return *cost_; }
+    ir::SplineCost* operator->() const { return cost_.get(); }
+
+   private:
+    const SplineCost& from_;
+    std::unique_ptr<ir::SplineCost> cost_;
+  };
+
   void check(const Array& control, const Rows& row) const {
     if (control.ndim() != 2 || control.shape(1) != n_ || control.shape(0) < 4)
       throw std::invalid_argument("control has to be (K, n) with K >= 4");
     if (row.ndim() != 1 || row.shape(0) != control.shape(0) - 3) throw std::invalid_argument("row has to be (K - 3,)");
-    const auto rows = static_cast<std::int32_t>(pairs_ > 0 ? terms_.threshold.size() / pairs_ : 1);
+    if (pairs_ == 0) return;  // nor thresholds
+    const auto rows = static_cast<py::ssize_t>(terms_.threshold.size()) / pairs_;
     for (py::ssize_t k = 0; k < row.size(); ++k)
       if (row.data()[k] < 0 || row.data()[k] >= rows) throw std::invalid_argument("row is out of range");
   }
 
   int pairs_, n_;
-  ir::SplineTerms terms_;
+  const ir::SplineTerms terms_;
   const ir::Model& geometry_;
   const dynamics::Core& drives_;
+  mutable std::mutex busy_;
+  mutable std::vector<std::unique_ptr<ir::SplineCost>> idle_;
 };
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 constexpr int P = SplineCost::samples;
 constexpr double still = 0.02;       // [rad/s] friction and |qd| are smoothed below
 constexpr double ramp = 0.05;        // share of the speed over which a step of the torque limit is smoothed
-constexpr float visit_slack = 2e-5f; // [m] more than floats lose
+constexpr double about = 100.0;      // 1 / rad: a position limit overrun by 0.01 rad counts like a limit used twice
 
 // Weights of the four control points at a place u of an interval, for position and its two derivatives by u.
 struct Basis {
@@ -39,17 +39,18 @@ double sum(const Double8& v) {
   return s;
 }
 
-// Lists, lane by lane, the pairs nearer than their threshold and margin.
+// Lists, lane by lane, the pairs nearer than their threshold and margin; and those that may be, as far as lanes can tell.
 template <class V> struct Within {
   using S = Scalar<V>;
   const Shifts<S>& shift;
   std::vector<int>* hits;
-  IR_INLINE V outside(int) const { return splat<V>(S(visit_slack)); }
-  IR_INLINE V own(std::size_t) const { return splat<V>(S(visit_slack)); }
-  IR_INLINE Float16 farthest(std::size_t) const { return splat<Float16>(static_cast<float>(shift.highest) + visit_slack); }
+  S slack;  // [m] more than the lanes lose
+  IR_INLINE V outside(int) const { return splat<V>(slack); }
+  IR_INLINE V own(std::size_t) const { return splat<V>(slack); }
+  IR_INLINE Float16 farthest(std::size_t) const { return splat<Float16>(static_cast<float>(shift.highest + slack)); }
   IR_INLINE bool done() const { return false; }
   IR_INLINE void take(int z, int, V distance) {
-    for (std::uint32_t left = bits(distance < shift.of[z]); left != 0; left &= left - 1)
+    for (std::uint32_t left = bits(distance < shift.of[z] + slack); left != 0; left &= left - 1)
       hits[__builtin_ctz(left)].push_back(z);
   }
 };
@@ -64,21 +65,30 @@ std::vector<double> widest(const SplineTerms& t, int pairs) {
 
 }  // namespace
 
-SplineCost::SplineCost(const Model& geometry, const dynamics::Core& drives, SplineTerms terms)
-    : model_(geometry), core_(drives), terms_(std::move(terms)), n_(drives.model.n),
-      shift_float_(geometry, widest(terms_, geometry.pairs()).data()),
-      shift_double_(geometry, widest(terms_, geometry.pairs()).data()),
-      placement_float_(geometry), placement_double_(geometry), slope_(n_) {
+SplineCost::SplineCost(const Model& geometry, const dynamics::Core& drives, const SplineTerms& terms)
+    : model_(geometry), core_(drives), terms_(terms), n_(drives.model.n), widest_(widest(terms, geometry.pairs())),
+      shift_float_(geometry, widest_.data()), shift_double_(geometry, widest_.data()), placement_float_(geometry),
+      placement_double_(geometry), slope_(n_) {
+  smooth_envelope();
+}
+
+// The torque limits as sums of bends: continuous, as the step at the first speed becomes a ramp below it, which stays
+// within the envelope where that falls.
+void SplineCost::smooth_envelope() {
   const int knots = core_.envelope.knots();
-  for (int j = 0; j < n_; ++j) {  // continuous and never above the envelope: the step at its first speed becomes a ramp
+  bends_ = knots > 0 ? knots + 1 : 0;
+  for (int j = 0; j < n_; ++j) {
     const double *v = core_.envelope.speeds(j), *t = core_.envelope.torques(j);
+    const bool step = knots > 0 && v[0] > 0.0;
+    standing_.push_back(knots > 0 && !step ? t[1] : t[0]);
+    if (knots == 0) continue;
     double slope = 0.0;
     const auto bend = [&](double at, double now) {
       bend_at_.push_back(at);
       bend_.push_back(now - slope);
       slope = now;
     };
-    bend(v[0] * (1 - ramp), (t[1] - t[0]) / (v[0] * ramp));
+    bend(v[0] * (1 - ramp), step ? (t[1] - t[0]) / (v[0] * ramp) : 0.0);
     for (int k = 1; k < knots; ++k) bend(v[k - 1], (t[k + 1] - t[k]) / (v[k] - v[k - 1]));
     bend(v[knots - 1], 0.0);
   }
@@ -91,61 +101,28 @@ double SplineCost::operator()(const double* control, int K, const std::int32_t* 
   count_ = intervals * P;
   of_step_ = 0.0;
   std::fill_n(gradient, static_cast<std::size_t>(K) * n_, 0.0);
-  of_interval = 0.0;
-  sample(control);
-  for (Group& g : groups_)
-    for (int j = 0; j < n_; ++j) {
-      const double per = 1.0 / interval;
-      g.qd[j] *= per;
-      g.qdd[j] *= per * per;
-    }
-  double value = drives(interval);
+  sample(control, interval);
+  double value = drives(step);
   value += bus(step);
-  value += clearance(row, step, of_step_);
-  // torques backwards; then what the times between knots do to speeds and accelerations
-  const auto& arm = core_.model;
-  for (std::size_t k = 0; k < groups_.size(); ++k) {
-    Group& g = groups_[k];
-    Lane of_power{};
-    for (int l = 0; l < 8; ++l) of_power[l] = 8 * k + l < static_cast<std::size_t>(count_) ? of_power_[8 * k + l] : 0.0;
-    for (int j = 0; j < n_; ++j) {
-      const auto& d = arm.drive[j];
-      Lane w = of_power;
-      if (terms_.regeneration == dynamics::Regeneration::kNone) w = g.power[j] > 0.0 ? w : Lane{};
-      g.of_tau[j] += w * (g.qd[j] + 2.0 * d.copper_at_joint * g.tau[j]);
-      g.of_qd[j] += w * g.tau[j];
-      const Lane root = g.qd[j] * g.qd[j] + still * still;
-      g.of_qd[j] += g.of_tau[j] * (d.viscous + d.coulomb * still * still / (root * sqrt(root)));
-      g.of_qdd[j] += g.of_tau[j] * d.rotor;
-    }
-    const int b = arm.balance.joint;
-    if (b >= 0) {
-      using Dual = dynamics::Dual<Lane>;
-      const Dual s{g.s[b], g.c[b]}, c{g.c[b], -g.s[b]};
-      g.of_q[b] -= g.of_tau[b] * dynamics::balance_torque(arm.balance, s, c).d;
-    }
-    dynamics::newton_euler_adjoint(arm, g.s, g.c, g.qd, g.link, g.of_tau, g.of_q, g.of_qd, g.of_qdd);
-    Lane slower{};
-    for (int j = 0; j < n_; ++j) slower += g.of_qd[j] * g.qd[j] + 2.0 * g.of_qdd[j] * g.qdd[j];
-    of_interval -= sum(slower) / interval;
-  }
-  scatter(intervals, interval, gradient);
-  of_interval += of_step_ / P + terms_.time_value * intervals;
+  value += clearance(row, step);
+  of_interval = -slower() / interval + of_step_ / P + terms_.time_value * intervals;
   value += terms_.time_value * intervals * interval;
+  scatter(interval, gradient);
   return value + knots(control, intervals, interval, gradient, of_interval);
 }
 
-// Joint values and their derivatives by u of all samples; nothing is counted yet.
-void SplineCost::sample(const double* control) {
+// Joint values, speeds and accelerations of all samples; lanes without a sample repeat the last one.
+void SplineCost::sample(const double* control, double interval) {
   groups_.resize((count_ + 7) / 8);
   q_.resize(static_cast<std::size_t>(count_) * n_);
   const Basis* at = bases();
+  const double per = 1.0 / interval;
   for (std::size_t k = 0; k < groups_.size(); ++k) {
     Group& g = groups_[k];
     for (int l = 0; l < 8; ++l) {
       const int wanted = static_cast<int>(8 * k) + l, i = std::min(wanted, count_ - 1);
       const Basis& b = at[i % P];
-      const double* c = control + (i / P) * n_;
+      const double* c = control + static_cast<std::size_t>(i / P) * n_;
       g.counts[l] = wanted < count_;
       for (int j = 0; j < n_; ++j) {
         double v[3];
@@ -155,15 +132,17 @@ void SplineCost::sample(const double* control) {
         q_[static_cast<std::size_t>(i) * n_ + j] = v[0];
       }
     }
-    for (int j = 0; j < n_; ++j) g.of_q[j] = g.of_qd[j] = g.of_qdd[j] = g.of_tau[j] = Lane{};
+    for (int j = 0; j < n_; ++j) {
+      g.qd[j] *= per;
+      g.qdd[j] *= per * per;
+      g.of_q[j] = g.of_qdd[j] = Lane{};
+    }
   }
 }
 
 // Torques, their penalties and those of speed; the powers.
-double SplineCost::drives(double interval) {
+double SplineCost::drives(double step) {
   const auto& arm = core_.model;
-  const double step = interval / P;
-  const int bends = core_.envelope.knots() + 1;
   Lane cost{}, of_step{};
   for (Group& g : groups_) {
     for (int j = 0; j < n_; ++j) sincos(g.q[j] + arm.joint[j].theta0, g.s[j], g.c[j]);
@@ -177,9 +156,9 @@ double SplineCost::drives(double interval) {
       const Lane v = g.qd[j], speed = abs(v), root = sqrt(v * v + still * still);
       g.tau[j] += g.qdd[j] * d.rotor + v * d.viscous + d.coulomb * v / root;
       g.power[j] = g.tau[j] * v + d.copper_at_joint * g.tau[j] * g.tau[j];
-      Lane limit = splat<Lane>(core_.envelope.torques(j)[0]), falls{};
-      for (int k = 0; k < bends; ++k) {
-        const double at = bend_at_[j * bends + k], by = bend_[j * bends + k];
+      Lane limit = splat<Lane>(standing_[j]), falls{};
+      for (int k = 0; k < bends_; ++k) {
+        const double at = bend_at_[j * bends_ + k], by = bend_[j * bends_ + k];
         const Lane over = speed - at;
         limit += over > 0.0 ? by * over : Lane{};
         falls += over > 0.0 ? splat<Lane>(by) : Lane{};
@@ -222,21 +201,29 @@ double SplineCost::bus(double step) {
     for (int k = 0; k < count_; ++k) energy += power_[k] * step;
     std::fill(of_power_.begin(), of_power_.end(), 1.0);
   } else {
-    // of_power_ first says what a joule in this sample does: 1 drawn, 2 through the capacitor, 0 burnt, -1 fed back
+    // of_power_ first says where a joule of this sample comes from: 1 the mains (or goes back there), 2 the capacitor, 0
+    // nowhere, as one is burnt less
     double stored = 0.0;
     for (int k = 0; k < count_; ++k) {
-      const double wanted = power_[k] * step;
-      if (wanted > stored) energy += wanted - stored, stored = 0.0, of_power_[k] = 1.0;
-      else if (wanted < stored - terms_.capacity) {
-        if (terms_.regeneration == Regeneration::kFedBack) energy += wanted - (stored - terms_.capacity), of_power_[k] = -1.0;
+      const double wanted = power_[k] * step, full = stored - terms_.capacity;
+      if (wanted > stored) {
+        energy += wanted - stored;
+        stored = 0.0;
+        of_power_[k] = 1.0;
+      } else if (wanted < full) {
+        const bool returns = terms_.regeneration == Regeneration::kFedBack;
+        if (returns) energy += wanted - full;
         stored = terms_.capacity;
-      } else stored -= wanted, of_power_[k] = 2.0;
+        of_power_[k] = returns ? 1.0 : 0.0;
+      } else {
+        stored -= wanted;
+        of_power_[k] = 2.0;
+      }
     }
-    double of_stored = 0.0;  // what a joule more in the capacitor is worth from here on
+    double of_stored = 0.0;  // what a joule more in the capacitor costs from here on
     for (int k = count_ - 1; k >= 0; --k) {
       if (of_power_[k] == 2.0) of_power_[k] = -of_stored;
-      else if (of_power_[k] == 0.0) of_stored = 0.0;
-      else of_stored = -1.0, of_power_[k] = 1.0;  // drawn and fed back alike: a stored joule is one drawn less
+      else of_stored = -of_power_[k];
     }
   }
   const double worth = terms_.energy_value;
@@ -251,12 +238,12 @@ double SplineCost::bus(double step) {
 
 template <class V>
 double SplineCost::clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>& shift, const std::int32_t* row,
-                                double step, double& of_step) {
+                                double step) {
   constexpr int width = Lanes<V>::width;
   const std::size_t pairs = model_.pairs();
   const double* rows[width];
   double cost = 0.0;
-  Within<V> within{shift, hits_};
+  Within<V> within{shift, hits_, static_cast<Scalar<V>>(width == 16 ? model_.float_margin : 1e-9)};
   for (int first = 0; first < count_; first += width) {
     const int used = std::min(width, count_ - first);
     for (int l = 0; l < used; ++l) rows[l] = &q_[static_cast<std::size_t>(first + l) * n_];
@@ -284,7 +271,7 @@ double SplineCost::clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>
           if (!(lacks > 0.0)) continue;
           const double penalty = terms_.clearance_penalty * lacks * lacks;
           cost += penalty * step;
-          of_step += penalty;
+          of_step_ += penalty;
           const double weight = 2.0 * terms_.clearance_penalty * step * lacks / terms_.clearance_scale;
           for (int j = 0; j < n_; ++j) groups_[k / 8].of_q[j][k % 8] -= weight * slope_[j][l];
         }
@@ -294,16 +281,50 @@ double SplineCost::clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>
   return cost;
 }
 
-double SplineCost::clearance(const std::int32_t* row, double step, double& of_step) {
-  if (model_.wide) return clearance_in(placement_double_, shift_double_, row, step, of_step);
-  return clearance_in(placement_float_, shift_float_, row, step, of_step);
+double SplineCost::clearance(const std::int32_t* row, double step) {
+  if (model_.pairs() == 0) return 0.0;
+  if (model_.wide) return clearance_in(placement_double_, shift_double_, row, step);
+  return clearance_in(placement_float_, shift_float_, row, step);
+}
+
+// From powers and torques back to positions, speeds and accelerations. Returns what the cost gains from a motion that is
+// slower, per relative change of the time between knots.
+double SplineCost::slower() {
+  const auto& arm = core_.model;
+  double gain = 0.0;
+  for (std::size_t k = 0; k < groups_.size(); ++k) {
+    Group& g = groups_[k];
+    Lane of_power{};
+    for (int l = 0; l < 8; ++l) of_power[l] = 8 * k + l < static_cast<std::size_t>(count_) ? of_power_[8 * k + l] : 0.0;
+    for (int j = 0; j < n_; ++j) {
+      const auto& d = arm.drive[j];
+      Lane w = of_power;
+      if (terms_.regeneration == dynamics::Regeneration::kNone) w = g.power[j] > 0.0 ? w : Lane{};
+      g.of_tau[j] += w * (g.qd[j] + 2.0 * d.copper_at_joint * g.tau[j]);
+      g.of_qd[j] += w * g.tau[j];
+      const Lane root = g.qd[j] * g.qd[j] + still * still;
+      g.of_qd[j] += g.of_tau[j] * (d.viscous + d.coulomb * still * still / (root * sqrt(root)));
+      g.of_qdd[j] += g.of_tau[j] * d.rotor;
+    }
+    const int b = arm.balance.joint;
+    if (b >= 0) {
+      using Dual = dynamics::Dual<Lane>;
+      const Dual s{g.s[b], g.c[b]}, c{g.c[b], -g.s[b]};
+      g.of_q[b] -= g.of_tau[b] * dynamics::balance_torque(arm.balance, s, c).d;
+    }
+    dynamics::newton_euler_adjoint(arm, g.s, g.c, g.qd, g.link, g.of_tau, g.of_q, g.of_qd, g.of_qdd);
+    Lane lane_gain{};
+    for (int j = 0; j < n_; ++j) lane_gain += g.of_qd[j] * g.qd[j] + 2.0 * g.of_qdd[j] * g.qdd[j];
+    gain += sum(lane_gain);
+  }
+  return gain;
 }
 
 // From samples to control points.
-void SplineCost::scatter(int intervals, double interval, double* gradient) const {
+void SplineCost::scatter(double interval, double* gradient) const {
   const Basis* at = bases();
   const double per = 1.0 / interval;
-  for (int k = 0; k < intervals * P; ++k) {
+  for (int k = 0; k < count_; ++k) {
     const Group& g = groups_[k / 8];
     const Basis& b = at[k % P];
     double* to = gradient + static_cast<std::size_t>(k / P) * n_;
@@ -315,40 +336,47 @@ void SplineCost::scatter(int intervals, double interval, double* gradient) const
 }
 
 // Accelerations at the knots (linear between), jerk of each interval (constant), positions by the control points.
-double SplineCost::knots(const double* control, int intervals, double interval, double* gradient, double& of_interval) {
+double SplineCost::knots(const double* control, int intervals, double interval, double* gradient,
+                         double& of_interval) const {
   const double second = 1.0 / (interval * interval), third = second / interval, weight = terms_.penalty * interval;
-  constexpr double about = 100.0;  // 1 / rad: a position limit overrun by 0.01 rad counts like a limit used twice
   double cost = 0.0;
+  // a derivative of order `order`, beyond its limit; returns what the cost gains per unit of it
+  const auto beyond = [&](double derivative, double limit, int order) {
+    const double over = std::fabs(derivative) / limit - 1.0;
+    const double slope = std::copysign(2.0 * weight * over / limit, derivative);
+    cost += weight * over * over;
+    of_interval += terms_.penalty * over * over - order * slope * derivative / interval;
+    return slope;
+  };
   for (int i = 0; i < intervals; ++i) {
     const double* c = control + static_cast<std::size_t>(i) * n_;
     double* g = gradient + static_cast<std::size_t>(i) * n_;
     for (int j = 0; j < n_; ++j) {
       const double jerk = (c[3 * n_ + j] - 3 * c[2 * n_ + j] + 3 * c[n_ + j] - c[j]) * third;
-      double over = std::fabs(jerk) / terms_.jerk[j] - 1.0;
-      if (over > 0.0) {
-        const double slope = 2.0 * weight * over / terms_.jerk[j] * (jerk > 0 ? 1.0 : -1.0);
-        cost += weight * over * over;
-        of_interval += terms_.penalty * over * over - 3.0 * slope * jerk / interval;
-        g[3 * n_ + j] += slope * third, g[2 * n_ + j] -= 3 * slope * third;
-        g[n_ + j] += 3 * slope * third, g[j] -= slope * third;
-      }
-      if (i == 0) continue;
-      const double acceleration = (c[2 * n_ + j] - 2 * c[n_ + j] + c[j]) * second;
-      over = std::fabs(acceleration) / terms_.acceleration[j] - 1.0;
-      if (over > 0.0) {
-        const double slope = 2.0 * weight * over / terms_.acceleration[j] * (acceleration > 0 ? 1.0 : -1.0);
-        cost += weight * over * over;
-        of_interval += terms_.penalty * over * over - 2.0 * slope * acceleration / interval;
-        g[2 * n_ + j] += slope * second, g[n_ + j] -= 2 * slope * second, g[j] += slope * second;
-      }
-      over = std::max(terms_.low[j] - c[n_ + j], c[n_ + j] - terms_.high[j]) * about;
-      if (over > 0.0) {
-        cost += weight * over * over;
-        of_interval += terms_.penalty * over * over;
-        g[n_ + j] += 2.0 * weight * over * about * (c[n_ + j] > terms_.high[j] ? 1.0 : -1.0);
-      }
+      if (!(std::fabs(jerk) > terms_.jerk[j])) continue;
+      const double slope = beyond(jerk, terms_.jerk[j], 3) * third;
+      g[3 * n_ + j] += slope, g[2 * n_ + j] -= 3 * slope, g[n_ + j] += 3 * slope, g[j] -= slope;
     }
   }
+  for (int i = 0; i <= intervals; ++i) {
+    const double* c = control + static_cast<std::size_t>(i) * n_;
+    double* g = gradient + static_cast<std::size_t>(i) * n_;
+    for (int j = 0; j < n_; ++j) {
+      const double acceleration = (c[2 * n_ + j] - 2 * c[n_ + j] + c[j]) * second;
+      if (!(std::fabs(acceleration) > terms_.acceleration[j])) continue;
+      const double slope = beyond(acceleration, terms_.acceleration[j], 2) * second;
+      g[2 * n_ + j] += slope, g[n_ + j] -= 2 * slope, g[j] += slope;
+    }
+  }
+  for (int i = 0; i < intervals + 3; ++i)
+    for (int j = 0; j < n_; ++j) {
+      const std::size_t at = static_cast<std::size_t>(i) * n_ + j;
+      const double over = std::max(terms_.low[j] - control[at], control[at] - terms_.high[j]) * about;
+      if (!(over > 0.0)) continue;
+      cost += weight * over * over;
+      of_interval += terms_.penalty * over * over;
+      gradient[at] += std::copysign(2.0 * weight * over * about, control[at] - terms_.high[j]);
+    }
   return cost;
 }
 

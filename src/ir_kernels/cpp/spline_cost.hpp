@@ -18,11 +18,13 @@ struct SplineTerms {
   double clearance_margin, clearance_scale, penalty, clearance_penalty;
 };
 
+// Workspace of one thread: evaluates one motion after the other without allocating again.
 class SplineCost {
  public:
   static constexpr int samples = 2;  // per interval between knots
 
-  SplineCost(const Model& geometry, const dynamics::Core& drives, SplineTerms terms);
+  // All three have to outlive it; terms.threshold empty where there are no pairs.
+  SplineCost(const Model& geometry, const dynamics::Core& drives, const SplineTerms& terms);
 
   // control (K, n) with K - 3 intervals of `interval` s; row (K - 3): which thresholds hold. Returns the cost; fills
   // gradient (K, n) and of_interval.
@@ -41,22 +43,26 @@ class SplineCost {
     dynamics::LinkTrace<Lane> link[dynamics::kMaxJoints];
     Lane counts;  // 1 where the lane is a sample
   };
-  void sample(const double* control);
-  double drives(double interval);
+  void smooth_envelope();
+  void sample(const double* control, double interval);
+  double drives(double step);
   double bus(double step);
-  double knots(const double* control, int intervals, double interval, double* gradient, double& of_interval);
-  double clearance(const std::int32_t* row, double step, double& of_step);
-  void scatter(int intervals, double interval, double* gradient) const;
+  double clearance(const std::int32_t* row, double step);
+  double slower();
+  double knots(const double* control, int intervals, double interval, double* gradient, double& of_interval) const;
+  void scatter(double interval, double* gradient) const;
 
   const Model& model_;
   const dynamics::Core& core_;
-  SplineTerms terms_;
-  int n_, count_ = 0;
-  double of_step_ = 0.0;
-  std::vector<double> bend_at_, bend_;  // (n, knots + 2): where the smoothed torque limit changes its slope, by how much
+  const SplineTerms& terms_;
+  int n_, count_ = 0, bends_ = 0;  // joints, samples, bends of each torque limit
+  double of_step_ = 0.0;           // derivative of what is summed over time, by the time between samples
+  std::vector<double> standing_;   // (n) torque limit at rest
+  std::vector<double> bend_at_, bend_;  // (n, bends): speeds at which the smoothed limit changes its slope, by how much
   std::vector<Group> groups_;
   std::vector<double> power_, of_power_, q_;  // (N), (N), (N, n)
   // clearance
+  std::vector<double> widest_;  // (pairs) the largest threshold of all rows, with the margin
   Shifts<float> shift_float_;
   Shifts<double> shift_double_;
   Placement<Float16> placement_float_;
@@ -64,7 +70,7 @@ class SplineCost {
   std::vector<int> hits_[16];
   std::vector<Lane> slope_;
   template <class V> double clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>& shift,
-                                         const std::int32_t* row, double step, double& of_step);
+                                         const std::int32_t* row, double step);
 };
 
 }  // namespace ir

@@ -1,5 +1,5 @@
 """Batch functions over arrays: kinematics, exact distances, certified motion, path search, dynamics,
-inverse kinematics.
+inverse kinematics, motions along splines.
 """
 
 from ir_kernels.ccd import CcdResult, CcdSettings, ccd
@@ -21,7 +21,7 @@ from ir_kernels.inverse_kinematics import IkSet, SphericalWristIk
 from ir_kernels.limits import Extrema, MotionExtrema, motion_extrema, polynomial_extrema
 from ir_kernels.power import DcBus, DcBusParameters, DriveEnergy, dc_bus, drive_energy
 from ir_kernels.search import BidirectionalTree
-from ir_kernels.spline import SplineCost, SplineTerms
+from ir_kernels.spline import SplineCost, SplineDescent, SplineTerms, SplineValue
 from ir_kernels.torque_bounds import EXCEEDS, WITHIN, TorqueBounds
 
 __all__ = [
@@ -53,7 +53,9 @@ __all__ = [
     "Pair",
     "SphericalWristIk",
     "SplineCost",
+    "SplineDescent",
     "SplineTerms",
+    "SplineValue",
     "TorqueBounds",
     "Witnesses",
     "ccd",

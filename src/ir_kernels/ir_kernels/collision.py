@@ -96,7 +96,7 @@ class CollisionModel:
         self.chain = chain
         self._geometry: Geometry = geometry(chain, capsules, bodies, self_pairs, ignored_pairs)
         self.pairs: tuple[Pair, ...] = self._geometry.pairs
-        self._core = _core(self._geometry)
+        self._core = core_of(self._geometry, compiled.MODULE)
 
     def _per_pair(self, value: ArrayLike, name: str) -> FloatArray:
         """`value` for every pair: one number, or (Z,); -inf is allowed, NaN and +inf aren't."""
@@ -175,14 +175,14 @@ class CollisionModel:
         return Certificate(verdict, (begin, end), pair, bound)
 
 
-def _core(geometry: Geometry) -> Any:
-    """The compiled model, or the one in NumPy."""
-    if compiled.MODULE is None:
+def core_of(geometry: Geometry, module: Any) -> Any:
+    """The model of one compiled module, or the one in NumPy where that is None."""
+    if module is None:
         from ir_kernels.reference.model import Model  # half of the import time, for those who need it
 
         return Model(geometry)
     chain, capsules, scene = geometry.chain, geometry.capsules, geometry.scene
-    return compiled.MODULE.Model(
+    return module.Model(
         chain.joint_origin,
         chain.joint_axis,
         chain.base_pose,

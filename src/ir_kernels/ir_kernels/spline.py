@@ -1,14 +1,15 @@
 """Motions along uniform cubic B-splines: what they cost, and the descent to cheaper ones.
 
-q(t) follows control points c_0 .. c_{K-1} with `interval` seconds between knots; three equal points at an end mean
-rest there. The cost is
+q(t) follows control points c_0 .. c_{K-1} with `interval` seconds between knots; three equal points at an end
+mean rest there. The cost is
 
     energy_value E + time_value T + sum_j travel_j int |qd_j| dt + penalties
 
-with E the drives' energy at the mains over the common DC bus. What exceeds a bound is punished by the square of its
-relative excess over time: speed, torque (of its share of the envelope) at samples, acceleration at the knots, jerk
-between them, position by the control points; and clearance, for every pair nearer than its threshold and
-`clearance_margin`, in units of `clearance_scale`. Nothing here is a proof: see CollisionModel.certify_trajectory and
+with E the drives' energy at the mains over the common DC bus. What exceeds a bound is punished by the square
+of its relative excess over time: speed, torque (of its share of the envelope) at samples, acceleration at the
+knots, jerk between them, position by the control points; and clearance, for every pair nearer than its
+threshold and `clearance_margin`, in units of `clearance_scale`. Near standstill friction and |qd| are
+smoothed, so that the cost has derivatives. Nothing here is a proof: see CollisionModel.certify_trajectory and
 DynamicsModel.torque_bounds.
 """
 
@@ -18,23 +19,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ir_kernels import compiled
-from ir_kernels.collision import CollisionModel
+from ir_kernels import arguments, compiled, data
+from ir_kernels.collision import CollisionModel, core_of
 from ir_kernels.dynamics import DynamicsModel
-from ir_kernels.power import Regeneration
+from ir_kernels.errors import InputError
+from ir_kernels.power import REGENERATIONS, Regeneration
 
 FloatArray = NDArray[np.float64]
 RowArray = NDArray[np.int32]
+SAME_CHAIN = 1e-5  # m, or of a unit vector: what the chains of two models of one robot may differ by
+MOST_EVALUATIONS = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
 class SplineTerms:
     """What a motion is judged by; n joints, Z pairs.
 
-    velocity, acceleration, jerk, low, high (n,): bounds, rad and s. travel (n,): cost per rad. threshold (R, Z) m: rows
-    of safety distances, each interval of a spline says which row holds. torque_share: of the envelope. energy_value:
-    cost per joule; time_value: per second. capacity_energy [J] and regeneration: see DcBusParameters.
-    clearance_margin, clearance_scale [m]. penalty, clearance_penalty: cost per second of a relative excess of 1.
+    velocity, acceleration, jerk, low, high (n,): bounds, rad and s. travel (n,): cost per rad. threshold
+    (R, Z) m: rows of safety distances, each interval of a spline says which row holds; -inf leaves a pair
+    out. torque_share: of the envelope. energy_value: cost per joule; time_value: per second. capacity_energy
+    [J] and regeneration: see DcBusParameters. clearance_margin, clearance_scale [m]. penalty,
+    clearance_penalty: cost per second of a relative excess of 1.
     """
 
     velocity: FloatArray
@@ -57,7 +62,9 @@ class SplineTerms:
 
 @dataclass(frozen=True, eq=False)
 class SplineValue:
-    """Cost; gradient (K, n) by the control points; derivative by the interval; energy [J] at the mains of the axes."""
+    """Cost; gradient (K, n) by the control points; derivative by the interval; energy [J] of the axes at the
+    mains.
+    """
 
     value: float
     gradient: FloatArray
@@ -76,16 +83,44 @@ class SplineDescent:
 
 
 class SplineCost:
-    """Cost of motions of one robot with its load in one scene, and the descent on it. Immutable."""
+    """Cost of motions of one robot with its load in one scene, and the descent on it. Immutable.
 
-    def __init__(self, collision: CollisionModel, dynamics: DynamicsModel, terms: SplineTerms) -> None:
+    Raises InputError for terms that make no sense, and for a chain that isn't the one of the dynamics.
+    Several threads may use one object at once; the compiled core doesn't hold up others.
+    """
+
+    def __init__(
+        self,
+        collision: CollisionModel,
+        dynamics: DynamicsModel,
+        terms: SplineTerms,
+        *,
+        core: Any = compiled.MODULE,
+    ) -> None:
         self.n = dynamics.n
-        self._core: Any = compiled.MODULE.SplineCost(collision._core, dynamics._core, terms)
+        _same_chain(collision, dynamics)
+        kept = _checked_terms(terms, self.n, len(collision.pairs))
+        self._rows = len(kept.threshold)
+        if core is None:
+            from ir_kernels.reference.spline import SplineCost as Reference
+
+            self._core: Any = Reference(collision._geometry, dynamics.data, kept)
+            return
+        scene, drives = collision._core, dynamics._core
+        if not isinstance(scene, core.Model):
+            scene = core_of(collision._geometry, core)
+        if not isinstance(drives, core.Dynamics):
+            drives = core.Dynamics(dynamics.data)
+        self._core = core.SplineCost(scene, drives, kept)
 
     def value(self, control: ArrayLike, interval: float, row: ArrayLike | None = None) -> SplineValue:
-        """Cost and derivatives of a spline (K, n), K >= 4; row (K - 3,): of the thresholds, None: the first."""
-        points, rows = self._checked(control, row)
-        return SplineValue(*self._core.value(points, rows, float(interval)))
+        """Cost and derivatives of a spline (K, n), K >= 4; row (K - 3,): of the thresholds, None: the first.
+
+        Raises InputError. Numbers so large that the cost overflows make it inf or nan.
+        """
+        points, rows = self._checked(control, row, 4)
+        seconds = _number("interval", interval, 0.0, above=True)
+        return SplineValue(*self._core.value(points, rows, seconds))
 
     def descend(
         self,
@@ -97,16 +132,111 @@ class SplineCost:
         evaluations: int = 100,
         tolerance: float = 1e-4,
     ) -> SplineDescent:
-        """Go down from a spline (K, n), K >= 7, at rest at both ends, which stay.
+        """Go down from a spline (K, n), K >= 7, at rest at both ends, which stay: three points at each.
 
-        L-BFGS with a metric in which bending counts; the interval changes too unless `fixed_interval`. Ends after
-        `evaluations`, or when ten steps gain less than `tolerance` of the cost. Deterministic.
+        L-BFGS with a metric in which bending counts; the interval changes too unless `fixed_interval`. Ends
+        after `evaluations`, or when ten steps gain less than `tolerance` of the cost; at once where the cost
+        is not finite. Deterministic. Raises InputError.
         """
-        points, rows = self._checked(control, row)
-        found = self._core.descend(points, rows, float(interval), fixed_interval, evaluations, tolerance)
-        return SplineDescent(*found)
+        points, rows = self._checked(control, row, 7)
+        seconds = _number("interval", interval, 0.0, above=True)
+        gain = _number("tolerance", tolerance, 0.0)
+        if isinstance(evaluations, bool) or not isinstance(evaluations, int | np.integer) or evaluations < 1:
+            raise InputError(f"evaluations is {evaluations!r}: expected a whole number of at least 1")
+        most = min(int(evaluations), MOST_EVALUATIONS)
+        return SplineDescent(*self._core.descend(points, rows, seconds, bool(fixed_interval), most, gain))
 
-    def _checked(self, control: ArrayLike, row: ArrayLike | None) -> tuple[FloatArray, RowArray]:
-        points = np.ascontiguousarray(control, dtype=np.float64)
-        rows = np.zeros(max(len(points) - 3, 0), np.int32) if row is None else np.asarray(row, np.int32)
-        return points, rows
+    def _checked(self, control: ArrayLike, row: ArrayLike | None, fewest: int) -> tuple[FloatArray, RowArray]:
+        points = data.array(control, "control", (None, self.n))
+        if len(points) < fewest:
+            raise InputError(f"control has shape {points.shape}: expected (K, {self.n}) with K >= {fewest}")
+        count = len(points) - 3
+        if row is None:
+            return points, np.zeros(count, np.int32)
+        return points, data.indices(row, "row", (count,), self._rows).astype(np.int32)
+
+
+def _number(name: str, value: Any, least: float, most: float = np.inf, *, above: bool = False) -> float:
+    """`value` as a finite float within least and most, not least itself where `above`; or InputError."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    fits = np.isfinite(number) and least <= number <= most and not (above and number == least)
+    if not fits:
+        bound = f"{'above' if above else 'at least'} {least:g}" + (
+            f" and at most {most:g}" if most < np.inf else ""
+        )
+        raise InputError(f"{name} is {value!r}: expected a finite number {bound}")
+    return number
+
+
+def _same_chain(collision: CollisionModel, dynamics: DynamicsModel) -> None:
+    """Raise InputError unless both models are of one chain."""
+    chain, other = collision.chain, dynamics.data
+    if chain.n != other.n:
+        raise InputError(f"collision has {chain.n} joints, dynamics {other.n}: expected models of one robot")
+    off = max(
+        float(np.abs(chain.joint_origin - other.origin).max()),
+        float(np.abs(chain.joint_axis - other.axis).max()),
+    )
+    if off > SAME_CHAIN:
+        raise InputError(
+            f"the chains of collision and dynamics differ by {off:.2g}: expected models of one robot"
+        )
+
+
+def _copy(value: ArrayLike) -> Any:
+    """The same numbers, contiguous, where nobody else writes; what is no array is left to the checks."""
+    return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def _checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
+    """The terms as contiguous arrays and floats, or InputError naming the one that makes no sense."""
+    names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
+    arrays: dict[str, Any] = {
+        name: data.array(_copy(getattr(terms, name)), f"terms.{name}", (n,)) for name in names
+    }
+    for name in names[:3]:
+        if (arrays[name] <= 0.0).any():
+            raise InputError(f"terms.{name} holds {arrays[name].min()}: bounds have to be above 0")
+    if (arrays["low"] > arrays["high"]).any():
+        j = int(np.argmax(arrays["low"] > arrays["high"]))
+        raise InputError(f"terms.low[{j}] is {arrays['low'][j]}, above terms.high[{j}] {arrays['high'][j]}")
+    if (arrays["travel"] < 0.0).any():
+        raise InputError(f"terms.travel holds {arrays['travel'].min()}: a cost per rad can't be negative")
+    if terms.regeneration not in REGENERATIONS:
+        raise InputError(
+            f"terms.regeneration is {terms.regeneration!r}: known are {', '.join(REGENERATIONS)}"
+        )
+    free = (
+        "energy_value",
+        "time_value",
+        "capacity_energy",
+        "clearance_margin",
+        "penalty",
+        "clearance_penalty",
+    )
+    numbers: dict[str, Any] = {name: _number(f"terms.{name}", getattr(terms, name), 0.0) for name in free}
+    return SplineTerms(
+        **arrays,
+        **numbers,
+        threshold=_thresholds(terms.threshold, pairs),
+        torque_share=_number("terms.torque_share", terms.torque_share, 0.0, 1.0, above=True),
+        clearance_scale=_number("terms.clearance_scale", terms.clearance_scale, 0.0, above=True),
+        regeneration=terms.regeneration,
+    )
+
+
+def _thresholds(value: ArrayLike, pairs: int) -> FloatArray:
+    """(R, Z), R >= 1; without pairs there is nothing to read."""
+    name = "terms.threshold"
+    if pairs == 0:
+        rows = np.shape(value)
+        if len(rows) != 2 or rows[0] == 0 or rows[1] != 0:
+            raise InputError(f"{name} has shape {rows}: expected (R, 0), there are no pairs")
+        return np.zeros(rows)
+    limits = arguments.shaped(name, _copy(value), None, pairs)
+    if np.isnan(limits).any() or (limits == np.inf).any():
+        raise InputError(f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair")
+    return limits

@@ -1,0 +1,238 @@
+"""What a motion along a uniform cubic B-spline costs, with its derivatives: the oracle of the compiled core.
+
+Each interval between knots is sampled at the middles of SAMPLES equal parts. There the drives are looked at
+(torque, speed, power) and the clearance; accelerations at the knots, jerks between them and positions by the
+control points. Derivatives go backwards: by the samples' q, qd, qdd first, then by the control points and by
+the interval.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ir_kernels.data import FloatArray, IntArray
+from ir_kernels.dynamics_data import DynamicsData
+from ir_kernels.geometry import Geometry
+from ir_kernels.reference import collision, dynamics
+from ir_kernels.reference.descent import bending_metric, descend
+
+if TYPE_CHECKING:
+    from ir_kernels.spline import SplineTerms
+
+SAMPLES = 2  # per interval
+STILL = 0.02  # [rad/s] friction and |qd| are smoothed below
+RAMP = 0.05  # share of the speed over which the step of the torque limit is smoothed
+ABOUT = 100.0  # 1 / rad: a position limit overrun by 0.01 rad counts like a limit used twice
+INTERVAL_WEIGHT = 4.0  # of the logarithm of the interval in the metric, against (rad/s)^2
+HOLDING = 0.02  # against bending
+
+
+@dataclass
+class Samples:
+    """q, qd, qdd (N, n) at N places, and derivatives of the cost by them and by the time between two."""
+
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+    of_q: FloatArray
+    of_qd: FloatArray
+    of_qdd: FloatArray
+    of_step: float = 0.0
+
+
+def basis() -> FloatArray:
+    """(3, SAMPLES, 4): weights of an interval's control points for position and two derivatives by u."""
+    u = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    v = 1.0 - u
+    position = [v**3 / 6, (3 * u**3 - 6 * u**2 + 4) / 6, (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6, u**3 / 6]
+    first = [-(v**2) / 2, (3 * u**2 - 4 * u) / 2, (-3 * u**2 + 2 * u + 1) / 2, u**2 / 2]
+    second = [v, 3 * u - 2, 1 - 3 * u, u]
+    weights: FloatArray = np.array([position, first, second]).transpose(0, 2, 1)
+    return weights
+
+
+def sampling(K: int) -> FloatArray:
+    """(3, N, K): what the samples of all K - 3 intervals take of each control point."""
+    weights = np.zeros((3, (K - 3) * SAMPLES, K))
+    for i in range(K - 3):
+        weights[:, i * SAMPLES : (i + 1) * SAMPLES, i : i + 4] = basis()
+    return weights
+
+
+def torque_limit(data: DynamicsData, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Torque limit (N, n) at |speed|, and its slope; the step at the first speed is a ramp below it."""
+    limit, slope = np.empty_like(speed), np.empty_like(speed)
+    for j, (v, t) in enumerate(zip(data.envelope_speed, data.envelope_torque, strict=True)):
+        at, torque = np.append(v[0] * (1.0 - RAMP), v), t
+        if v[0] == 0.0:
+            at, torque = v, t[1:]
+        limit[:, j] = np.interp(speed[:, j], at, torque)
+        slopes = np.concatenate([[0.0], np.diff(torque) / np.diff(at), [0.0]])
+        slope[:, j] = slopes[np.searchsorted(at, speed[:, j])]
+    return limit, slope
+
+
+def torques(data: DynamicsData, s: Samples) -> FloatArray:
+    """Torque (N, n) of the motors, with friction that turns round smoothly."""
+    friction = data.viscous * s.qd + data.coulomb * s.qd / np.hypot(s.qd, STILL)
+    arm = dynamics.rigid(data, s.q, s.qd, s.qdd) - dynamics.counterbalance(data, s.q)
+    return arm + data.rotor_inertia * s.qdd + friction
+
+
+def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
+    """Hand derivatives of the cost by the torques (N, n) on to positions, speeds and accelerations."""
+    of_q, of_qd, of_qdd = dynamics.torque_gradients(data, s.q, s.qd, s.qdd)  # with viscous friction
+    s.of_q += np.einsum("ki,kij->kj", of_torque, of_q)
+    s.of_qd += np.einsum("ki,kij->kj", of_torque, of_qd)
+    s.of_qd += of_torque * data.coulomb * STILL**2 / np.hypot(s.qd, STILL) ** 3
+    s.of_qdd += np.einsum("ki,kij->kj", of_torque, of_qdd)
+
+
+def bus(power: FloatArray, step: float, capacity: float, regeneration: str) -> tuple[float, FloatArray]:
+    """Joules at the mains for axis powers (N, n) held for `step` each, and what a joule more adds (N, n)."""
+    if regeneration == "none":
+        return float(np.maximum(power, 0.0).sum() * step), (power > 0.0).astype(float)
+    stored, mains, source = 0.0, 0.0, []
+    for wanted in power.sum(axis=1) * step:
+        rest = 0.0
+        if wanted > stored:
+            rest, stored = wanted - stored, 0.0
+            source.append("mains")
+        elif wanted < stored - capacity:
+            rest, stored = wanted - (stored - capacity), capacity
+            source.append("mains" if regeneration == "fed_back" else "burnt")
+        else:
+            stored -= wanted
+            source.append("capacitor")
+        mains += rest if source[-1] == "mains" else 0.0
+    adds, worth = np.empty(len(power)), 0.0  # worth: what a joule more in the capacitor saves from here on
+    for k in reversed(range(len(power))):
+        if source[k] != "capacitor":
+            worth = 1.0 if source[k] == "mains" else 0.0
+        adds[k] = worth
+    return float(mains), np.repeat(adds[:, None], power.shape[1], axis=1)
+
+
+class SplineCost:
+    """Cost of one robot in one scene. See ir_kernels.spline.SplineCost for what the methods promise."""
+
+    def __init__(self, geometry: Geometry, data: DynamicsData, terms: "SplineTerms") -> None:
+        self.geometry, self.data, self.terms = geometry, data, terms
+
+    def value(
+        self, control: FloatArray, row: IntArray, interval: float
+    ) -> tuple[float, FloatArray, float, float]:
+        """Cost, gradient (K, n), derivative by the interval, energy."""
+        t, count, step = self.terms, len(control) - 3, interval / SAMPLES
+        weights = sampling(len(control))
+        weights[1] /= interval
+        weights[2] /= interval**2
+        zeros = np.zeros((count * SAMPLES, control.shape[1]))
+        q, qd, qdd = weights @ control
+        s = Samples(q, qd, qdd, zeros, zeros.copy(), zeros.copy())
+        with np.errstate(over="ignore", invalid="ignore"):  # as in the compiled core: inf and nan say it
+            value, energy = self._drives(s, step)
+            value += self._clearance(s, np.repeat(row, SAMPLES), step)
+            gradient = weights[0].T @ s.of_q + weights[1].T @ s.of_qd + weights[2].T @ s.of_qdd
+            of_interval = s.of_step / SAMPLES + t.time_value * count
+            of_interval -= float(np.sum(s.of_qd * s.qd + 2.0 * s.of_qdd * s.qdd)) / interval
+            value += t.time_value * count * interval
+            for order, limit in ((3, t.jerk), (2, t.acceleration)):
+                found = self._beyond(control, order, limit, interval)
+                value, gradient, of_interval = value + found[0], gradient + found[1], of_interval + found[2]
+            over = ABOUT * np.maximum(np.maximum(t.low - control, control - t.high), 0.0)
+            value += t.penalty * interval * float(np.sum(over**2))
+            gradient += 2.0 * t.penalty * interval * ABOUT * over * np.sign(control - t.high)
+            of_interval += t.penalty * float(np.sum(over**2))
+        return value, gradient, of_interval, energy
+
+    def descend(
+        self,
+        control: FloatArray,
+        row: IntArray,
+        interval: float,
+        fixed: bool,
+        evaluations: int,
+        tolerance: float,
+    ) -> tuple[FloatArray, float, float, int]:
+        """New control, interval, value, evaluations."""
+        m, n = len(control) - 6, control.shape[1]
+        metric = bending_metric(m, HOLDING)
+
+        def spline(x: FloatArray) -> tuple[FloatArray, float]:
+            with np.errstate(over="ignore"):
+                now = interval * np.exp(x[-1])
+            return np.concatenate([control[:3], x[:-1].reshape(m, n), control[-3:]]), float(now)
+
+        def function(x: FloatArray) -> tuple[float, FloatArray]:
+            points, now = spline(x)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                value, gradient, of_interval, _ = self.value(points, row, now)
+            return value, np.append(gradient[3:-3], 0.0 if fixed else of_interval * now)
+
+        def solve(v: FloatArray) -> FloatArray:
+            bent = np.linalg.solve(metric, v[:-1].reshape(m, n)) * self.terms.velocity**2
+            return np.append(bent, v[-1] * INTERVAL_WEIGHT)
+
+        start = np.append(control[3:-3], 0.0)
+        x, value, used = descend(start, function, solve, evaluations, tolerance)
+        points, now = spline(x)
+        return points, now, value, used
+
+    def _drives(self, s: Samples, step: float) -> tuple[float, float]:
+        """Cost of energy and travel, of torque and speed beyond their limits; and the energy."""
+        t, data = self.terms, self.data
+        torque, speed = torques(data, s), np.abs(s.qd)
+        limit, falls = torque_limit(data, speed)
+        use = np.abs(torque) / (limit * t.torque_share)
+        too_much, too_fast = np.maximum(use - 1.0, 0.0), np.maximum(speed / t.velocity - 1.0, 0.0)
+        way = t.travel * (np.hypot(s.qd, STILL) - STILL)
+        rate = t.penalty * float(np.sum(too_much**2 + too_fast**2)) + float(np.sum(way))
+        weight = 2.0 * t.penalty * step * too_much
+        of_torque = weight * np.sign(torque) / (limit * t.torque_share)
+        s.of_qd += np.sign(s.qd) * (
+            2.0 * t.penalty * step * too_fast / t.velocity - weight * use / limit * falls
+        )
+        s.of_qd += step * t.travel * s.qd / np.hypot(s.qd, STILL)
+        power = dynamics.axis_power(data, s.qd, torque)
+        energy, adds = bus(power, step, t.capacity_energy, t.regeneration)
+        of_power = t.energy_value * step * adds
+        of_torque += of_power * (s.qd + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)
+        s.of_qd += of_power * torque
+        torques_back(data, s, of_torque)
+        s.of_step += rate + t.energy_value * float(np.sum(adds * power))
+        return rate * step + t.energy_value * energy, energy
+
+    def _clearance(self, s: Samples, row: IntArray, step: float) -> float:
+        """Cost of pairs nearer than their threshold and the margin."""
+        t, model = self.terms, self.geometry
+        if t.threshold.shape[1] == 0 or not np.isfinite(s.q).all():
+            return 0.0
+        poses = collision.poses(model, s.q)
+        ends = collision.ends(model, poses)
+        kept = t.threshold[row] + t.clearance_margin
+        sample, pair = np.nonzero(collision.distances(model, ends) < kept)
+        if len(sample) == 0:
+            return 0.0
+        found = collision.witnesses(model, ends[sample], pair)
+        lacks = (kept[sample, pair] - found.distance) / t.clearance_scale
+        slopes = collision.gradient(model, poses[sample], found, pair)
+        weight = 2.0 * t.clearance_penalty * step * lacks / t.clearance_scale
+        np.subtract.at(s.of_q, sample, weight[:, None] * slopes)
+        rate = t.clearance_penalty * float(np.sum(lacks**2))
+        s.of_step += rate
+        return rate * step
+
+    def _beyond(
+        self, control: FloatArray, order: int, limit: FloatArray, interval: float
+    ) -> tuple[float, FloatArray, float]:
+        """Cost of derivatives of `order` beyond their limit (n,), and its own by control and interval."""
+        difference = np.diff(np.eye(len(control)), order, axis=0) / interval**order
+        derivative = difference @ control
+        over = np.maximum(np.abs(derivative) / limit - 1.0, 0.0)
+        slope = 2.0 * self.terms.penalty * interval * over / limit * np.sign(derivative)
+        of_interval = (
+            self.terms.penalty * float(np.sum(over**2)) - order * float(np.sum(slope * derivative)) / interval
+        )
+        return self.terms.penalty * interval * float(np.sum(over**2)), difference.T @ slope, of_interval
