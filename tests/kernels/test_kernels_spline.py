@@ -1,0 +1,284 @@
+"""The cost of a motion along a spline: against its definition by other means, and its derivatives."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_cases import COLUMNS, OPEN, Body, box
+from robots import RobotLiteral, kr210
+from spline_cases import (
+    MIDDLE,
+    WORKING,
+    along,
+    chain_models,
+    kr210_cost,
+    kr210_models,
+    motion,
+    sample_times,
+    terms,
+)
+
+from ir_kernels import (
+    CollisionModel,
+    DcBusParameters,
+    DynamicsModel,
+    SplineCost,
+    SplineTerms,
+    compiled,
+    drive_energy,
+)
+from ir_kernels.data import FloatArray, IntArray
+from ir_kernels.power import REGENERATIONS, Regeneration
+
+FREE: dict[str, Any] = {"penalty": 0.0, "clearance_penalty": 0.0, "time_value": 0.0, "travel": np.zeros(6)}
+
+
+def plain(robot: RobotLiteral) -> RobotLiteral:
+    """Without what the cost smoothes: Coulomb friction, and the step of the envelope."""
+    torque = robot.envelope_torque.copy()
+    torque[:, 0] = torque[:, 1]
+    return replace(robot, friction_coulomb=np.zeros_like(robot.friction_coulomb), envelope_torque=torque)
+
+
+def by_definition(
+    collision: CollisionModel,
+    dynamics: DynamicsModel,
+    t: SplineTerms,
+    control: FloatArray,
+    interval: float,
+    row: IntArray,
+) -> float:
+    """The cost from the public kernels along scipy's spline, for a robot without Coulomb friction and step."""
+    K, step = len(control), interval / 2.0
+    at = sample_times(K, interval)
+    q, qd, qdd = (np.ascontiguousarray(along(control, interval, at, order)) for order in range(3))
+    torque = dynamics.inverse_dynamics(q, qd, qdd)
+    bus = DcBusParameters(t.capacity_energy, t.regeneration)
+    cost = t.energy_value * drive_energy(dynamics.axis_power(qd, torque), step, bus).mains
+    cost += t.time_value * interval * (K - 3)
+    cost += step * float((t.travel * (np.sqrt(qd**2 + 0.02**2) - 0.02)).sum())
+
+    def squares(use: FloatArray, weight: float) -> float:
+        return weight * float((np.maximum(use - 1.0, 0.0) ** 2).sum())
+
+    cost += squares(np.abs(qd) / t.velocity, t.penalty * step)
+    cost += squares(np.abs(torque) / (t.torque_share * dynamics.torque_limit(qd)), t.penalty * step)
+    knots, middles = np.arange(K - 2) * interval, (np.arange(K - 3) + 0.5) * interval
+    inside = np.clip(knots, 1e-12, knots[-1] - 1e-12)  # scipy's spline ends there
+    cost += squares(np.abs(along(control, interval, inside, 2)) / t.acceleration, t.penalty * interval)
+    cost += squares(np.abs(along(control, interval, middles, 3)) / t.jerk, t.penalty * interval)
+    over = np.maximum(np.maximum(t.low - control, control - t.high), 0.0)
+    cost += t.penalty * interval * float(((100.0 * over) ** 2).sum())
+    kept = t.threshold[np.repeat(row, 2)] + t.clearance_margin
+    lacks = np.maximum(kept - collision.distances(q), 0.0) / t.clearance_scale
+    return cost + t.clearance_penalty * step * float((lacks**2).sum())
+
+
+@pytest.mark.parametrize("regeneration", REGENERATIONS)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_cost_is_what_it_says(core: Any, seed: int, regeneration: Regeneration) -> None:
+    robot = plain(kr210())
+    collision, dynamics = kr210_models(few=core is None, robot=robot)
+    rng = np.random.default_rng(seed)
+    rows = np.stack(
+        [np.full(len(collision.pairs), 0.02), rng.choice([-np.inf, 0.0, 0.2], len(collision.pairs))]
+    )
+    t = terms(robot, len(collision.pairs), threshold=rows, regeneration=regeneration, energy_value=0.7)
+    cost = SplineCost(collision, dynamics, t, core=core)
+    control, row = motion(seed, 16, around=MIDDLE, size=1.5), rng.integers(0, 2, 13)
+    for interval in (0.06, 0.5):  # much too fast; nearly within the limits
+        expected = by_definition(collision, dynamics, t, control, interval, row)
+        assert cost.value(control, interval, row).value == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("n", [1, 4, 8, 16])
+def test_the_cost_of_other_robots_is_what_it_says(core: Any, n: int) -> None:
+    robot, collision, _ = chain_models(n, n)
+    robot = plain(robot)
+    dynamics = DynamicsModel(robot)
+    t = terms(robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), 0.1))
+    control, row = motion(n, 9, n), np.zeros(6, int)
+    expected = by_definition(collision, dynamics, t, control, 0.2, row)
+    assert SplineCost(collision, dynamics, t, core=core).value(control, 0.2).value == pytest.approx(
+        expected, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("capacity", [0.0, 106.0, 5000.0])
+@pytest.mark.parametrize("regeneration", REGENERATIONS)
+def test_energy_is_that_of_the_drives(core: Any, regeneration: Regeneration, capacity: float) -> None:
+    control, interval = motion(4, 20, around=WORKING), 0.15
+    for robot, tolerance in (
+        (plain(kr210()), 1e-11),
+        (kr210(), 0.01),
+    ):  # smoothed below 0.02 rad/s: less than 1 %
+        collision, dynamics = kr210_models((), few=True, robot=robot)
+        t = terms(robot, 0, regeneration=regeneration, capacity_energy=capacity, energy_value=3.0, **FREE)
+        found = SplineCost(collision, dynamics, t, core=core).value(control, interval)
+        at = sample_times(20, interval)
+        power = dynamics.drive_power(
+            *(np.ascontiguousarray(along(control, interval, at, k)) for k in range(3))
+        )
+        mains = drive_energy(power, interval / 2.0, DcBusParameters(capacity, regeneration)).mains
+        assert found.energy == pytest.approx(mains, rel=tolerance)
+        assert found.value == pytest.approx(3.0 * found.energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 6, 9, 16])
+def test_torque_adjoint_is_the_transpose_of_the_torque_gradients(core: Any, n: int) -> None:
+    """With every axis for itself the gradient is that of the axis powers, sample by sample."""
+    if n == 6:
+        collision, dynamics = kr210_models((), few=True, robot=plain(kr210()))  # with a counterbalance
+        robot = plain(kr210())
+    else:
+        robot, collision, _ = chain_models(n, n)
+        dynamics = DynamicsModel(plain(robot))
+    free = {**FREE, "travel": np.zeros(n), "regeneration": "none"}
+    t = terms(robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), -np.inf), **free)
+    control, interval = motion(n, 10, n), 0.3
+    found = SplineCost(collision, dynamics, t, core=core).value(control, interval)
+    at = sample_times(10, interval)
+    motions = [np.ascontiguousarray(along(control, interval, at, k)) for k in range(3)]
+    of = dynamics.power_gradients(*motions)
+    drawn = np.where(dynamics.drive_power(*motions) > 0.0, interval / 2.0, 0.0)
+    weights = [along(np.eye(10), interval, at, k) for k in range(3)]
+    parts = [
+        np.einsum("kc,ki,kij->cj", w, drawn, g) for w, g in zip(weights, (of.q, of.qd, of.qdd), strict=True)
+    ]
+    expected = sum(parts)
+    np.testing.assert_allclose(found.gradient, expected, atol=1e-10 * np.abs(expected).max())
+
+
+def check_derivatives(
+    cost: SplineCost, control: FloatArray, interval: float, row: IntArray, seed: int
+) -> None:
+    """Central differences along random directions, along single control points, and by the interval."""
+    found = cost.value(control, interval, row)
+    rng = np.random.default_rng(seed)
+    K, n = control.shape
+    directions = [rng.normal(size=(K, n)) for _ in range(6)]
+    for _ in range(8):
+        single = np.zeros((K, n))
+        single[rng.integers(K), rng.integers(n)] = 1.0
+        directions.append(single)
+    h, scale = 1e-6, float(np.abs(found.gradient).max())
+    for d in directions:
+        ahead, behind = (cost.value(control + s * h * d, interval, row).value for s in (1.0, -1.0))
+        error = (ahead - behind) / (2.0 * h) - float((found.gradient * d).sum())
+        assert abs(error) < 3e-6 * scale * float(np.abs(d).sum()) ** 0.5
+    h = 1e-6 * interval
+    ahead, behind = (cost.value(control, interval + s * h, row).value for s in (1.0, -1.0))
+    assert found.of_interval == pytest.approx((ahead - behind) / (2.0 * h), rel=3e-6)
+
+
+@pytest.mark.parametrize("regeneration", REGENERATIONS)
+@pytest.mark.parametrize(("interval", "seed"), [(0.08, 0), (0.3, 1), (0.6, 2)])
+def test_derivatives_are_those_of_differences(
+    core: Any, interval: float, seed: int, regeneration: Regeneration
+) -> None:
+    collision, _ = kr210_models(few=core is None)
+    rng = np.random.default_rng(seed)
+    rows = np.stack([np.full(len(collision.pairs), 0.02), rng.choice([-np.inf, 0.1], len(collision.pairs))])
+    cost = kr210_cost(core, few=core is None, regeneration=regeneration, threshold=rows)
+    control = motion(seed, 12, around=MIDDLE, size=1.5)
+    check_derivatives(cost, control, interval, rng.integers(0, 2, 9), seed)
+
+
+@pytest.mark.parametrize("n", [1, 3, 7])
+def test_derivatives_of_other_robots_are_those_of_differences(core: Any, n: int) -> None:
+    robot, collision, dynamics = chain_models(10 + n, n)
+    t = terms(robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), 0.1))
+    cost = SplineCost(collision, dynamics, t, core=core)
+    check_derivatives(cost, motion(n, 8, n), 0.2, np.zeros(5, int), n)
+
+
+@pytest.mark.parametrize("bodies", [COLUMNS, OPEN, (box("far", (60.0, 0.0, 0.0), (100.0, 1.0, 3.0)),), ()])
+def test_compiled_cores_agree_with_the_reference(core: Any, bodies: tuple[Body, ...]) -> None:
+    """One scene is so large that lanes of doubles choose the pairs."""
+    if core is None:
+        pytest.skip("nothing compiled to compare with")
+    control = motion(7, 13, around=WORKING)
+    found, expected = (kr210_cost(one, bodies).value(control, 0.15) for one in (core, None))
+    assert found.value == pytest.approx(expected.value, rel=1e-11)
+    assert found.energy == pytest.approx(expected.energy, rel=1e-11)
+    assert found.of_interval == pytest.approx(expected.of_interval, rel=1e-9)
+    np.testing.assert_allclose(found.gradient, expected.gradient, atol=1e-9 * np.abs(expected.gradient).max())
+
+
+def test_native_agrees_with_baseline() -> None:
+    if compiled.NAME != "native":
+        pytest.skip("no native build here")
+    control = motion(8, 40, around=WORKING)
+    native, baseline = (
+        kr210_cost(compiled.load(name)[1]).value(control, 0.1) for name in ("native", "baseline")
+    )
+    assert native.value == pytest.approx(baseline.value, rel=1e-13)
+    np.testing.assert_allclose(
+        native.gradient, baseline.gradient, atol=1e-11 * np.abs(baseline.gradient).max()
+    )
+
+
+@pytest.mark.parametrize("lack", [1e-7, 1e-6, 1e-5])
+def test_pairs_that_lack_less_than_a_float_can_tell_count(core: Any, lack: float) -> None:
+    collision, dynamics = kr210_models(few=core is None)
+    q = np.tile(WORKING, (4, 1))
+    threshold = collision.distances(q[:1]) + lack  # what every pair lacks, all the time
+    t = terms(kr210(), len(collision.pairs), **{**FREE, "threshold": threshold})
+    t = replace(t, energy_value=0.0, clearance_margin=0.0, clearance_scale=lack, clearance_penalty=1.0)
+    found = SplineCost(collision, dynamics, t, core=core).value(q, 2.0)
+    assert found.value == pytest.approx(2.0 * len(collision.pairs), rel=1e-7)
+
+
+def test_a_threshold_row_holds_in_its_interval_only(core: Any) -> None:
+    collision, _ = kr210_models(few=True)
+    rows = np.stack([np.full(len(collision.pairs), value) for value in (-np.inf, 1.0)])
+    cost = kr210_cost(
+        core, few=True, threshold=rows, **FREE | {"clearance_penalty": 1.0, "energy_value": 0.0}
+    )
+    control = motion(9, 12, around=WORKING, size=0.2)
+    single = [cost.value(control, 0.1, np.eye(9, dtype=int)[k]).value for k in range(9)]
+    assert cost.value(control, 0.1).value == 0.0
+    assert min(single) > 0.0
+    assert sum(single) == pytest.approx(cost.value(control, 0.1, np.ones(9, int)).value, rel=1e-12)
+
+
+def test_the_smoothed_envelope_stays_below_the_true_one(core: Any) -> None:
+    """At one speed after the other: the step of the envelope is a ramp below its first speed."""
+    robot = replace(kr210(), friction_coulomb=np.zeros(6))
+    collision, dynamics = kr210_models((), few=True, robot=robot)
+    t = terms(robot, 0, **{**FREE, "penalty": 1.0, "travel": np.zeros(6)})
+    huge = {name: np.full(6, 1e9) for name in ("velocity", "acceleration", "jerk", "high")}
+    t = replace(t, **huge, low=-huge["high"], energy_value=0.0, torque_share=1e-3)
+    cost = SplineCost(collision, dynamics, t, core=core)
+    first = robot.envelope_speed[0, 0]
+    for share, exact in ((0.5, True), (0.949, True), (0.97, False), (0.999, False), (1.1, True)):
+        control = np.tile(WORKING, (4, 1))
+        control[:, 0] = share * first * np.arange(4) * 0.01  # only the first axis moves, at one speed
+        at = sample_times(4, 0.01)
+        q, qd, qdd = (np.ascontiguousarray(along(control, 0.01, at, k)) for k in range(3))
+        use = np.abs(dynamics.inverse_dynamics(q, qd, qdd)) / (1e-3 * dynamics.torque_limit(qd))
+        least = float((np.maximum(use - 1.0, 0.0) ** 2).sum()) * 0.005
+        found = cost.value(control, 0.01).value
+        assert found == pytest.approx(least, rel=1e-9) if exact else found > (1.0 + 1e-6) * least
+
+
+def test_an_envelope_that_falls_from_standstill_on_has_no_step(core: Any) -> None:
+    robot = kr210()
+    speed = robot.envelope_speed.copy()
+    speed[:, 0] = 0.0
+    robot = replace(plain(robot), envelope_speed=speed)
+    collision, dynamics = kr210_models(few=True, robot=robot)
+    t, control = terms(robot, len(collision.pairs)), motion(3, 10, around=WORKING)
+    expected = by_definition(collision, dynamics, t, control, 0.1, np.zeros(7, int))
+    assert SplineCost(collision, dynamics, t, core=core).value(control, 0.1).value == pytest.approx(
+        expected, rel=1e-9
+    )
+
+
+def test_a_scene_without_pairs_has_no_clearance_to_lack(core: Any) -> None:
+    cost = kr210_cost(core, (), few=True, threshold=np.zeros((2, 0)))
+    control = motion(2, 9, around=WORKING)
+    other = cost.value(control, 0.1, np.ones(6, int))
+    assert cost.value(control, 0.1).value == other.value
+    assert np.isfinite(other.gradient).all()
