@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_cases import COLUMNS, OPEN, Body, box
+from ir_kernels.data import FloatArray, IntArray
+from ir_kernels.power import REGENERATIONS, Regeneration
 from robots import RobotLiteral, kr210
 from spline_cases import (
     MIDDLE,
@@ -28,8 +30,6 @@ from ir_kernels import (
     compiled,
     drive_energy,
 )
-from ir_kernels.data import FloatArray, IntArray
-from ir_kernels.power import REGENERATIONS, Regeneration
 
 FREE: dict[str, Any] = {"penalty": 0.0, "clearance_penalty": 0.0, "time_value": 0.0, "travel": np.zeros(6)}
 
@@ -49,7 +49,7 @@ def by_definition(
     interval: float,
     row: IntArray,
 ) -> float:
-    """The cost from the public kernels along scipy's spline, for a robot without Coulomb friction and step."""
+    """The cost from the public kernels along scipy's spline, for robots without friction and step."""
     K, step = len(control), interval / 2.0
     at = sample_times(K, interval)
     q, qd, qdd = (np.ascontiguousarray(along(control, interval, at, order)) for order in range(3))
