@@ -50,7 +50,9 @@ def planner_of(cell: str) -> Planner:
 
 def asked(task: Task, seed: int = 0) -> PlanOptions:
     """The request's options: J as the objective."""
-    return PlanOptions(seed=seed, safety_distance=task.margin, planning_time=PLANNING_TIME, time_value=TIME_VALUE)
+    return PlanOptions(
+        seed=seed, safety_distance=task.margin, planning_time=PLANNING_TIME, time_value=TIME_VALUE
+    )
 
 
 def first_feasible(info: PlanningInfo) -> float:

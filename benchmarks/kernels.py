@@ -18,6 +18,7 @@ from pathlib import Path
 import _kernels_build
 import _kernels_dynamics
 import _kernels_geometry
+import _kernels_spline
 from _kernels_dynamics import Claim, Row
 
 from ir_description import bundled_cells
@@ -53,6 +54,7 @@ def main() -> None:
         for part in (_kernels_geometry.measure(cells, seed), _kernels_dynamics.measure(seed)):
             rows += part[0]
             claims += part[1]
+        rows += _kernels_spline.measure(cells, seed)
     part = _kernels_build.measure(given.build)
     rows += part[0]
     claims += part[1]
