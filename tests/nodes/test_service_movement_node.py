@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,51 +11,12 @@ from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import ComputeIk, GetTrajectory, PlanServiceMovement, SetEquipment
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros.conversions import trajectory_from_msg
-from ir_planner.node import PlannerNode
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 Call = Callable[..., Any]
 SERVICE = "plan_service_movement"
-
-
-@pytest.fixture
-def planner_node(ros_context: Any) -> Iterator[PlannerNode]:
-    """The node with the demonstration cell, spun by an executor of its own threads as in production."""
-    node = PlannerNode(
-        context=ros_context, parameter_overrides=[Parameter("cell", Parameter.Type.STRING, "demo")]
-    )
-    executor = MultiThreadedExecutor(num_threads=4, context=ros_context)
-    executor.add_node(node)
-
-    def spin() -> None:
-        with contextlib.suppress(ExternalShutdownException, ShutdownException):
-            executor.spin()
-
-    thread = threading.Thread(target=spin, daemon=True)
-    thread.start()
-    yield node
-    executor.shutdown(timeout_sec=5.0)
-    thread.join(5.0)
-    node.destroy_node()
-
-
-@pytest.fixture
-def call(planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any) -> Call:
-    """Call a service of the planner by its type, name and request."""
-
-    def ask(kind: Any, name: str, /, timeout: float = 60.0, **fields: Any) -> Any:
-        client = ros_executor.run(lambda: ros_node.create_client(kind, f"/ir_planner/{name}"))
-        wait_for(client.service_is_ready, what=f"{name} is offered")
-        future = ros_executor.run(lambda: client.call_async(kind.Request(**fields)))
-        wait_for(future.done, timeout=timeout, what=f"{name} answers")
-        ros_executor.run(lambda: ros_node.destroy_client(client))
-        return future.result()
-
-    return ask
 
 
 def test_exit_and_entry_are_certified_and_their_points_can_be_fetched(call: Call) -> None:
