@@ -11,6 +11,7 @@ import coal
 import numpy as np
 import pinocchio
 import pybullet
+from _coal_shapes import along_z, solid
 from numpy.typing import NDArray
 
 from ir_description import Cell, robot_urdf
@@ -19,37 +20,8 @@ from ir_kernels import CollisionModel
 Array = NDArray[np.float64]
 
 
-def _along_z(p0: Array, p1: Array) -> Array:
-    """Pose of a frame in the middle of a segment, z along it."""
-    pose = np.eye(4)
-    d = p1 - p0
-    z = d / np.linalg.norm(d)
-    x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
-    x /= np.linalg.norm(x)
-    pose[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    pose[:3, 3] = (p0 + p1) / 2.0
-    return pose
-
-
 def _se3(pose: Array) -> Any:
     return pinocchio.SE3(np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3]))
-
-
-def _shape(body: Any) -> Any:
-    if body.kind == "box":
-        return coal.Box(*body.size)
-    if body.kind == "cylinder":
-        return coal.Cylinder(body.size[0], body.size[1])
-    if body.kind == "sphere":
-        return coal.Sphere(body.size[0])
-    if body.kind == "capsule":
-        return coal.Capsule(body.size[0], body.size[1])
-    if body.kind == "plane":
-        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-    points = coal.StdVec_Vec3s()
-    for vertex in body.vertices:
-        points.append(vertex)
-    return coal.Convex.convexHull(points, False, "")
 
 
 class Coal:
@@ -67,12 +39,12 @@ class Coal:
         index = {}
         for c in capsules:
             shape = coal.Capsule(c.radius, float(np.linalg.norm(c.p1 - c.p0)))
-            local = _along_z(c.p0, c.p1) if c.link else chain.base_pose @ _along_z(c.p0, c.p1)
+            local = along_z(c.p0, c.p1) if c.link else chain.base_pose @ along_z(c.p0, c.p1)
             item = pinocchio.GeometryObject(f"capsule {c.name}", c.link, 0, _se3(local), shape)
             index[c.name] = self.geometry.addGeometryObject(item)
         for body in bodies:
             item = pinocchio.GeometryObject(
-                f"body {body.name}", 0, 0, _se3(np.asarray(body.pose)), _shape(body)
+                f"body {body.name}", 0, 0, _se3(np.asarray(body.pose)), solid(body)
             )
             index[f"body {body.name}"] = self.geometry.addGeometryObject(item)
         for pair in model.pairs:

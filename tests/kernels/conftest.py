@@ -9,6 +9,7 @@ import pytest
 from ir_kernels import compiled
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the shapes of a scene in Coal
 
 
 @pytest.fixture(params=["native", "baseline", "reference"])
