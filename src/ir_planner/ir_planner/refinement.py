@@ -53,6 +53,7 @@ _REPAIR_EVALUATIONS = 40
 _ZONE_SAMPLES = 4  # per interval
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
 _FITS = 25
+_WITHIN_REACH = 1.06  # of a wished duration: from there more effort may get to it
 _EDGES_PER_INTERVAL = 0.25  # work of one evaluation, in certified edges
 
 
@@ -138,6 +139,8 @@ class Refinement:
                 )
                 if blocked is None:
                     return Refined(path, trajectory, trajectory_value(trajectory, self.scene, self.options))
+            if found.trajectory.duration > _WITHIN_REACH * self.options.duration:
+                break
         return None
 
     def check_wish(self) -> None:
