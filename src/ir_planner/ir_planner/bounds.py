@@ -8,7 +8,7 @@ from ir_msgs_py.status import StatusCode
 
 from ir_planner.errors import RequestError
 
-PLANNERS = ("", "direct", "detours", "retreat", "tree")
+PLANNERS = ("", "direct", "detours", "retreat", "tree", "genetic")
 SAFETY_DISTANCE_MAX = 1.0  # m
 DURATION_MAX = 3600.0  # s
 SCALING_MIN = 1e-6

@@ -24,7 +24,8 @@ BoolArray = NDArray[np.bool_]
 _SAMPLES_PER_EDGE = 40  # configurations that cost as much as one certified edge
 _BEYOND = 0.25  # crossover reaches this share beyond both parents
 _OWN = 0.5  # vias of one individual mutate together, and by this share on their own
-_FINE = 400
+_LARGEST = 3.0  # rad: no deviation grows beyond
+_FINE = 400  # places on a spline between which its progress is interpolated
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +69,9 @@ class _Individuals:
 def evolve(
     a: FloatArray, b: FloatArray, space: FreeSpace, settings: GeneticSettings, rng: np.random.Generator
 ) -> Evolution:
-    """Ways round between the free configurations a and b (n,); ends at the settings' generations or with the
-    budget.
+    """Ways round between the free configurations a and b (n,) within the limits.
+
+    Ends at the settings' generations or with the budget. Raises CancelledError when asked to stop.
     """
     return _Breeder(a, b, space, settings, rng).run()
 
@@ -111,8 +113,7 @@ class _Breeder:
         self.blend = np.ascontiguousarray(matrix[:, 1:-1])  # (S, V)
         self.fixed = matrix[:, :1] * a + matrix[:, -1:] * b  # (S, n)
         self.along = np.arange(1, settings.vias + 1)[:, None] / (settings.vias + 1)
-        self.per_island = max(settings.population // settings.islands, 2)
-        self.elite = min(settings.elite, self.per_island - 1)
+        self.per_island, self.elite = settings.per_island, settings.elite
         self.found: list[FloatArray] = []
         self.tried: set[bytes] = set()
 
@@ -128,10 +129,11 @@ class _Breeder:
                 break
             people = self._next(people)
             generations += 1
-        best = int(np.argmin(people.shortfall))
+        lack = np.where(people.shortfall < 0.0, np.inf, people.shortfall)  # free, but no better than others
+        best = int(np.argmin(lack))
         ways = sorted(self.found, key=lambda way: path_cost(self.weights, way))
         q = self.samples(people.vias[best : best + 1])[people.sample[best], 0]
-        return Evolution(ways, float(people.shortfall[best]), int(people.pair[best]), q, generations)
+        return Evolution(ways, float(lack[best]), int(people.pair[best]), q, generations)
 
     def samples(self, vias: FloatArray) -> FloatArray:
         """(S, N, n): the ways of individuals."""
@@ -174,8 +176,7 @@ class _Breeder:
         """Random individuals around the straight stretch, the best of each island's."""
         s, rng, n = self.settings, self.rng, len(self.a)
         count = s.islands * self.per_island * s.first
-        least, most = sorted((s.spread_least, s.spread_most))
-        spread = np.exp(rng.uniform(np.log(least), np.log(most), (count, 1, 1)))
+        spread = np.exp(rng.uniform(np.log(s.spread_least), np.log(s.spread_most), (count, 1, 1)))
         line = self.a + self.along * (self.b - self.a)
         noise = rng.standard_normal((count, 1, n)) + _OWN * rng.standard_normal((count, s.vias, n))
         vias = np.clip(line + spread * noise, self.space.low, self.space.high)
@@ -193,6 +194,7 @@ class _Breeder:
         s, rng, n = self.settings, self.rng, len(self.a)
         islands, per, children = s.islands, self.per_island, self.per_island - self.elite
         base = per * np.arange(islands)[:, None]
+        # islands are sorted by fitness: the lowest of some random places wins a tournament
         won = rng.integers(0, per, (2, islands, children, s.tournament)).min(axis=3) + base
         mother, father = won.reshape(2, -1)
         count = len(mother)
@@ -202,22 +204,15 @@ class _Breeder:
         child = vias + share * (people.vias[father] - vias)
         child += self._parting(people, mother) * (rng.random(count) < s.parting)[:, None, None]
         spread = people.spread[mother] * np.exp(s.adaptation * rng.standard_normal(count))
-        spread = np.maximum(spread, s.mutation_least)
+        spread = np.clip(spread, s.mutation_least, _LARGEST)
         noise = rng.standard_normal((count, 1, n)) + _OWN * rng.standard_normal(vias.shape)
         mutated = rng.random((count, 1, n)) < s.mutated_share
         child += spread[:, None, None] * noise * mutated
         child = np.clip(child, self.space.low, self.space.high)
-        new = self.evaluated(child, spread)
         stay = (base + np.arange(self.elite)).ravel()
-        both = _Individuals.joined(people.of(stay), new)
-        rows = np.concatenate(
-            [
-                np.arange(len(stay)).reshape(islands, -1),
-                len(stay) + np.arange(count).reshape(islands, -1),
-            ],
-            axis=1,
-        )
-        return self._ranked(both.of(rows.ravel()), per)
+        both = _Individuals.joined(people.of(stay), self.evaluated(child, spread))
+        island = np.concatenate([stay // per, np.arange(count) // children])
+        return self._ranked(both.of(np.argsort(island, kind="stable")), per)
 
     def _parting(self, people: _Individuals, rows: IntArray) -> FloatArray:
         """Steps (N, V, n) that part the pair which lacks most, to first order by one to two times."""

@@ -53,6 +53,7 @@ from ir_planner.node_inputs import LastState, measured_velocity
 from ir_planner.node_requests import Requests
 from ir_planner.parameters import PlannerParameters
 from ir_planner.planner import Planner
+from ir_planner.regional_settings import GeneticSettings
 from ir_planner.service_movement import ServicePlan
 from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
 from ir_planner.service_shapes import service_shapes
@@ -87,11 +88,13 @@ class PlannerNode(Node):
             self._change_pauses,
             self._change_interaction,
             self._change_withdrawal,
+            self._change_genetic,
         )
         make = make_planner or (lambda settings, pauses: Planner(time.monotonic, settings, pauses))
         self.planner = make(parameters.planner, parameters.pauses)
         self._change_interaction(parameters.interaction)
         self._change_withdrawal(parameters.withdrawal)
+        self._change_genetic(parameters.genetic)
         self._last_state = LastState(look=self._look)
         self._requests = Requests(
             self.planner,
@@ -190,6 +193,9 @@ class PlannerNode(Node):
 
     def _change_withdrawal(self, settings: WithdrawalSettings) -> None:
         self.planner.withdrawal = settings
+
+    def _change_genetic(self, settings: GeneticSettings) -> None:
+        self.planner.genetic = settings
 
     def _load_first_cell(self, cell: str) -> None:
         if not cell:

@@ -5,13 +5,15 @@ from collections.abc import Callable
 from ir_msgs_py.ros.parameters import Parameters
 from rclpy.node import Node
 
+from ir_planner.regional_settings import GeneticSettings
 from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
 from ir_planner.settings import PauseSettings, PlannerSettings
 
 
 class PlannerParameters:
-    """Declared on the node: the planner's own, the times of the power modes under "transitions.", and the two
-    stages of service movements under "interaction." and "withdrawal.".
+    """Declared on the node: the planner's own, the times of the power modes under "transitions.", the two
+    stages of service movements under "interaction." and "withdrawal.", and the genetic correction of regional
+    movements under "genetic.".
     """
 
     def __init__(
@@ -21,6 +23,7 @@ class PlannerParameters:
         on_pauses: Callable[[PauseSettings], None],
         on_interaction: Callable[[InteractionSettings], None],
         on_withdrawal: Callable[[WithdrawalSettings], None],
+        on_genetic: Callable[[GeneticSettings], None],
     ) -> None:
         self._planner = Parameters(node, PlannerSettings, on_change=on_planner)
         self._pauses = Parameters(node, PauseSettings, prefix="transitions.", on_change=on_pauses)
@@ -28,6 +31,7 @@ class PlannerParameters:
             node, InteractionSettings, prefix="interaction.", on_change=on_interaction
         )
         self._withdrawal = Parameters(node, WithdrawalSettings, prefix="withdrawal.", on_change=on_withdrawal)
+        self._genetic = Parameters(node, GeneticSettings, prefix="genetic.", on_change=on_genetic)
 
     @property
     def planner(self) -> PlannerSettings:
@@ -48,3 +52,8 @@ class PlannerParameters:
     def withdrawal(self) -> WithdrawalSettings:
         """In force now."""
         return self._withdrawal.value
+
+    @property
+    def genetic(self) -> GeneticSettings:
+        """In force now."""
+        return self._genetic.value

@@ -26,6 +26,7 @@ from ir_planner.inverse_kinematics import free_configurations, no_configuration,
 from ir_planner.journal import Journal
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.regional import MovementPlan, plan_regional, too_near_sentence
+from ir_planner.regional_settings import GeneticSettings
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_planner.service_movement import ServicePlan, ServiceRequest, checked_request, plan_service
@@ -83,6 +84,7 @@ class Planner:
         power: PowerData | None = None,
         interaction: InteractionSettings | None = None,
         withdrawal: WithdrawalSettings | None = None,
+        genetic: GeneticSettings | None = None,
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
@@ -90,6 +92,7 @@ class Planner:
         self.power = power or load_power_data()
         self.interaction = interaction or InteractionSettings()
         self.withdrawal = withdrawal or WithdrawalSettings()
+        self.genetic = genetic or GeneticSettings()
         self._cell: Cell | None = None
         # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
         self._scenes: dict[tuple[str, str], tuple[Cell, PlanningScene]] = {}
@@ -262,7 +265,7 @@ class Planner:
                 if direct.status.ok:
                     return direct
         for q in candidates:
-            plan = plan_regional(start, q, scene, options, budget)
+            plan = plan_regional(start, q, scene, options, budget, self.genetic)
             if plan.status.ok or budget.exhausted:
                 break
         return plan
@@ -327,6 +330,7 @@ class Planner:
             self.settings.regeneration,  # type: ignore[arg-type]
             self.pauses,
             self.withdrawal,
+            self.genetic,
         )
         movements = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._budget(options, cancelled, movements), progress)

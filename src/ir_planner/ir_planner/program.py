@@ -30,6 +30,7 @@ from ir_planner.program_movements import Leg, assembled
 from ir_planner.program_nodes import posture_nodes, station_nodes
 from ir_planner.program_steps import Scenes, placed_steps, steps_of
 from ir_planner.regional import search_regional
+from ir_planner.regional_settings import GeneticSettings
 from ir_planner.reporting import total_report
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ServiceLine, timed_service
@@ -66,6 +67,7 @@ class ProgramRequest:
     regeneration: Regeneration = "shared"
     pauses: PauseSettings = field(default_factory=PauseSettings)
     withdrawal: WithdrawalSettings = field(default_factory=WithdrawalSettings)
+    genetic: GeneticSettings = field(default_factory=GeneticSettings)
 
 
 class _FailedError(Exception):
@@ -212,7 +214,8 @@ class _Planner:
         if key not in self.ways:
             scene = self._scene(stops[gap])
             inner = Journal(self.journal.budget, self.journal.seed)
-            status, found = search_regional(first.outside, second.outside, scene, self.options, inner)
+            ends, settings = (first.outside, second.outside), self.request.genetic
+            status, found = search_regional(*ends, scene, self.options, inner, settings)
             self.journal.rejected.update(inner.rejected)
             if found is None:
                 names = self._names(stops, gap)

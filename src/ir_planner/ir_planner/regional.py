@@ -8,6 +8,7 @@ found is an answer too: which pair is in the way, where, by how much, and what w
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from ir_kernels.collision import FREE
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from ir_planner.budget import Budget
 from ir_planner.clearance import pair_value
+from ir_planner.correction import corrected
 from ir_planner.detours import drawn_back, over_postures, scattered
 from ir_planner.free_space import FreeSpace
 from ir_planner.journal import Journal
@@ -27,6 +29,7 @@ from ir_planner.movement_cost import path_cost
 from ir_planner.polish import fewest_corners, pulled
 from ir_planner.portfolio import Portfolio
 from ir_planner.refinement import Refinement
+from ir_planner.regional_settings import GeneticSettings
 from ir_planner.retreat import retreating_paths
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.timing import STILL
@@ -34,6 +37,8 @@ from ir_planner.tree import connect
 
 FloatArray = NDArray[np.float64]
 Search = Callable[[FloatArray, FloatArray, FreeSpace, int], list[FloatArray]]
+Searches = tuple[tuple[str, Search], ...]
+_GENETIC = GeneticSettings()
 _SCATTERED = 160
 _WAYS = 3  # different ways round of one search
 _FINISHED = 2  # drafts that are finished in one round
@@ -55,15 +60,20 @@ class MovementPlan:
 
 
 def plan_regional(
-    start: FloatArray, goal: FloatArray, scene: PlanningScene, options: PlanOptions, budget: Budget
+    start: FloatArray,
+    goal: FloatArray,
+    scene: PlanningScene,
+    options: PlanOptions,
+    budget: Budget,
+    settings: GeneticSettings = _GENETIC,
 ) -> MovementPlan:
-    """Movement from start to goal (n,), both within the limits.
+    """Movement from start to goal (n,), both within the limits; `settings` of the planner `genetic`.
 
     Raises RequestError for options that can't be met (duration), CancelledError when asked to stop.
     """
     journal = Journal(budget, options.seed)
     names = scene.cell.robot.joint_names
-    status, found = search_regional(start, goal, scene, options, journal)
+    status, found = search_regional(start, goal, scene, options, journal, settings)
     info = journal.info(start, names)
     if found is None:
         return MovementPlan(status, info, TrajectoryReport())
@@ -71,7 +81,12 @@ def plan_regional(
 
 
 def search_regional(
-    start: FloatArray, goal: FloatArray, scene: PlanningScene, options: PlanOptions, journal: Journal
+    start: FloatArray,
+    goal: FloatArray,
+    scene: PlanningScene,
+    options: PlanOptions,
+    journal: Journal,
+    settings: GeneticSettings = _GENETIC,
 ) -> tuple[Status, TimedMovement | None]:
     """The best movement found, with the status that says so or says why not."""
     space = FreeSpace.of(scene, options.safety_distance, journal.budget)
@@ -79,10 +94,13 @@ def search_regional(
     if blocked is not None:
         return blocked, None
     portfolio = Portfolio(space, Refinement(scene, options, journal.budget), journal)
-    ways = _first_ways(start, goal, space, options, journal)
+    searches, explorers = SEARCHES, EXPLORERS
+    if options.planner_id == "genetic":
+        searches = explorers = (("genetic", partial(genetic, settings=settings, journal=journal)),)
+    ways = _first_ways(start, goal, space, options, journal, searches)
     best: tuple[str, TimedMovement] | None = None
     if ways and np.abs(goal - start).max() >= STILL and not _by_laws(options):
-        _improve(start, goal, ways, portfolio, options)
+        _improve(start, goal, ways, portfolio, options, explorers)
         best = portfolio.best()
         if best is None:
             portfolio.refinement.check_wish()
@@ -108,10 +126,15 @@ def _by_laws(options: PlanOptions) -> bool:
 
 
 def _first_ways(
-    start: FloatArray, goal: FloatArray, space: FreeSpace, options: PlanOptions, journal: Journal
+    start: FloatArray,
+    goal: FloatArray,
+    space: FreeSpace,
+    options: PlanOptions,
+    journal: Journal,
+    searches: Searches,
 ) -> list[tuple[str, FloatArray]]:
     """The first free ways, by the first search that finds any."""
-    for name, search in SEARCHES:
+    for name, search in searches:
         if options.planner_id not in ("", name):
             continue
         with journal.stage(name) as notes:
@@ -131,6 +154,7 @@ def _improve(
     ways: list[tuple[str, FloatArray]],
     portfolio: Portfolio,
     options: PlanOptions,
+    explorers: Searches,
 ) -> None:
     """Refine the first ways, look for other ways round, and refine the best of all until the work is
     spent.
@@ -144,7 +168,7 @@ def _improve(
     with journal.stage("refine") as notes:
         portfolio.add(ways[0][0], [way for _, way in ways])
         notes.append(f"{portfolio.finish_best(1)} certified")
-    others = [entry for entry in EXPLORERS if options.planner_id in ("", entry[0])]
+    others = [entry for entry in explorers if options.planner_id in ("", entry[0])]
     for turn in range(_ROUNDS):
         for name, search in others:
             if not more():
@@ -207,8 +231,31 @@ def short_tree(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int)
     return [] if path is None else [path]
 
 
+def genetic(
+    start: FloatArray,
+    goal: FloatArray,
+    space: FreeSpace,
+    seed: int,
+    settings: GeneticSettings,
+    journal: Journal,
+) -> list[FloatArray]:
+    """The straight movement with what collides corrected by a population (eqs. 9, 10); by name only.
+
+    Nothing found: the journal says how near the population came, and which pair blocks.
+    """
+    found = corrected(start, goal, space, settings, np.random.default_rng(seed))
+    if found.pair >= 0 and not found.ways:
+        pair = space.scene.collision.pairs[found.pair]
+        journal.note(
+            "genetic correction",
+            f"{found.generations} generations; the nearest to free lacks {found.shortfall * 1e3:.1f} mm "
+            f"between {pair.body_a} and {pair.body_b}",
+        )
+    return found.ways
+
+
 # in the order in which a first way is looked for; name and search
-SEARCHES: tuple[tuple[str, Search], ...] = (
+SEARCHES: Searches = (
     ("direct", direct),
     ("tree", short_tree),
     ("detours", detours),
@@ -216,7 +263,7 @@ SEARCHES: tuple[tuple[str, Search], ...] = (
     ("tree", tree),
 )
 # that find other ways round with another seed
-EXPLORERS: tuple[tuple[str, Search], ...] = (("detours", detours), ("tree", short_tree))
+EXPLORERS: Searches = (("detours", detours), ("tree", short_tree))
 
 
 def _different(ways: list[FloatArray], space: FreeSpace) -> list[FloatArray]:
