@@ -35,7 +35,7 @@ def test_a_path_is_free_and_what_it_cost_is_charged(scene_of: SceneOf) -> None:
     scene = scene_of("deep_box")
     budget = endless(100_000)
     space = space_of(scene, budget)
-    path = connect(*asked(scene), space, SEED)
+    path = connect(*asked(scene), space, SEED).path
     assert path is not None
     assert 0 < budget.iterations < 100_000
     assert (space.certificates(path[:-1].copy(), path[1:].copy()).verdict == FREE).all()
@@ -45,7 +45,7 @@ def test_a_path_is_free_and_what_it_cost_is_charged(scene_of: SceneOf) -> None:
 def test_a_budget_is_spent_to_the_last_edge_and_not_beyond(scene_of: SceneOf, most: int) -> None:
     scene = scene_of("deep_box")
     budget = endless(most)
-    assert connect(*asked(scene), space_of(scene, budget), SEED) is None
+    assert connect(*asked(scene), space_of(scene, budget), SEED).path is None
     assert budget.iterations == most
     assert not budget.truncated
 
@@ -63,7 +63,7 @@ def test_a_deadline_is_heard_between_slices(scene_of: SceneOf) -> None:
     scene = scene_of("deep_box")
     ticks = iter(range(10))
     budget = Budget(100_000, 2.0, lambda: float(next(ticks)))
-    assert connect(*asked(scene), space_of(scene, budget), SEED) is None
+    assert connect(*asked(scene), space_of(scene, budget), SEED).path is None
     assert budget.truncated
     assert budget.iterations == 2 * 256
 

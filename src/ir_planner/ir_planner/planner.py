@@ -231,7 +231,7 @@ class Planner:
     def plan_regional(
         self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER
     ) -> MovementPlan:
-        """Movement from start (n,) to a goal; of a pose the cheapest reachable configuration is taken."""
+        """Movement from start (n,) to a goal; a pose is reached in the configuration that serves best."""
         options, note = checked_options(options)
         scene = self.scene(options.load)
         start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
@@ -247,28 +247,8 @@ class Planner:
                 info = Journal(budget, options.seed).info(start, scene.cell.robot.joint_names)
                 return MovementPlan(status, info, TrajectoryReport())
             candidates = found.q
-        plan = self._first_planned(start, candidates, scene, options, budget)
+        plan = plan_regional(start, candidates, scene, options, budget, self.genetic)
         return self._kept(plan, note)
-
-    def _first_planned(
-        self,
-        start: FloatArray,
-        candidates: FloatArray,
-        scene: PlanningScene,
-        options: PlanOptions,
-        budget: Budget,
-    ) -> MovementPlan:
-        """To the cheapest candidate that can be reached: those straight ahead first, then all."""
-        if len(candidates) > 1 and options.planner_id == "":
-            for q in candidates:
-                direct = plan_regional(start, q, scene, replace(options, planner_id="direct"), budget)
-                if direct.status.ok:
-                    return direct
-        for q in candidates:
-            plan = plan_regional(start, q, scene, options, budget, self.genetic)
-            if plan.status.ok or budget.exhausted:
-                break
-        return plan
 
     def plan_service(
         self,

@@ -45,7 +45,7 @@ class Portfolio:
         self.found: list[tuple[str, Refined]] = []
 
     def add(self, method: str, ways: list[FloatArray]) -> int:
-        """Draft ways (M, n); the number of them that are new."""
+        """Draft ways (M, n), M >= 2; the number of them that are new."""
         new = 0
         weights = self.space.scene.weights
         for way in ways:

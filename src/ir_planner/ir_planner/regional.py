@@ -6,9 +6,8 @@ looked for, and the cheapest go down by gradient to the best path and pace near 
 found is an answer too: which pair is in the way, where, by how much, and what was tried.
 """
 
-from collections.abc import Callable
+from collections import Counter
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from ir_kernels.collision import FREE
@@ -20,8 +19,6 @@ from numpy.typing import NDArray
 
 from ir_planner.budget import Budget
 from ir_planner.clearance import pair_value
-from ir_planner.correction import corrected
-from ir_planner.detours import drawn_back, over_postures, scattered
 from ir_planner.free_space import FreeSpace
 from ir_planner.journal import Journal
 from ir_planner.movement import TimedMovement
@@ -30,22 +27,14 @@ from ir_planner.polish import fewest_corners, pulled
 from ir_planner.portfolio import Portfolio
 from ir_planner.refinement import Refinement
 from ir_planner.regional_settings import GeneticSettings
-from ir_planner.retreat import retreating_paths
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.searches import BY_NAME_ONLY, EXPLORERS, SEARCHES, Ends
 from ir_planner.timing import STILL
-from ir_planner.tree import connect
 
 FloatArray = NDArray[np.float64]
-Search = Callable[[FloatArray, FloatArray, FreeSpace, int], list[FloatArray]]
-Searches = tuple[tuple[str, Search], ...]
 _GENETIC = GeneticSettings()
-_SCATTERED = 160
-_WAYS = 3  # different ways round of one search
 _FINISHED = 2  # drafts that are finished in one round
 _TIMED_BY_LAWS = 3
-_SHORT_TREE = 4000  # edges
-_ROUNDS = 10_000  # the work ends them
-_DIFFERENT = 0.15  # rad: ways whose vias are nearer are one way
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,19 +50,20 @@ class MovementPlan:
 
 def plan_regional(
     start: FloatArray,
-    goal: FloatArray,
+    goals: FloatArray,
     scene: PlanningScene,
     options: PlanOptions,
     budget: Budget,
     settings: GeneticSettings = _GENETIC,
 ) -> MovementPlan:
-    """Movement from start to goal (n,), both within the limits; `settings` of the planner `genetic`.
+    """Movement from start (n,) to a goal (n,), or to the best reachable of goals (G, n), cheapest by W first.
 
-    Raises RequestError for options that can't be met (duration), CancelledError when asked to stop.
+    All within the limits. Raises RequestError for options that can't be met (duration), CancelledError when
+    asked to stop.
     """
     journal = Journal(budget, options.seed)
     names = scene.cell.robot.joint_names
-    status, found = search_regional(start, goal, scene, options, journal, settings)
+    status, found = search_regional(start, goals, scene, options, journal, settings)
     info = journal.info(start, names)
     if found is None:
         return MovementPlan(status, info, TrajectoryReport())
@@ -82,25 +72,24 @@ def plan_regional(
 
 def search_regional(
     start: FloatArray,
-    goal: FloatArray,
+    goals: FloatArray,
     scene: PlanningScene,
     options: PlanOptions,
     journal: Journal,
     settings: GeneticSettings = _GENETIC,
 ) -> tuple[Status, TimedMovement | None]:
     """The best movement found, with the status that says so or says why not."""
+    ends = Ends(start, np.atleast_2d(goals))
     space = FreeSpace.of(scene, options.safety_distance, journal.budget)
-    blocked = end_in_collision(start, goal, space, options.safety_distance)
+    blocked = end_in_collision(start, ends.goals[0], space, options.safety_distance)
     if blocked is not None:
         return blocked, None
     portfolio = Portfolio(space, Refinement(scene, options, journal.budget), journal)
-    searches, explorers = SEARCHES, EXPLORERS
-    if options.planner_id == "genetic":
-        searches = explorers = (("genetic", partial(genetic, settings=settings, journal=journal)),)
-    ways = _first_ways(start, goal, space, options, journal, searches)
+    ways = _first_ways(ends, space, options, journal, settings)
     best: tuple[str, TimedMovement] | None = None
-    if ways and np.abs(goal - start).max() >= STILL and not _by_laws(options):
-        _improve(start, goal, ways, portfolio, options, explorers)
+    there = np.abs(ends.goals - start).max(axis=1).min() < STILL
+    if ways and not there and not _by_laws(options):
+        _improve(ends, ways, portfolio, options, settings)
         best = portfolio.best()
         if best is None:
             portfolio.refinement.check_wish()
@@ -113,7 +102,7 @@ def search_regional(
             if best is not None and best[1].note:
                 notes.append(best[1].note)
     if best is None:
-        return _blocked_status(start, goal, space, options, journal), None
+        return _blocked_status(start, ends.goals[0], space, options, journal), None
     journal.planner_id, movement = best
     return Status.success(), movement
 
@@ -126,38 +115,34 @@ def _by_laws(options: PlanOptions) -> bool:
 
 
 def _first_ways(
-    start: FloatArray,
-    goal: FloatArray,
-    space: FreeSpace,
-    options: PlanOptions,
-    journal: Journal,
-    searches: Searches,
+    ends: Ends, space: FreeSpace, options: PlanOptions, journal: Journal, settings: GeneticSettings
 ) -> list[tuple[str, FloatArray]]:
     """The first free ways, by the first search that finds any."""
-    for name, search in searches:
-        if options.planner_id not in ("", name):
-            continue
+    wanted = [entry for entry in SEARCHES if options.planner_id in ("", entry[0])]
+    wanted += [entry for entry in BY_NAME_ONLY if options.planner_id == entry[0]]
+    for name, search in wanted:
         with journal.stage(name) as notes:
-            paths = search(start, goal, space, options.seed)
-            points = f"{len(paths)} free, {len(paths[0])} points" if paths else ""
-            notes.append(f"first feasible: {points}" if paths else "nothing free")
-        if paths:
-            return [(name, path) for path in paths]
+            found = search(ends, space, settings, options.seed)
+            if found.ways:
+                notes.append(f"first feasible: {len(found.ways)} free, {len(found.ways[0])} points")
+            else:
+                notes.append("nothing free" + (f", {found.note}" if found.note else ""))
+        if found.ways:
+            return [(name, path) for path in found.ways]
         if journal.budget.exhausted:
             break
     return []
 
 
 def _improve(
-    start: FloatArray,
-    goal: FloatArray,
+    ends: Ends,
     ways: list[tuple[str, FloatArray]],
     portfolio: Portfolio,
     options: PlanOptions,
-    explorers: Searches,
+    settings: GeneticSettings,
 ) -> None:
-    """Refine the first ways, look for other ways round, and refine the best of all until the work is
-    spent.
+    """Refine the first ways, then look for other ways round and refine the best of all, turn by turn, until
+    the work is spent.
     """
     journal = portfolio.journal
     until = journal.budget.iterations + journal.budget.improvement
@@ -168,18 +153,24 @@ def _improve(
     with journal.stage("refine") as notes:
         portfolio.add(ways[0][0], [way for _, way in ways])
         notes.append(f"{portfolio.finish_best(1)} certified")
-    others = [entry for entry in explorers if options.planner_id in ("", entry[0])]
-    for turn in range(_ROUNDS):
-        for name, search in others:
-            if not more():
-                return
-            with journal.stage(f"{name} again" if turn else f"other ways: {name}") as notes:
-                found = search(start, goal, portfolio.space, _seed(options.seed, turn, name))
-                notes.append(f"{len(found)} free, {portfolio.add(name, found)} new")
-        with journal.stage("refine") as notes:
-            notes.append(f"{portfolio.finish_best(_FINISHED) if more() else 0} certified")
+    explorers = [entry for entry in EXPLORERS if options.planner_id in ("", entry[0])]
+    turn = 0
+    with journal.stage("improve") as notes:
+        new, certified = Counter[str](), 0
+        while more():
+            before = journal.budget.iterations
+            for name, search in explorers:
+                if more() and not (name == "genetic" and turn == 0 and len(explorers) > 1):
+                    found = search(ends, portfolio.space, settings, _seed(options.seed, turn, name))
+                    new[name] += portfolio.add(name, found.ways)
+            certified += portfolio.finish_best(_FINISHED) if more() else 0
             if more():
-                portfolio.deepen()
+                certified += portfolio.deepen()
+            turn += 1
+            if journal.budget.iterations == before:
+                break  # nothing left to do
+        others = ", ".join(f"{count} by {name}" for name, count in new.items() if count)
+        notes.append(f"{turn} turns, new ways: {others or 'none'}; {certified} certified")
 
 
 def _seed(seed: int, turn: int, name: str) -> int:
@@ -191,92 +182,6 @@ def _seed(seed: int, turn: int, name: str) -> int:
 def _straightened(path: FloatArray, space: FreeSpace) -> FloatArray:
     weights = space.scene.weights
     return pulled(fewest_corners(path, space, weights), space, weights) if len(path) > 2 else path
-
-
-def direct(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """The straight movement, if it is free."""
-    path = np.stack([start, goal])
-    return [path] if space.edges_free(path[:1], path[1:])[0] else []
-
-
-def detours(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """Free simple detours: the cheapest few by W that are different ways."""
-    cell = space.scene.cell
-    postures = [np.array(cell.park), np.array(cell.machine_home)]
-    rng = np.random.default_rng(seed)
-    candidates = [
-        *over_postures(start, goal, postures),
-        *drawn_back(start, goal, postures),
-        *scattered(start, goal, space.low, space.high, _SCATTERED, rng),
-    ]
-    candidates = [np.clip(path, space.low, space.high) for path in candidates]
-    free = space.paths_free(candidates)
-    return _different([path for path, is_free in zip(candidates, free, strict=True) if is_free], space)
-
-
-def retreat(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """Free ways that first draw the tool back: the cheapest few that are different."""
-    return _different(retreating_paths(start, goal, space, np.random.default_rng(seed)), space)
-
-
-def tree(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """A free path found by two trees, however long it takes."""
-    path = connect(start, goal[None], space, seed)
-    return [] if path is None else [path]
-
-
-def short_tree(start: FloatArray, goal: FloatArray, space: FreeSpace, seed: int) -> list[FloatArray]:
-    """The same while it is quick."""
-    path = connect(start, goal[None], space, seed, _SHORT_TREE)
-    return [] if path is None else [path]
-
-
-def genetic(
-    start: FloatArray,
-    goal: FloatArray,
-    space: FreeSpace,
-    seed: int,
-    settings: GeneticSettings,
-    journal: Journal,
-) -> list[FloatArray]:
-    """The straight movement with what collides corrected by a population (eqs. 9, 10); by name only.
-
-    Nothing found: the journal says how near the population came, and which pair blocks.
-    """
-    found = corrected(start, goal, space, settings, np.random.default_rng(seed))
-    if found.pair >= 0 and not found.ways:
-        pair = space.scene.collision.pairs[found.pair]
-        journal.note(
-            "genetic correction",
-            f"{found.generations} generations; the nearest to free lacks {found.shortfall * 1e3:.1f} mm "
-            f"between {pair.body_a} and {pair.body_b}",
-        )
-    return found.ways
-
-
-# in the order in which a first way is looked for; name and search
-SEARCHES: Searches = (
-    ("direct", direct),
-    ("tree", short_tree),
-    ("detours", detours),
-    ("retreat", retreat),
-    ("tree", tree),
-)
-# that find other ways round with another seed
-EXPLORERS: Searches = (("detours", detours), ("tree", short_tree))
-
-
-def _different(ways: list[FloatArray], space: FreeSpace) -> list[FloatArray]:
-    """The cheapest few ways by W that are not the same way round."""
-    weights = space.scene.weights
-    chosen: list[FloatArray] = []
-    for path in sorted(ways, key=lambda path: path_cost(weights, path)):
-        middle = path[len(path) // 2]
-        if all(np.abs(middle - other[len(other) // 2]).max() > _DIFFERENT for other in chosen):
-            chosen.append(path)
-        if len(chosen) == _WAYS:
-            break
-    return chosen
 
 
 def end_in_collision(

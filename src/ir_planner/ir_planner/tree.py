@@ -5,6 +5,8 @@ The search itself is compiled (`ir_kernels.search`); here it is grown in slices 
 budget, so that a request can be stopped between them.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from ir_kernels.search import BidirectionalTree
 from numpy.typing import NDArray
@@ -24,11 +26,17 @@ def joint_scale(space: FreeSpace) -> FloatArray:
     return np.asarray(np.maximum(np.sqrt(weights / weights[0]), _LEAST_SCALE))
 
 
-def connect(
-    start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, most: int = 2**62
-) -> FloatArray | None:
-    """A free path (M, n) from start (n,) to one of goals (G, n), or None when the budget, or `most` edges,
-    ended before one was found.
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """A free path (M, n), or None; then gap [rad]: how near the trees came, each joint by its scale."""
+
+    path: FloatArray | None
+    gap: float
+
+
+def connect(start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, most: int = 2**62) -> Meeting:
+    """A free path from start (n,) to one of goals (G, n), unless the budget, or `most` edges, end before one
+    is found.
 
     Raises CancelledError when asked to stop, ir_kernels.InputError where start, or every goal, isn't free.
     """
@@ -41,5 +49,5 @@ def connect(
         found = search.grow(min(_SLICE, budget.max_iterations - budget.iterations, most - before))
         budget.spend(search.edges - before)
         if found:
-            return search.path
-    return None
+            return Meeting(search.path, 0.0)
+    return Meeting(None, search.gap)

@@ -166,7 +166,7 @@ def tree_out(problem: Exit, rng: np.random.Generator) -> FloatArray | None:
     goals = _outside(problem, rng)
     if len(goals) == 0:
         return None
-    path = connect(problem.work, goals, problem.inside, int(rng.integers(2**63)))
+    path = connect(problem.work, goals, problem.inside, int(rng.integers(2**63))).path
     return None if path is None else _until_out(path, problem)
 
 
