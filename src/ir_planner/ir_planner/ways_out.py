@@ -18,7 +18,7 @@ from ir_planner.errors import RequestError
 from ir_planner.free_space import FreeSpace
 from ir_planner.journal import Journal
 from ir_planner.movement_cost import path_cost
-from ir_planner.polish import fewest_corners, pulled
+from ir_planner.polish import fewest_corners
 from ir_planner.scene import PlanningScene
 from ir_planner.service_settings import WithdrawalSettings
 from ir_planner.tree import connect, joint_scale
@@ -204,14 +204,7 @@ def _cheapest(ways: list[Way], problem: Exit, wanted: int) -> list[Way]:
     for way in sorted(shortened, key=cost):
         if len(chosen) < wanted and all(_apart(way.points, other.points) for other in chosen):
             chosen.append(way)
-    straight = [pulled(way.points, space, weights) for way in chosen]
-    return sorted(
-        (
-            Way(way.method, path if problem.contacts_end(path) else way.points)
-            for way, path in zip(chosen, straight, strict=True)
-        ),
-        key=cost,
-    )
+    return chosen
 
 
 def _apart(a: FloatArray, b: FloatArray) -> bool:
