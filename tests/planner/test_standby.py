@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
 from ir_planner.scene import load_text, scene_with
-from ir_planner.settings import PauseSettings
 from ir_planner.standby import break_even, mode_watts, pause_energy, plan_standby
 
 from ir_description import load_cell, load_power_data
@@ -20,7 +20,7 @@ POWER = load_power_data()
 SCENE = scene_with(CELL, load_text(CELL), POWER)
 EMPTY = replace(SCENE, loads=())
 HOME = np.array(CELL.machine_home)
-TIMES = PauseSettings()
+TIMES = TransitionTimes()
 
 
 @pytest.mark.parametrize("payload", [0.0, 155.0])

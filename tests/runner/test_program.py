@@ -13,6 +13,7 @@ from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.transitions import TransitionTimes
 from ir_program_runner.errors import CanceledError
 from ir_program_runner.program import Program
 from ir_program_runner.settings import ProgramSettings
@@ -51,8 +52,8 @@ class World:
     refusals: dict[str, Status] = field(default_factory=dict)
     cancel_in: Callable[[ask.Request], bool] = lambda request: False
 
-    def run(self, movements, settings=None):
-        steps = Program(movements, settings or ProgramSettings()).run()
+    def run(self, movements, settings=None, times=None):
+        steps = Program(movements, settings or ProgramSettings(), times).run()
         try:
             request = next(steps)
             while True:
@@ -243,11 +244,12 @@ def test_the_robot_is_woken_as_late_as_possible():
 
 def test_times_come_from_the_settings_when_the_driver_does_not_tell_them():
     world = World(knows_modes=False)
-    settings = ProgramSettings(bus_power_off_leave=30.0, bus_power_off_enter=3.0, wake_margin=0.0)
+    settings = ProgramSettings(wake_margin=0.0)
     woken = []
     original = world.wake
     world.wake = lambda rest: (woken.append(world.now), original(rest))
-    world.run([pause(60.0, "BUS_POWER_OFF")], settings)
+    times = TransitionTimes(bus_power_off_leave=30.0, bus_power_off_enter=3.0)
+    world.run([pause(60.0, "BUS_POWER_OFF")], settings, times=times)
     assert woken == [pytest.approx(130.0)]
 
 

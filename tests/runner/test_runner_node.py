@@ -20,9 +20,9 @@ from ir_msgs_py.ros.conversions import planned_movement_to_msg, power_mode_to_ms
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.transitions import TransitionTimes
 from ir_program_runner.machines import Machines
 from ir_program_runner.node import ProgramRunnerNode
-from ir_program_runner.settings import ProgramSettings
 from ir_program_runner.wake_on_lan import magic_packet
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
@@ -88,15 +88,15 @@ class FakeDriver(Node):
 
     def query_modes(self, request, response):
         response.status = OK
-        settings = ProgramSettings(
+        times = TransitionTimes(
             **{
                 f"{name}_{way}": 0.0
                 for name in ("bus_power_off", "hibernation")
-                for way in ("enter", "leave", "stay")
+                for way in ("enter", "leave", "minimum_stay")
             }
         )
         response.modes = [
-            power_mode_to_msg(settings.times(mode)) for mode in (Mode.BUS_POWER_OFF, Mode.HIBERNATION)
+            power_mode_to_msg(times.of(mode)) for mode in (Mode.BUS_POWER_OFF, Mode.HIBERNATION)
         ]
         return response
 

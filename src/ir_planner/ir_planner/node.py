@@ -35,6 +35,7 @@ from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.transitions import TransitionTimes
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -57,7 +58,7 @@ from ir_planner.regional_settings import GeneticSettings
 from ir_planner.service_movement import ServicePlan
 from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
 from ir_planner.service_shapes import service_shapes
-from ir_planner.settings import PauseSettings, PlannerSettings
+from ir_planner.settings import PlannerSettings
 from ir_planner.shapes import Shape, cell_shapes, movement_shapes
 
 _MARKER = {
@@ -77,7 +78,7 @@ class PlannerNode(Node):
 
     def __init__(
         self,
-        make_planner: Callable[[PlannerSettings, PauseSettings], Planner] | None = None,
+        make_planner: Callable[[PlannerSettings, TransitionTimes], Planner] | None = None,
         context: Context | None = None,
         **options: Any,
     ) -> None:
@@ -185,7 +186,7 @@ class PlannerNode(Node):
     def _change_settings(self, settings: PlannerSettings) -> None:
         self.planner.settings = settings
 
-    def _change_pauses(self, pauses: PauseSettings) -> None:
+    def _change_pauses(self, pauses: TransitionTimes) -> None:
         self.planner.pauses = pauses
 
     def _change_interaction(self, settings: InteractionSettings) -> None:

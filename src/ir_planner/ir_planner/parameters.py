@@ -3,11 +3,12 @@
 from collections.abc import Callable
 
 from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from rclpy.node import Node
 
 from ir_planner.regional_settings import GeneticSettings
 from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
-from ir_planner.settings import PauseSettings, PlannerSettings
+from ir_planner.settings import PlannerSettings
 
 
 class PlannerParameters:
@@ -20,13 +21,13 @@ class PlannerParameters:
         self,
         node: Node,
         on_planner: Callable[[PlannerSettings], None],
-        on_pauses: Callable[[PauseSettings], None],
+        on_pauses: Callable[[TransitionTimes], None],
         on_interaction: Callable[[InteractionSettings], None],
         on_withdrawal: Callable[[WithdrawalSettings], None],
         on_genetic: Callable[[GeneticSettings], None],
     ) -> None:
         self._planner = Parameters(node, PlannerSettings, on_change=on_planner)
-        self._pauses = Parameters(node, PauseSettings, prefix="transitions.", on_change=on_pauses)
+        self._pauses = Parameters(node, TransitionTimes, prefix=PREFIX, on_change=on_pauses)
         self._interaction = Parameters(
             node, InteractionSettings, prefix="interaction.", on_change=on_interaction
         )
@@ -39,7 +40,7 @@ class PlannerParameters:
         return self._planner.value
 
     @property
-    def pauses(self) -> PauseSettings:
+    def pauses(self) -> TransitionTimes:
         """In force now."""
         return self._pauses.value
 

@@ -12,6 +12,7 @@ from ir_msgs_py.report import DistancePair, PlannedMovement, PlanningInfo, Plann
 from ir_msgs_py.stations import IkSolution
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.transitions import TransitionTimes
 from numpy.typing import NDArray
 
 from ir_description import Cell, PowerData, cell_from_yaml, load_cell, load_power_data
@@ -31,7 +32,7 @@ from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_planner.service_movement import ServicePlan, ServiceRequest, checked_request, plan_service
 from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
-from ir_planner.settings import PauseSettings, PlannerSettings
+from ir_planner.settings import PlannerSettings
 from ir_planner.standby import Standby, plan_standby
 from ir_planner.store import Store
 from ir_planner.ways_out import known_method
@@ -80,7 +81,7 @@ class Planner:
         self,
         clock: Clock,
         settings: PlannerSettings | None = None,
-        pauses: PauseSettings | None = None,
+        pauses: TransitionTimes | None = None,
         power: PowerData | None = None,
         interaction: InteractionSettings | None = None,
         withdrawal: WithdrawalSettings | None = None,
@@ -88,7 +89,7 @@ class Planner:
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
-        self.pauses = pauses or PauseSettings()
+        self.pauses = pauses or TransitionTimes()
         self.power = power or load_power_data()
         self.interaction = interaction or InteractionSettings()
         self.withdrawal = withdrawal or WithdrawalSettings()

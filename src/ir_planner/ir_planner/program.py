@@ -15,6 +15,7 @@ from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.transitions import TransitionTimes
 from numpy.typing import NDArray
 
 from ir_description import Cell, PowerData
@@ -35,7 +36,6 @@ from ir_planner.reporting import total_report
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ServiceLine, timed_service
 from ir_planner.service_settings import WithdrawalSettings
-from ir_planner.settings import PauseSettings
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int, float], None]
@@ -65,7 +65,7 @@ class ProgramRequest:
     options: PlanOptions
     cycle_time: float = 0.0
     regeneration: Regeneration = "shared"
-    pauses: PauseSettings = field(default_factory=PauseSettings)
+    pauses: TransitionTimes = field(default_factory=TransitionTimes)
     withdrawal: WithdrawalSettings = field(default_factory=WithdrawalSettings)
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
+from ir_msgs_py.transitions import TransitionTimes
 from numpy.typing import NDArray
 
 from ir_planner.blending import stretched
@@ -11,7 +12,6 @@ from ir_planner.movement import TimedMovement
 from ir_planner.program_steps import PlacedStep, Scenes, signal_text
 from ir_planner.reporting import evaluate_trajectory
 from ir_planner.scene import PlanningScene
-from ir_planner.settings import PauseSettings
 from ir_planner.standby import pause_energy, plan_standby
 
 FloatArray = NDArray[np.float64]
@@ -57,7 +57,7 @@ def assembled(
     steps: tuple[PlacedStep, ...],
     legs: dict[int, Leg],
     scenes: Scenes,
-    times: PauseSettings,
+    times: TransitionTimes,
     start: FloatArray,
 ) -> tuple[PlannedMovement, ...]:
     """Movements and pauses in order. `legs`: by the step they belong to. `times`: of the power modes.
@@ -116,7 +116,7 @@ def _moves(leg: Leg) -> list[PlannedMovement]:
 
 
 def _pause(
-    here: str, duration: float, wish: str, q: FloatArray, scene: PlanningScene, times: PauseSettings
+    here: str, duration: float, wish: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
 ) -> PlannedMovement:
     mode = wish
     if duration > 0.0 and wish == AUTO:

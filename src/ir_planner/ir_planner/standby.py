@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from ir_msgs_py.power import REST_MODES, Mode, PowerMode
 from ir_msgs_py.status import StatusCode
+from ir_msgs_py.transitions import TransitionTimes
 from numpy.typing import NDArray
 
 from ir_planner.energy import holding_watts
 from ir_planner.errors import RequestError
 from ir_planner.scene import PlanningScene
-from ir_planner.settings import PauseSettings
 
 FloatArray = NDArray[np.float64]
 MOTORS = "STAND_ON_MOTORS"
@@ -48,7 +48,9 @@ def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
     return scene.power.mode(name).controller_watts + always + bus
 
 
-def pause_energy(name: str, pause: float, q: FloatArray, scene: PlanningScene, times: PauseSettings) -> float:
+def pause_energy(
+    name: str, pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+) -> float:
     """Energy [J] of a pause [s] in a mode, inf when it is too short for it."""
     change = times.enter(name) + times.leave(name)
     if pause < change + times.minimum_stay(name):
@@ -56,7 +58,7 @@ def pause_energy(name: str, pause: float, q: FloatArray, scene: PlanningScene, t
     return mode_watts(MOTORS, q, scene) * change + mode_watts(name, q, scene) * (pause - change)
 
 
-def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: PauseSettings) -> Standby:
+def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Standby:
     """The mode of least energy for a pause [s] at q (n,). Raises RequestError for a pause that is none."""
     if not (np.isfinite(pause) and 0.0 < pause <= PAUSE_MAX):
         raise RequestError(
@@ -69,7 +71,7 @@ def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: Pause
     return Standby(modes[k], wake_at, energies[k], energies[0] - energies[k], modes, energies)
 
 
-def _mode(name: str, q: FloatArray, scene: PlanningScene, times: PauseSettings) -> PowerMode:
+def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> PowerMode:
     data = scene.power.mode(name)
     motors = mode_watts(MOTORS, q, scene)
     enter, leave, stay = times.enter(name), times.leave(name), times.minimum_stay(name)
@@ -88,7 +90,7 @@ def _mode(name: str, q: FloatArray, scene: PlanningScene, times: PauseSettings) 
     )
 
 
-def break_even(name: str, q: FloatArray, scene: PlanningScene, times: PauseSettings) -> float:
+def break_even(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
     """Pause [s] from which a mode saves against the next shallower one, both entered from motors; inf:
     never.
     """

@@ -126,7 +126,8 @@ class ProgramRunnerNode(Node):
             result = ProgramResult(status, 0)
             if status.ok:
                 progress.movements = movements
-                result = await self._run_steps(goal, Program(movements, self._settings.program.value))
+                program = Program(movements, self._settings.program.value, self._settings.transitions.value)
+                result = await self._run_steps(goal, program)
         finally:
             self._progress = None
         return self._end(goal, result, self._now() - progress.started, self._driver.energy - energy)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from rclpy.node import Node
 
 from ir_program_runner.settings import LinkSettings, ProgramSettings
@@ -13,9 +14,10 @@ from ir_program_runner.settings import LinkSettings, ProgramSettings
 
 @dataclass(frozen=True)
 class RunnerParameters:
-    """What the node is set to."""
+    """What the node is set to; transitions count where the driver doesn't tell them."""
 
     program: Parameters[ProgramSettings]
+    transitions: Parameters[TransitionTimes]
     links: Parameters[LinkSettings]
 
 
@@ -26,5 +28,7 @@ def declare_parameters(node: Node, busy: Callable[[], bool]) -> RunnerParameters
         return f"a program runs: {', '.join(names)} can be changed when it has ended" if busy() else ""
 
     return RunnerParameters(
-        Parameters(node, ProgramSettings, refuse=refuse), Parameters(node, LinkSettings, refuse=refuse)
+        Parameters(node, ProgramSettings, refuse=refuse),
+        Parameters(node, TransitionTimes, prefix=PREFIX, refuse=refuse),
+        Parameters(node, LinkSettings, refuse=refuse),
     )

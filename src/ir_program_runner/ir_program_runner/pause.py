@@ -11,6 +11,7 @@ from collections.abc import Generator
 from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.transitions import TransitionTimes
 
 from ir_program_runner.errors import CanceledError, StepFailedError
 from ir_program_runner.requests import (
@@ -38,10 +39,10 @@ _BIT = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib", Mode.STAND_ON_BRAKES:
 class Pause:
     """One pause; `run()` is the generator that returns a note, "" when all went as planned."""
 
-    def __init__(self, movement: PlannedMovement, settings: ProgramSettings) -> None:
+    def __init__(self, movement: PlannedMovement, settings: ProgramSettings, times: TransitionTimes) -> None:
         self._duration = movement.duration
         self._mode = Mode[movement.power_mode or Mode.STAND_ON_MOTORS.name]
-        self._settings = settings
+        self._settings, self._times = settings, times
         self._bit = _BIT.get(self._mode, "")
         self.restarted = False  # whether the controller has hibernated
 
@@ -52,7 +53,7 @@ class Pause:
         if self._mode is Mode.STAND_ON_MOTORS:
             need((yield WaitUntil(end)))
             return ""
-        times = self._settings.times(self._mode)
+        times = self._times.of(self._mode)
         asked = yield AskModes()
         times = next((mode for mode in asked.modes if mode.mode is self._mode), times)
         shortest = times.time_to_pause + times.time_min_length_of_stay + times.regular_time_to_operate

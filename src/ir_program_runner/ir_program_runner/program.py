@@ -14,6 +14,7 @@ from ir_msgs_py.power import Mode
 from ir_msgs_py.program import Event
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.transitions import TransitionTimes
 
 from ir_program_runner.checks import load_after, step_name
 from ir_program_runner.errors import CanceledError, StepFailedError
@@ -49,14 +50,21 @@ class ProgramResult:
 
 
 class Program:
-    """One run of a checked program. `run()` is the generator.
+    """One run of a checked program. `run()` is the generator. times: of the power modes, where the driver
+    doesn't tell them.
 
     CanceledError may be thrown into it once, at a request that is INTERRUPTIBLE.
     """
 
-    def __init__(self, movements: Sequence[PlannedMovement], settings: ProgramSettings) -> None:
+    def __init__(
+        self,
+        movements: Sequence[PlannedMovement],
+        settings: ProgramSettings,
+        times: TransitionTimes | None = None,
+    ) -> None:
         self._movements = tuple(movements)
         self._settings = settings
+        self._times = times or TransitionTimes()
         self._carried = ""  # what the driver was last told; "" = not known
 
     def run(self) -> Generator[Request, Outcome, ProgramResult]:
@@ -103,7 +111,7 @@ class Program:
         yield from self._carry(movement.load)
         yield Tell(index, Event.STARTED)
         if movement.is_pause:
-            pause = Pause(movement, self._settings)
+            pause = Pause(movement, self._settings, self._times)
             note = yield from pause.run()
             if pause.restarted:
                 self._carried = ""  # the controller has started anew

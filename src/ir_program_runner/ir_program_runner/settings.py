@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.settings import check_settings, setting
 
 _HOUR = 3600.0
@@ -13,7 +12,7 @@ _HOUR = 3600.0
 
 @dataclass(frozen=True)
 class ProgramSettings:
-    """Patience and margins of a program, and times of the power modes where the driver doesn't tell them."""
+    """Patience and margins of a program."""
 
     signal_timeout: float = setting(
         600.0, "Longest wait for the signals of a step.", unit="s", minimum=0.0, maximum=24 * _HOUR
@@ -37,37 +36,9 @@ class ProgramSettings:
         minimum=0.1,
         maximum=60.0,
     )
-    brakes_enter: float = setting(0.3, "Time to close the brakes.", unit="s", minimum=0.0, maximum=_HOUR)
-    brakes_leave: float = setting(0.7, "Time to open the brakes.", unit="s", minimum=0.0, maximum=_HOUR)
-    brakes_stay: float = setting(1.0, "Shortest stay on brakes.", unit="s", minimum=0.0, maximum=_HOUR)
-    bus_power_off_enter: float = setting(
-        3.0, "Time to switch the drive bus off.", unit="s", minimum=0.0, maximum=_HOUR
-    )
-    bus_power_off_leave: float = setting(
-        20.0, "Time to switch the drive bus on.", unit="s", minimum=0.0, maximum=_HOUR
-    )
-    bus_power_off_stay: float = setting(
-        2.0, "Shortest stay with the bus off.", unit="s", minimum=0.0, maximum=_HOUR
-    )
-    hibernation_enter: float = setting(60.0, "Time to hibernate.", unit="s", minimum=0.0, maximum=_HOUR)
-    hibernation_leave: float = setting(120.0, "Time to wake up.", unit="s", minimum=0.0, maximum=_HOUR)
-    hibernation_stay: float = setting(
-        120.0, "Shortest stay in hibernation.", unit="s", minimum=0.0, maximum=_HOUR
-    )
 
     def __post_init__(self) -> None:
         check_settings(self)
-
-    def times(self, mode: Mode) -> PowerMode:
-        """Times of a rest mode, as far as these settings know them."""
-        enter, leave, stay = {
-            Mode.STAND_ON_BRAKES: (self.brakes_enter, self.brakes_leave, self.brakes_stay),
-            Mode.BUS_POWER_OFF: (self.bus_power_off_enter, self.bus_power_off_leave, self.bus_power_off_stay),
-            Mode.HIBERNATION: (self.hibernation_enter, self.hibernation_leave, self.hibernation_stay),
-        }[mode]
-        return PowerMode(
-            mode=mode, time_to_pause=enter, regular_time_to_operate=leave, time_min_length_of_stay=stay
-        )
 
 
 @dataclass(frozen=True)

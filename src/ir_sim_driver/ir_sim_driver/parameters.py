@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.settings import check_settings, setting
+from ir_msgs_py.transitions import PREFIX
 from rclpy.node import Node
 
 from ir_sim_driver.control import ControlSettings
@@ -96,7 +97,7 @@ class DriverParameters:
             controller=Parameters(node, ControllerSettings).value,
             control=Parameters(node, ControlSettings, prefix="control.").value,
             execution=execution.value,
-            transitions=Parameters(node, TransitionSettings, prefix="transitions.").value,
+            transitions=Parameters(node, TransitionSettings, prefix=PREFIX).value,
             plc=Parameters(node, PlcSettings, prefix="plc.").value,
         )
         self._execution = execution

@@ -13,46 +13,48 @@ from ir_msgs_py.settings import check_settings, setting
 
 from ir_sim_driver.errors import SettingsError
 
+_WEEK = 604_800.0
+
 
 @dataclass(frozen=True)
 class TransitionSettings:
-    """Times of the ways into and out of each rest, the shortest stay in it, and the controller's own
-    timers.
+    """Times of the ways into and out of each rest and the shortest stay in it, under the names of
+    ir_msgs_py.transitions, but fixed at the start; and the controller's own timers.
     """
 
     stand_on_brakes_enter: float = setting(
-        0.3, "Motors to brakes.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        0.3, "Motors to brakes.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     stand_on_brakes_leave: float = setting(
-        0.7, "Brakes to motors.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        0.7, "Brakes to motors.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     stand_on_brakes_minimum_stay: float = setting(
-        1.0, "Shortest stay on brakes.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        1.0, "Shortest stay on brakes.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     bus_power_off_enter: float = setting(
-        3.0, "Into Bus Power Off.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        3.0, "Into Bus Power Off.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     bus_power_off_leave: float = setting(
-        20.0, "Bus Power Off to motors.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        20.0, "Bus Power Off to motors.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     bus_power_off_minimum_stay: float = setting(
-        2.0, "Shortest Bus Power Off.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        2.0, "Shortest Bus Power Off.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     hibernation_enter: float = setting(
-        60.0, "Into hibernation.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        60.0, "Into hibernation.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     hibernation_leave: float = setting(
-        120.0, "Hibernation to motors.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        120.0, "Hibernation to motors.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     hibernation_minimum_stay: float = setting(
-        120.0, "Shortest hibernation.", unit="s", minimum=0.0, maximum=1e5, read_only=True
+        120.0, "Shortest hibernation.", unit="s", minimum=0.0, maximum=_WEEK, read_only=True
     )
     motors_to_brakes_in_program: float = setting(
         20.0,
         "Standing on motors before the brakes close, in AUT and EXT.",
         unit="s",
         minimum=0.0,
-        maximum=1e5,
+        maximum=_WEEK,
         read_only=True,
     )
     motors_to_brakes_in_command: float = setting(
@@ -60,7 +62,7 @@ class TransitionSettings:
         "Standing on motors before the brakes close, in T1 and T2.",
         unit="s",
         minimum=0.0,
-        maximum=1e5,
+        maximum=_WEEK,
         read_only=True,
     )
 
