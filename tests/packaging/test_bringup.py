@@ -9,6 +9,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import yaml
+from ir_msgs_py.settings import describe
+from ir_planner.settings import PlannerSettings
+from ir_program_runner.settings import LinkSettings, ProgramSettings
+from ir_recorder.settings import RecorderSettings
+from ir_sim_driver.execution_settings import ExecutionSettings
+from ir_sim_driver.parameters import NodeSettings
+from ir_sim_driver.simulation_settings import ControllerSettings
 
 from ir_msgs_py import names
 
@@ -29,24 +36,37 @@ def test_the_launch_file_starts_executables_that_the_packages_declare() -> None:
         )
 
 
-def leaves(block: dict[str, object]) -> Iterator[str]:
-    """Names of the parameters, without the prefixes they are nested in."""
+def leaves(block: dict[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Full names of the parameters, and what the file says."""
     for name, value in block.items():
         if isinstance(value, dict):
-            yield from leaves(value)
+            yield from leaves(value, f"{prefix}{name}.")
         else:
-            yield name
+            yield f"{prefix}{name}", value
 
 
-def test_the_parameter_file_names_settings_of_the_nodes() -> None:
+SETTINGS = {
+    "ir_planner": {"": (PlannerSettings,)},
+    "ir_sim_driver": {"": (NodeSettings, ControllerSettings), "execution.": (ExecutionSettings,)},
+    "ir_program_runner": {"": (ProgramSettings, LinkSettings)},
+    "ir_recorder": {"": (RecorderSettings,)},
+}
+
+
+def test_the_parameter_file_shows_settings_of_the_nodes_with_their_defaults() -> None:
     parameters = yaml.safe_load((BRINGUP / "config" / "cell.yaml").read_text(encoding="utf-8"))
     assert set(parameters) == {f"/**/{node}" for node in NODES}
-    for key, block in parameters.items():
-        package = key.removeprefix("/**/")
-        sources = "\n".join(path.read_text() for path in (ROOT / "src" / package / package).glob("*.py"))
-        declared = set(re.findall(r"^    (\w+): [\w\[\], .]+ = ", sources, re.MULTILINE))
+    for node, by_prefix in SETTINGS.items():
+        block = parameters[f"/**/{node}"]
+        defaults = {
+            f"{prefix}{each.name}": each.default
+            for prefix, classes in by_prefix.items()
+            for settings in classes
+            for each in describe(settings)
+        }
         assert set(block) == {"ros__parameters"}
-        assert set(leaves(block["ros__parameters"])) <= declared, f"{package} has no such setting"
+        shown = dict(leaves(block["ros__parameters"]))
+        assert shown == {name: defaults.get(name, "no such setting") for name in shown}, node
 
 
 def test_views_show_topics_of_the_cell() -> None:
