@@ -16,6 +16,7 @@ from ir_planner.goals import Goal
 from ir_planner.planner import Planner
 
 PLANNING_TIME = 1.0  # s
+ENDLESS = 100_000_000  # certified edges: more than the time holds
 UNHURRIED = 60.0  # s: where ids are compared, so that the budget of work ends a search and never the clock
 FIRST = "first feasible"  # how the note of the stage begins that knew the first free way
 NOTHING = "nothing free"
@@ -98,6 +99,11 @@ def runs(planner: Planner, task: Task, seeds: int) -> list[Run]:
     """Seeds 0 .. N-1, after one answer that isn't counted."""
     run(planner, task, asked(task))
     return [run(planner, task, asked(task, seed)) for seed in range(seeds)]
+
+
+def patient_runs(planner: Planner, task: Task, seeds: int) -> list[Run]:
+    """The same with as much work as PLANNING_TIME holds."""
+    return [run(planner, task, replace(asked(task, seed), max_iterations=ENDLESS)) for seed in range(seeds)]
 
 
 def until(planner: Planner, task: Task, seconds: float, iterations: int) -> Iterator[Cost]:

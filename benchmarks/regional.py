@@ -1,10 +1,11 @@
 """What does a regional movement cost, how fast is it known, and what do OMPL and TOPP-RA reach beside it?
 
     python benchmarks/regional.py [--cell FILE]... [--task NAME]... [--seeds N] [--peers N] [--coal N]
-                                  [--best-seconds S | --minute] [--best FILE] [--quick]
+                                  [--patient N] [--best-seconds S | --minute] [--best FILE] [--quick]
                                   [--json FILE] [--plot FILE]
 
-Every task there and back with J = drive energy without base load + 500 W x T; then OMPL's RRTConnect and
+Every task there and back with J = drive energy without base load + 500 W x T, with the default budget and
+with 1 s of work; then OMPL's RRTConnect and
 BKPIECE1 (validity by the project's own kernel every 0.01 rad, PathSimplifier) with TOPP-RA over their paths
 (speed, acceleration and torque, no limit of jerk) and the uniform slow-down of least J. The best known J
 is what any method finds in longer time: some seconds per task, or --minute for 60 s of each method; an
@@ -24,7 +25,17 @@ from _regional_best import best_of, read
 from _regional_checks import SecondOpinion
 from _regional_figures import Claim, Figures, PeerRun, at_least, claims_of
 from _regional_ompl import PLANNERS, SEARCH_S, ompl_path
-from _regional_ours import Run, asked, knows, planner_of, repeats, runs, solved_alone, tells_first
+from _regional_ours import (
+    Run,
+    asked,
+    knows,
+    patient_runs,
+    planner_of,
+    repeats,
+    runs,
+    solved_alone,
+    tells_first,
+)
 from _regional_plot import plot
 from _regional_tasks import CELLS, Task, tasks_of
 from _regional_toppra import timed
@@ -45,6 +56,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--cell", action="append", help=f"file or bundled cell; default: {', '.join(CELLS)}")
     parser.add_argument("--task", action="append", help="only tasks of this name, as home->p1")
     parser.add_argument("--seeds", type=int, default=30)
+    parser.add_argument("--patient", type=int, default=3, help="seeds with 1 s of work per task")
     parser.add_argument("--peers", type=int, default=5, help="searches of each of OMPL's planners per task")
     parser.add_argument("--coal", type=int, default=1, help="movements per task that Coal checks")
     parser.add_argument("--best-seconds", type=float, default=5.0, help="per task for the best known J")
@@ -56,6 +68,7 @@ def arguments() -> argparse.Namespace:
     given = parser.parse_args()
     if given.quick:
         given.seeds, given.peers, given.best_seconds = min(given.seeds, 2), min(given.peers, 2), 1.0
+        given.patient = min(given.patient, 1)
     return given
 
 
@@ -99,14 +112,16 @@ def measured(
 ) -> Figures:
     """All figures of one task."""
     mine = runs(planner, task, given.seeds)
+    patient = patient_runs(planner, task, given.patient)
     peers = peer_runs(task, given.peers)
     seconds = 60.0 if given.minute else given.best_seconds / METHODS
-    by, J = best_known(planner, task, seconds, mine, peers, earlier)
+    by, J = best_known(planner, task, seconds, [*mine, *patient], peers, earlier)
     different = {one.trajectory_id: one.trajectory for one in mine if one.trajectory is not None}
     coal = [opinion.clearance_left(one, task.margin) for one in list(different.values())[: given.coal]]
     return Figures(
         task,
         tuple(mine),
+        tuple(patient),
         peers,
         by,
         J,
@@ -147,7 +162,7 @@ def tables(figures: list[Figures]) -> None:
     planners = list(dict.fromkeys(peer.planner for f in figures for peer in f.peers))
     columns = ["task", "S_m_mm", "solved", "truncated", "first_ms", "final_ms", "J", "T", "E", "clearance_mm"]
     columns += [f"{name}_{what}" for name in planners for what in ("solved", "first_ms", "final_ms", "J")]
-    columns += ["ompl_J", "ompl_T", "ompl_E", "best_J", "near_best", "best_by"]
+    columns += ["ompl_J", "ompl_T", "ompl_E", "best_J", "near_best", "near_best_1s", "best_by"]
     rows = [["-" if f.row().get(c) is None else str(f.row()[c]) for c in columns] for f in figures]
     heads = [c.replace("RRTConnect", "RRTC").replace("BKPIECE1", "BKP") for c in columns]
     widths = [max(len(line[k]) for line in [heads, *rows]) for k in range(len(columns))]
