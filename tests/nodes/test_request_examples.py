@@ -1,0 +1,102 @@
+"""The call that every .srv file starts with, put to running nodes with the demonstration cell."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ir_msgs.msg import Status
+from ir_msgs_py.ros.types import interface_type
+from ir_msgs_py.ros.yaml_messages import message_from_yaml
+from ir_recorder.node import RecorderNode
+from ir_recorder.settings import RecorderSettings
+from ir_sim_driver.node import SimDriver
+from rclpy.parameter import Parameter
+
+from ir_msgs_py import names
+
+SRV_FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs" / "srv"
+LINE = re.compile(r'# ros2 service call (\S+) (\S+) "(.*)"')
+UNKNOWN = "0123456789abcdef"  # the id that examples give
+LATER = {"ExportProgram", "OptimizeTrajectory"}  # defined before a node offers them
+DRIVER = {"cell": "demo", "backend": "ideal", "wake_port": 0, "transitions.stand_on_brakes_minimum_stay": 0.1}
+
+# in this order: a pause ends before a bit is set, a recording starts before it stops; code and a word of the
+# sentence
+EXPECTED: dict[str, tuple[int, str]] = {
+    "SetCell": (Status.SUCCESS, ""),
+    "GetCell": (Status.SUCCESS, ""),
+    "SetEquipment": (Status.SUCCESS, ""),
+    "CheckState": (Status.SUCCESS, ""),
+    "StartRecording": (Status.SUCCESS, "shift.mcap"),
+    "ComputeIk": (Status.SUCCESS, ""),
+    "PlanRegionalMovement": (Status.SUCCESS, ""),
+    "PlanServiceMovement": (Status.SUCCESS, ""),
+    "PlanTrajectory": (Status.SUCCESS, ""),
+    "PlanProgram": (Status.SUCCESS, ""),
+    "PlanStandby": (Status.SUCCESS, ""),
+    "EvaluateTrajectory": (Status.INVALID_OBJECT_NAME, UNKNOWN),
+    "GetTrajectory": (Status.INVALID_OBJECT_NAME, UNKNOWN),
+    "GetProgram": (Status.INVALID_OBJECT_NAME, UNKNOWN),
+    "OptimizeTrajectory": (Status.INVALID_OBJECT_NAME, UNKNOWN),
+    "ExportProgram": (Status.INVALID_OBJECT_NAME, UNKNOWN),
+    "SetLoad": (Status.SUCCESS, "gripper"),
+    "QueryModes": (Status.SUCCESS, ""),
+    "StartPause": (Status.SUCCESS, "STAND_ON_BRAKES for 60 s"),
+    "EndPause": (Status.SUCCESS, ""),
+    "Recover": (Status.SUCCESS, "nothing to recover from"),
+    "SetPlcInput": (Status.SUCCESS, ""),
+    "StopRecording": (Status.SUCCESS, "messages over"),
+}
+
+
+def example(name: str) -> tuple[str, str, str]:
+    """Service, type and request as the first line of a file says."""
+    found = LINE.fullmatch((SRV_FOLDER / f"{name}.srv").read_text(encoding="utf-8").splitlines()[0])
+    assert found is not None, name
+    return found[1], found[2], found[3]
+
+
+def test_an_answer_is_expected_of_every_service() -> None:
+    assert set(EXPECTED) == {file.stem for file in SRV_FOLDER.glob("*.srv")}
+
+
+@pytest.mark.usefixtures("planner_node")
+def test_the_examples_are_answered_as_they_should(
+    ros_context: Any,
+    ros_executor: Any,
+    ros_node: Any,
+    wait_for: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    overrides = [Parameter(name, value=value) for name, value in DRIVER.items()]
+    ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+    ros_executor.add_node(RecorderNode(RecorderSettings(), context=ros_context))
+    wait_for(lambda: ros_node.count_publishers(f"/{names.JOINT_STATES}"), what="joint_states come")
+
+    def offered() -> set[str]:
+        return {service for service, _ in ros_node.get_service_names_and_types()}
+
+    now = {name: example(name)[0] for name in EXPECTED if name not in LATER}
+    wait_for(lambda: set(now.values()) <= offered(), timeout=20.0, what="the services are offered")
+    wrong = []
+    for name, (code, word) in EXPECTED.items():
+        service, type_text, text = example(name)
+        if name in LATER and service not in offered():
+            continue
+        kind = interface_type(type_text, "srv")
+        client = ros_executor.run(lambda kind=kind, service=service: ros_node.create_client(kind, service))
+        wait_for(client.service_is_ready, what=f"{service} is ready")
+        request = message_from_yaml(kind.Request, text)
+        future = ros_executor.run(lambda client=client, request=request: client.call_async(request))
+        wait_for(future.done, timeout=120.0, what=f"{service} answers")
+        status = future.result().status
+        if status.code != code or word not in status.message:
+            wrong.append(f"{name}: {status.code} {status.message!r} (wanted {code} with {word!r})")
+    assert wrong == []
+    assert (tmp_path / "out" / "shift.mcap").stat().st_size > 0
