@@ -64,6 +64,11 @@ def space_of(task: Task) -> FreeSpace:
     return FreeSpace.of(task.scene, task.margin, budget)
 
 
+def straight_is_free(task: Task) -> bool:
+    """Whether there is nothing to correct."""
+    return bool(space_of(task).edges_free(task.start[None], task.goal[None])[0])
+
+
 def timed(task: Task, settings: GeneticSettings, seed: int) -> tuple[Correction, float, FreeSpace]:
     """A correction, its time in ms and the space it was charged to."""
     space = space_of(task)
@@ -138,10 +143,7 @@ def main() -> None:
     given = parser.parse_args()
     rows: list[dict[str, Any]] = []
     for cell in given.cell or CELLS:
-        tasks = []
-        for task in tasks_of(cell):
-            if not space_of(task).edges_free(task.start[None], task.goal[None])[0]:
-                tasks.append(task)
+        tasks = [task for task in tasks_of(cell) if not straight_is_free(task)]
         for variant, changed in VARIANTS.items():
             settings = GeneticSettings(**changed)
             searches = [searched(task, settings, seed) for task in tasks for seed in range(given.seeds)]

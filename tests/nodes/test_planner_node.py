@@ -619,3 +619,18 @@ def test_a_parameter_out_of_range_is_refused_and_the_value_kept(
     answer = call(SetParameters, "set_parameters", parameters=[parameter])
     assert not answer.results[0].successful
     assert planner_node.planner.settings.max_iterations > 0
+
+
+def test_the_genetic_settings_are_parameters(
+    planner_node: PlannerNode, call: Call, ros_node: Any, ros_executor: Any, wait_for: Any
+) -> None:
+    def answer(name: str, value: int) -> Any:
+        parameter = Parameter(f"genetic.{name}", Parameter.Type.INTEGER, value).to_parameter_msg()
+        return call(SetParameters, "set_parameters", parameters=[parameter]).results[0]
+
+    assert answer("population", 96).successful
+    wait_for(lambda: planner_node.planner.genetic.population == 96)
+    refused = answer("elite", 24)
+    assert not refused.successful
+    assert "must be less than population / islands, which is 24" in refused.reason
+    assert planner_node.planner.genetic.elite == 2

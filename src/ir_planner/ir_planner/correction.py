@@ -3,7 +3,7 @@
 The movement of least W (eq. 9) is the straight one of all joints. Where its discretised way meets a forbidden
 zone, the stretch that collides, and no more, gets vias from a population (genetic.py); what is free before
 and after stays. The corrected way is proved step by step and corrected again until it is clean. A stretch
-whose population finds nothing is tried again, each time wider.
+whose population finds nothing is tried again, each time wider and with more samples.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ir_planner.free_space import FreeSpace
 from ir_planner.genetic import Evolution, batch_work, evolve
 from ir_planner.movement_cost import path_cost
-from ir_planner.regional_settings import GeneticSettings
+from ir_planner.regional_settings import SAMPLES_MAX, GeneticSettings
 
 FloatArray = NDArray[np.float64]
 _SPACING = 0.02  # rad between samples of a way in search of what collides
@@ -88,7 +88,8 @@ def _round_stretch(
     best = Evolution([], np.inf, -1, way[0], 0)
     for attempt in range(settings.attempts):
         before, after = colliding_stretch(way, proof, space, settings.margin * _WIDER**attempt)
-        found = evolve(before[-1], after[0], space, settings, rng)
+        finer = replace(settings, samples=min(settings.samples * (attempt + 1), SAMPLES_MAX))
+        found = evolve(before[-1], after[0], space, finer, rng)
         generations += found.generations
         if found.ways:
             whole = [np.concatenate([before[:-1], part, after[1:]]) for part in found.ways]

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.settings import check_settings, setting
 
+SAMPLES_MAX = 200
+
 
 @dataclass(frozen=True)
 class GeneticSettings:
@@ -26,7 +28,10 @@ class GeneticSettings:
         2, "Random individuals that are drawn for one in the first generation.", minimum=1, maximum=8
     )
     samples: int = setting(
-        24, "Configurations of an individual's way that are checked.", minimum=4, maximum=200
+        24,
+        "Configurations of an individual's way that are checked; more with every further attempt.",
+        minimum=4,
+        maximum=SAMPLES_MAX,
     )
     spread_least: float = setting(
         0.1, "Least deviation of first vias.", unit="rad", minimum=1e-3, maximum=3.0

@@ -5,7 +5,7 @@ any of them. A search that finds nothing says how near it came.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +104,11 @@ def genetic(ends: Ends, space: FreeSpace, settings: GeneticSettings, seed: int) 
     return Found([], nearest[1])
 
 
+def short_genetic(ends: Ends, space: FreeSpace, settings: GeneticSettings, seed: int) -> Found:
+    """The same while it is quick: each stretch is tried once."""
+    return genetic(ends, space, replace(settings, attempts=1), seed)
+
+
 # in the order in which a first way is looked for
 SEARCHES: tuple[tuple[str, Search], ...] = (
     ("direct", direct),
@@ -113,7 +118,11 @@ SEARCHES: tuple[tuple[str, Search], ...] = (
     ("tree", tree),
 )
 # that find other ways round with another seed
-EXPLORERS: tuple[tuple[str, Search], ...] = (("detours", detours), ("tree", short_tree), ("genetic", genetic))
+EXPLORERS: tuple[tuple[str, Search], ...] = (
+    ("detours", detours),
+    ("tree", short_tree),
+    ("genetic", short_genetic),
+)
 BY_NAME_ONLY: tuple[tuple[str, Search], ...] = (("genetic", genetic),)
 
 
