@@ -106,6 +106,31 @@ def test_clearance_may_only_lack_what_the_tool_was_off(analysis: Analysis, devia
         assert (told["clearance"], told["allowed contacts"]) == (ok, ok)
 
 
+@pytest.mark.parametrize(
+    ("certified", "planned", "kept", "whose"),
+    [
+        (True, 0.006, 0.006, "6.0 mm, the certified plan's clearance"),
+        (False, 0.006, 0.02, "20.0 mm, the safety distance"),
+        (True, 0.05, 0.02, "20.0 mm, the safety distance"),
+        (True, math.inf, 0.02, "20.0 mm, the safety distance"),
+    ],
+)
+def test_a_plan_with_a_smaller_safety_distance_is_held_against_its_own_clearance(
+    analysis: Analysis, certified: bool, planned: float, kept: float, whose: str
+) -> None:
+    moved = analysis.movements[1]
+    assert moved.clearance is not None
+    report = replace(moved.step.movement.report, certified=certified, min_clearance=planned)
+    step = replace(moved.step, movement=replace(moved.step.movement, report=report))
+    for beyond, ok in ((-2e-5, True), (2e-5, False)):
+        near = replace(moved.clearance, least=kept - 1e-4 - beyond)
+        result = replace(moved, step=step, tool_deviation=0.0, clearance=near)
+        checks = findings(replace(analysis, steps=(result,)))
+        (clearance,) = [check for check in checks if check.name.startswith("clearance on")]
+        assert clearance.ok == ok
+        assert clearance.note.endswith(f"to keep: {whose}")
+
+
 def test_checks_hold_for_a_run_as_planned(analysis: Analysis) -> None:
     checks = findings(analysis, Tolerances(table_2_rows=8, safety_distance=-1.0))
     assert [check.name for check in checks if not check.ok] == []

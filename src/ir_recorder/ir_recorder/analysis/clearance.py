@@ -96,11 +96,7 @@ def _along(cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlac
     model = collision_model(cell, step.movement.load, places)
     own = _allowed(cell, step, model)
     offset = np.where(np.isnan(own), 0.0, -np.inf)
-    stride = (
-        max(1, round(COARSE / max(float(np.median(np.diff(joints.time[rows]))), 1e-4)))
-        if len(rows) > 1
-        else 1
-    )
+    stride = _stride(joints.time[rows])
     coarse = rows[::stride]
     near = model.min_distance(joints.position[coarse], offset)
     best = int(np.argmin(near.distance))

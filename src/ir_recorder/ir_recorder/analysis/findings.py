@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ir_msgs_py.report import TrajectoryReport
+
 from ir_recorder.analysis.plateaus import Plateau
 from ir_recorder.analysis.results import Analysis, StepResult
 
@@ -16,7 +18,8 @@ class Tolerances:
 
     energy_relative or energy_absolute [J], whichever is larger, per movement; duration [s]; tool_deviation
     [m]; safety_distance [m]: S_m, that the executed clearance keeps but for the deviation that was measured
-    (or tolerated, where none was) and `slack` [m]; allowed pairs keep their own distance alike;
+    (or tolerated, where none was) and `slack` [m]; where a certified plan comes nearer, its clearance stands
+    for the S_m it was made with, which no message tells; allowed pairs keep their own distance alike;
     table_2_relative; table_2_rows: how many rows the recording has to show; indirect_relative: indirect
     against direct measurement.
     """
@@ -83,9 +86,18 @@ def _movement(result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
     if near is not None:
         off = bounds.tool_deviation if math.isnan(result.tool_deviation) else result.tool_deviation
         off = min(off, bounds.tool_deviation) + bounds.slack
-        yield _above(f"clearance on {name}", near.least, bounds.safety_distance - off, near.least_pair)
+        kept, whose = _kept(planned, bounds)
+        note = f"{near.least_pair}; to keep: {kept * 1e3:.1f} mm, {whose}"
+        yield _above(f"clearance on {name}", near.least, kept - off, note)
         if math.isfinite(near.contact_margin):
             yield _above(f"allowed contacts on {name}", near.contact_margin, -off, "over their own")
+
+
+def _kept(planned: TrajectoryReport, bounds: Tolerances) -> tuple[float, str]:
+    """The distance [m] that the executed clearance is held against, and what it is."""
+    if planned.certified and planned.min_clearance < bounds.safety_distance:
+        return planned.min_clearance, "the certified plan's clearance"
+    return bounds.safety_distance, "the safety distance"
 
 
 def _table_2(analysis: Analysis, bounds: Tolerances) -> Iterator[Finding]:
