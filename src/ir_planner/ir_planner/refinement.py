@@ -41,9 +41,8 @@ BoolArray = NDArray[np.bool_]
 _SPACING = 0.1  # s between the knots of the coarsest spline
 _FEWEST, _MOST = 12, 64  # control points of the coarsest spline
 _SLOWER = 1.3  # than the path at full speed: where the descent starts
-_STIFFNESS = (
-    4.0  # penalties against the power that the objective is about; ten times that on the finest spline
-)
+_STIFFNESS = 4.0  # of penalties, against the power that the objective is about
+_FINEST_STIFFNESS = 40.0  # the same on the finest spline
 _TORQUE_SHARES = (0.98, 0.95, 0.9)
 _MARGIN = 1e-3  # m of clearance beyond S_m that the descent asks for
 _SCALE = 1e-2  # m that lack count like a limit used twice
@@ -176,12 +175,15 @@ class Refinement:
             evaluations=evaluations,
         )
         self.budget.spend(int(np.ceil(found.evaluations * spline.intervals * _EDGES_PER_INTERVAL)))
-        return replace(draft, spline=UniformSpline(found.control, found.interval), cost=found.value)
+        robot = self.scene.cell.robot
+        # a spline stays within the range of its control points
+        control = np.clip(found.control, robot.position_min, robot.position_max)
+        return replace(draft, spline=UniformSpline(control, found.interval), cost=found.value)
 
     def _cost(self, draft: Draft, path: FloatArray) -> SplineCost:
         scene, robot = self.scene, self.scene.cell.robot
         weights: ObjectiveWeights = objective_weights(self.options, scene, path)
-        stiffness = _STIFFNESS * weights.power * (10.0 if draft.level == 2 else 1.0)
+        stiffness = weights.power * (_FINEST_STIFFNESS if draft.level == 2 else _STIFFNESS)
         terms = SplineTerms(
             self.limits.velocity,
             self.limits.acceleration,
