@@ -57,16 +57,15 @@ def _followed(planner: Planner, task: Task, seconds: float) -> Iterator[Cost]:
     """OMPL's paths driven by the planner: half of the time finds paths, half drives the cheapest of them."""
     ways = sorted(_ompl(task, 0.5 * seconds), key=lambda way: way[1].J)
     end = time.perf_counter() + 0.5 * seconds
-    optimize = getattr(planner, "optimize_trajectory", None)
     for path, _ in ways:
         if time.perf_counter() > end:
             return
         try:
-            plan = planner.plan_trajectory(Reference(path.corners), asked(task))
-            if optimize is not None and plan.trajectory is not None:
-                plan = optimize(plan.trajectory, asked(task))
+            followed = planner.plan_trajectory(Reference(path.corners), asked(task))
+            if followed.trajectory is None:
+                continue
+            plan = planner.optimize_trajectory(followed.trajectory, asked(task))
         except RequestError:
             continue
-        report = plan.report
-        if plan.status.ok and report.certified:
-            yield Cost.of(report.energy - report.base_energy, report.duration)
+        if plan.status.ok and plan.after.certified:
+            yield Cost.of(plan.after.energy - plan.after.base_energy, plan.after.duration)

@@ -21,6 +21,7 @@ from ir_msgs.srv import (
     GetCell,
     GetProgram,
     GetTrajectory,
+    OptimizeTrajectory,
     PlanProgram,
     PlanRegionalMovement,
     PlanServiceMovement,
@@ -136,6 +137,7 @@ class PlannerNode(Node):
             (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service, long),
             (PlanRegionalMovement, names.PLAN_REGIONAL_MOVEMENT, ask.plan_regional, long),
             (PlanTrajectory, names.PLAN_TRAJECTORY, ask.plan_trajectory, long),
+            (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
         ):
             self.create_service(kind, name, ask.guarded(handler), callback_group=group)

@@ -21,6 +21,7 @@ from ir_msgs_py.stations import Station as StationValue
 from ir_msgs_py.status import Status
 
 from ir_description import Cell, Station
+from ir_planner.optimization import OptimizationPlan
 from ir_planner.planner import IkAnswer, StateCheck, StoredProgram
 from ir_planner.program import ProgramPlan
 from ir_planner.regional import MovementPlan
@@ -65,6 +66,19 @@ def fill_ik(response: Any, answer: IkAnswer) -> None:
 def fill_movement(response: Any, plan: MovementPlan, include_points: bool) -> None:
     """plan_regional_movement and plan_trajectory; points only where they were asked for."""
     response.report = report_to_msg(plan.report)
+    response.info = planning_info_to_msg(plan.info)
+    if plan.trajectory is not None:
+        response.trajectory_id = plan.trajectory.trajectory_id
+        if include_points:
+            response.trajectory = trajectory_to_msg(plan.trajectory)
+
+
+def fill_optimization(response: Any, plan: OptimizationPlan, include_points: bool) -> None:
+    """optimize_trajectory: the front's movements are stored, their ids stand in a stage's note."""
+    response.before = report_to_msg(plan.before)
+    response.after = report_to_msg(plan.after)
+    response.pareto_durations = [float(point.report.duration) for point in plan.front]
+    response.pareto_energies = [float(point.report.energy) for point in plan.front]
     response.info = planning_info_to_msg(plan.info)
     if plan.trajectory is not None:
         response.trajectory_id = plan.trajectory.trajectory_id

@@ -22,6 +22,7 @@ from ir_planner.node_answers import (
     fill_evaluation,
     fill_ik,
     fill_movement,
+    fill_optimization,
     fill_program,
     fill_service,
     fill_standby,
@@ -178,6 +179,15 @@ class Requests:
         return self._movement(
             self.planner.plan_trajectory(reference, options), response, options.include_points
         )
+
+    def optimize_trajectory(self, request: Any, response: Any) -> Status:
+        """The same end points for less."""
+        options = options_of(request.options, self.draw_seed)
+        plan = self.planner.optimize_trajectory(trajectory_of(request, self.planner), options)
+        fill_optimization(response, plan, options.include_points)
+        if plan.trajectory is not None:
+            self.planned(plan.trajectory)
+        return plan.status
 
     def _movement(self, plan: Any, response: Any, include_points: bool) -> Status:
         fill_movement(response, plan, include_points)

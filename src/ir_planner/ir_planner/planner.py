@@ -25,6 +25,7 @@ from ir_planner.goals import Goal, within_limits
 from ir_planner.interaction_point import STARTS_MAX, searched_configurations
 from ir_planner.inverse_kinematics import free_configurations, no_configuration, ranked_solutions
 from ir_planner.journal import Journal
+from ir_planner.optimization import OptimizationPlan, optimize_trajectory
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.regional import MovementPlan, plan_regional, too_near_sentence
 from ir_planner.regional_settings import GeneticSettings
@@ -287,6 +288,24 @@ class Planner:
         options, note = checked_options(options)
         scene = self.scene(options.load)
         return self._kept(plan_through(reference, scene, options, self._budget(options, cancelled)), note)
+
+    def optimize_trajectory(
+        self,
+        trajectory: JointTrajectory,
+        options: PlanOptions | None = None,
+        cancelled: Callable[[], bool] = _NEVER,
+    ) -> OptimizationPlan:
+        """A trajectory made cheaper between its end points, with the trade of time for energy."""
+        options, note = checked_options(options or PlanOptions())
+        scene = self.scene(options.load)
+        names = scene.cell.robot.joint_names
+        budget = self._budget(options, cancelled)
+        plan = optimize_trajectory(trajectory.reordered(names), scene, options, budget)
+        for point in plan.front:
+            self.trajectories.add(point.trajectory)
+        if plan.trajectory is not None:
+            self.trajectories.add(plan.trajectory)
+        return replace(plan, info=_noted(plan.info, note))
 
     def plan_program(
         self,

@@ -49,6 +49,9 @@ _SCALE = 1e-2  # m that lack count like a limit used twice
 _REPAIRS = 5
 _MORE_ROOM = 1e-3  # m more than what lacked
 _REPAIR_EVALUATIONS = 40
+_PACES = (0.98, 0.95, 0.9)  # room that the limits leave where the duration is wished, until they are kept
+_ROUNDING = 1e-9  # relative
+_STIFFER = 10.0  # penalties where the duration is wished: a second may be worth much more than usual
 _ZONE_SAMPLES = 4  # per interval
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
 _FITS = 25
@@ -71,14 +74,15 @@ THOROUGH = Effort(300, 300, 300)
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A spline on its way down: its level (0: coarse), cost, and the room (R, Z) m that its pairs are to
-    have.
+    """A spline on its way down: its level (0: coarse), cost, the room (R, Z) m that its pairs are to have,
+    and the pace that its limits leave room for.
     """
 
     spline: UniformSpline
     level: int
     cost: float
     room: FloatArray
+    pace: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +116,25 @@ class Refinement:
         count = int(np.clip(np.ceil(least / _SPACING), _FEWEST, _MOST))
         wished = self.options.duration
         start = along_path(path, count, wished if wished > 0.0 else _SLOWER * least)
-        return self._descended(Draft(start, 0, np.inf, self._room), path, evaluations)
+        return self.continued(start, path, evaluations)
+
+    def continued(self, spline: UniformSpline, path: FloatArray, evaluations: int) -> Draft:
+        """A coarse spline of any origin, gone down from its own shape and pace; path (M, n): what it came
+        from.
+        """
+        pace = _PACES[0] if self.options.duration > 0.0 else 1.0
+        return self._descended(Draft(spline, 0, np.inf, self._room, pace), path, evaluations)
 
     def finished(self, draft: Draft, path: FloatArray, effort: Effort = QUICK) -> Refined | None:
         """The proved movement that a draft ends in; None where it can't be made one."""
         found = self._finished(draft, path, effort)
-        if found is None and self.options.duration > 0.0:
-            return self._slowed_to_wish(path)
+        if self.options.duration > 0.0:
+            for pace in _PACES[1:]:
+                if found is None:
+                    slower = self._descended(replace(draft, pace=pace), path, effort.coarse)
+                    found = self._finished(slower, path, effort)
+            if found is None:
+                return self._slowed_to_wish(path)
         return found
 
     def _slowed_to_wish(self, path: FloatArray) -> Refined | None:
@@ -184,15 +200,17 @@ class Refinement:
         scene, robot = self.scene, self.scene.cell.robot
         weights: ObjectiveWeights = objective_weights(self.options, scene, path)
         stiffness = weights.power * (_FINEST_STIFFNESS if draft.level == 2 else _STIFFNESS)
+        stiffness *= _STIFFER if self.options.duration > 0.0 else 1.0
+        limits = self.limits.with_torque_share(_TORQUE_SHARES[0]).paced(draft.pace)
         terms = SplineTerms(
-            self.limits.velocity,
-            self.limits.acceleration,
-            self.limits.jerk,
+            limits.velocity,
+            limits.acceleration,
+            limits.jerk,
             robot.position_min,
             robot.position_max,
             weights.travel,
             draft.room,
-            torque_share=_TORQUE_SHARES[0],
+            torque_share=limits.torque_share,
             energy_value=weights.energy,
             time_value=weights.time,
             capacity_energy=scene.dc_bus.capacity_energy,
@@ -246,7 +264,10 @@ class Refinement:
         fitted = within_limits(spline, limits, self.scene)
         if fitted is not None:
             check_duration(fitted.duration, self.options)
-        if fitted is None or (self.options.duration > 0.0 and fitted.interval > spline.interval):
+        wished = self.options.duration
+        if fitted is not None and wished > 0.0:
+            fitted = fitted.lasting(wished) if fitted.duration <= wished * (1.0 + _ROUNDING) else None
+        if fitted is None:
             return None
         return fitted.trajectory(self.scene.cell.robot.joint_names)
 

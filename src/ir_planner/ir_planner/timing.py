@@ -49,6 +49,17 @@ class MotionLimits:
             self.torque_share,
         )
 
+    def paced(self, pace: float) -> "MotionLimits":
+        """Bounds that leave room: a motion within them keeps the true ones at 1 / pace times its speed; pace
+        in (0, 1].
+        """
+        return MotionLimits(
+            self.velocity * pace,
+            self.acceleration * pace**2,
+            self.jerk * pace**3,
+            self.torque_share * pace**2,
+        )
+
     def with_torque_share(self, share: float) -> "MotionLimits":
         """The same bounds with another share of the torque."""
         return MotionLimits(self.velocity, self.acceleration, self.jerk, share)

@@ -80,11 +80,29 @@ class UniformSpline:
         finer[:3], finer[-3:] = c[0], c[-1]  # rounding must not move the ends
         return UniformSpline(finer, 0.5 * self.interval)
 
+    def lasting(self, duration: float) -> "UniformSpline":
+        """The same path in another time [s]."""
+        return UniformSpline(self.control, duration / self.intervals)
+
     def trajectory(self, joint_names: tuple[str, ...]) -> JointTrajectory:
         """The motion as it is sent, a point per knot; the interval is rounded up to a nanosecond."""
         step = int(np.ceil(self.interval * 1e9 - 1e-3))
         q, qd, qdd = UniformSpline(self.control, step * 1e-9).knots()
         return JointTrajectory(joint_names, np.arange(len(q), dtype=np.int64) * step, q, qd, qdd)
+
+
+def along_motion(trajectory: JointTrajectory, count: int, duration: float) -> UniformSpline:
+    """Spline with `count` control points between its ends along a trajectory, at its pace but for the
+    duration [s].
+    """
+    begin = float(trajectory.times[0])
+    q = trajectory.sample(begin + np.linspace(0.0, 1.0, count + 4) * (trajectory.duration - begin)).q
+    q[0], q[-1] = trajectory.positions[0], trajectory.positions[-1]
+    bend = np.zeros_like(q)
+    bend[1:-1] = (q[:-2] - 2.0 * q[1:-1] + q[2:]) / 6.0  # a control point lies outside its curve by that
+    inner = (q - bend)[2:-2]
+    control = np.concatenate([np.repeat(q[:1], 3, axis=0), inner, np.repeat(q[-1:], 3, axis=0)])
+    return UniformSpline(control, duration / (count + 3))
 
 
 def along_path(path: FloatArray, count: int, duration: float) -> UniformSpline:

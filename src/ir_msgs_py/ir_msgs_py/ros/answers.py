@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ir_msgs_py.checks import FloatArray
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.ros.convert_report import planned_movement_from_msg, planning_info_from_msg, report_from_msg
 from ir_msgs_py.ros.convert_trajectory import trajectory_from_msg, trajectory_given
@@ -28,6 +31,35 @@ class MovementPlan:
             response.trajectory_id,
             trajectory_from_msg(points) if trajectory_given(points) else None,
             report_from_msg(response.report),
+            planning_info_from_msg(response.info),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class OptimizedTrajectory:
+    """A trajectory made cheaper; trajectory is None unless the options asked for points. durations [s] and
+    energies [J], each (P,): the trade of time for energy, the fastest first.
+    """
+
+    trajectory_id: str
+    trajectory: JointTrajectory | None
+    before: TrajectoryReport
+    after: TrajectoryReport
+    durations: FloatArray
+    energies: FloatArray
+    info: PlanningInfo
+
+    @classmethod
+    def from_msg(cls, response: Any) -> OptimizedTrajectory:
+        """From the response of optimize_trajectory."""
+        points = response.trajectory
+        return cls(
+            response.trajectory_id,
+            trajectory_from_msg(points) if trajectory_given(points) else None,
+            report_from_msg(response.before),
+            report_from_msg(response.after),
+            np.array(response.pareto_durations),
+            np.array(response.pareto_energies),
             planning_info_from_msg(response.info),
         )
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import rclpy
 from ir_msgs.action import ExecuteTrajectory, Plan, RunProgram
-from ir_msgs.srv import GetTrajectory, PlanRegionalMovement, SetCell
+from ir_msgs.srv import GetTrajectory, OptimizeTrajectory, PlanRegionalMovement, SetCell
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.task import Future
@@ -24,7 +24,13 @@ from rclpy.task import Future
 from ir_msgs_py import names
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.ros.answers import Execution, MovementPlan, ProgramPlan, ProgramRun
+from ir_msgs_py.ros.answers import (
+    Execution,
+    MovementPlan,
+    OptimizedTrajectory,
+    ProgramPlan,
+    ProgramRun,
+)
 from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.conversions import (
     plan_options_to_msg,
@@ -147,6 +153,19 @@ class Client:
         request = PlanRegionalMovement.Request(goal=goal, options=plan_options_to_msg(chosen))
         response = self.ask(names.PLAN_REGIONAL_MOVEMENT, request, self.timeout + chosen.planning_time)
         return MovementPlan.from_msg(response)
+
+    def optimize(
+        self, trajectory: JointTrajectory | str, options: PlanOptions | None = None
+    ) -> OptimizedTrajectory:
+        """Make a trajectory, or the one behind an id, cheaper between its end points."""
+        chosen = options or PlanOptions()
+        request = OptimizeTrajectory.Request(options=plan_options_to_msg(chosen))
+        if isinstance(trajectory, str):
+            request.trajectory_id = trajectory
+        else:
+            request.trajectory = trajectory_to_msg(trajectory)
+        response = self.ask(names.OPTIMIZE_TRAJECTORY, request, self.timeout + chosen.planning_time)
+        return OptimizedTrajectory.from_msg(response)
 
     def plan_program(
         self,
