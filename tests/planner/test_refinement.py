@@ -49,8 +49,10 @@ def test_the_trajectory_of_a_spline_is_the_spline() -> None:
     motion = trajectory.sample(t)
     assert np.abs(motion.q - reference(t)).max() < 1e-6  # times are whole nanoseconds
     assert np.abs(motion.qd - reference.derivative()(t)).max() < 1e-5
-    assert trajectory.velocities is not None and not np.any(trajectory.velocities[[0, -1]])
-    assert trajectory.accelerations is not None and not np.any(trajectory.accelerations[[0, -1]])
+    assert trajectory.velocities is not None
+    assert not np.any(trajectory.velocities[[0, -1]])
+    assert trajectory.accelerations is not None
+    assert not np.any(trajectory.accelerations[[0, -1]])
     assert np.array_equal(trajectory.positions[[0, -1]], spline.control[[0, -1]])
 
 
