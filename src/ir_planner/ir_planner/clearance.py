@@ -15,6 +15,7 @@ from ir_planner.scene import PlanningScene
 FloatArray = NDArray[np.float64]
 _ZOOMS = 4
 _PER_ZOOM = 9
+_DIPS = 8  # local minima that are looked at closely
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +73,17 @@ def nearest_pairs(
     return tuple(_pair(scene, near, row, bool(allowed[z])) for row, z in enumerate(order))
 
 
+def _lowest_dips(distance: FloatArray) -> NDArray[np.intp]:
+    """Where sampled distances (N,) are no larger than before and after, the smallest few first."""
+    around = np.concatenate([[np.inf], distance, [np.inf]])
+    dips = np.flatnonzero((distance <= around[:-2]) & (distance <= around[2:]))
+    return np.asarray(dips[np.argsort(distance[dips], kind="stable")[:_DIPS]])
+
+
 def clearance_profile(
     trajectory: JointTrajectory, scene: PlanningScene, station: str = ""
 ) -> ClearanceProfile:
-    """Distances along a trajectory, sampled every 10 ms or finer, the smallest one refined."""
+    """Distances along a trajectory, sampled every 10 ms or finer, and the smallest one between samples."""
     begin, span = float(trajectory.times[0]), trajectory.duration - float(trajectory.times[0])
     count = int(np.clip(np.ceil(span / 0.01), 32, 2000)) + 1
     times = np.linspace(begin, begin + span, count)
@@ -83,14 +91,17 @@ def clearance_profile(
     allowed = scene.allowed(station)
     offset = np.where(allowed, -np.inf, 0.0)
     near = scene.collision.min_distance(q, offset)
-    best, row = near, int(np.argmin(near.distance))
-    at, half = float(times[row]), span / (count - 1)
+    dips = _lowest_dips(near.distance)
+    best, row = near, int(dips[0])
+    at, centres, half = float(times[row]), times[dips], span / (count - 1)
     for _ in range(_ZOOMS):
-        zoom = np.clip(np.linspace(at - half, at + half, _PER_ZOOM), begin, begin + span)
-        closer = scene.collision.min_distance(trajectory.sample(zoom).q, offset)
+        zoom = np.clip(centres[:, None] + np.linspace(-half, half, _PER_ZOOM), begin, begin + span)
+        closer = scene.collision.min_distance(trajectory.sample(zoom.ravel()).q, offset)
+        lowest = np.argmin(closer.distance.reshape(zoom.shape), axis=1)
+        centres = zoom[np.arange(len(zoom)), lowest]
         k = int(np.argmin(closer.distance))
         if closer.distance[k] < best.distance[row]:
-            best, row, at = closer, k, float(zoom[k])
+            best, row, at = closer, k, float(zoom.ravel()[k])
         half /= (_PER_ZOOM - 1) / 2
     contacts: list[DistancePair] = []
     if allowed.any():

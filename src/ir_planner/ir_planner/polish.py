@@ -10,7 +10,7 @@ from ir_planner.free_space import FreeSpace
 from ir_planner.movement_cost import movement_cost, path_cost
 
 FloatArray = NDArray[np.float64]
-_POINTS = 22
+_POINTS = 16
 _PULLS = (1.0, 0.6, 0.3, 0.12)
 _ROUNDS = 6
 _CORNER = 0.04  # what a corner costs, as a share of the straight movement's W: it takes time

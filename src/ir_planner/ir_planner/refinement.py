@@ -28,8 +28,13 @@ from ir_planner.movement import (
     distinct,
     timed_movement,
 )
-from ir_planner.objective import ObjectiveWeights, objective_weights, trajectory_value
-from ir_planner.reporting import evaluate_trajectory
+from ir_planner.objective import (
+    ObjectiveWeights,
+    objective_value,
+    objective_weights,
+    trajectory_value,
+)
+from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.timing import MotionLimits, torque_use
 from ir_planner.uniform_spline import UniformSpline, along_path, fewest_seconds
@@ -68,7 +73,7 @@ class Effort:
     fine: int
 
 
-QUICK = Effort(80, 80, 60)
+QUICK = Effort(50, 40, 30)
 THOROUGH = Effort(300, 300, 300)
 
 
@@ -94,13 +99,26 @@ class Refined:
     path: FloatArray
     trajectory: JointTrajectory
     value: float
+    evaluation: Evaluation | None = None
 
 
 class Refinement:
-    """Descents for one request: the scene, what counts, and which limits hold."""
+    """Descents for one request: the scene, what counts, and which limits hold.
 
-    def __init__(self, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = "") -> None:
+    measured: movements come with everything that is known about them, else they are only proved and compared.
+    """
+
+    def __init__(
+        self,
+        scene: PlanningScene,
+        options: PlanOptions,
+        budget: Budget,
+        station: str = "",
+        *,
+        measured: bool = False,
+    ) -> None:
         self.scene, self.options, self.budget, self.station = scene, options, budget, station
+        self.measured = measured
         self.limits = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
         plain = scene.thresholds(options.safety_distance) - PROOF_TOLERANCE / 2
         rows = [plain]
@@ -249,6 +267,15 @@ class Refinement:
             trajectory = self._slowed(draft.spline, self.limits.with_torque_share(share))
             if trajectory is None:
                 return None
+            if self.measured:
+                known = evaluate_trajectory(trajectory, scene, options.safety_distance, self.station)
+                violation = known.verification.violation
+                if violation is None:
+                    value = objective_value(known.report, options.objective, options.time_value)
+                    return Refined(path, trajectory, value, known)
+                if violation.what != "torque":
+                    return violation
+                continue
             blocked = clearance_violation(trajectory, scene, options.safety_distance, self.station)
             if blocked is not None:
                 return blocked
@@ -301,10 +328,12 @@ def movement_over(
     """
     path = distinct(path)
     if len(path) > 1 and options.timing == "synchronous":
-        refinement = Refinement(scene, options, budget, station)
+        refinement = Refinement(scene, options, budget, station, measured=True)
         found = refinement.finished(refinement.drafted(path), path)
         if found is not None:
-            evaluation = evaluate_trajectory(found.trajectory, scene, options.safety_distance, station)
+            evaluation = found.evaluation or evaluate_trajectory(
+                found.trajectory, scene, options.safety_distance, station
+            )
             movement = TimedMovement(path, found.trajectory, evaluation)
             if movement.violation is None:
                 return movement

@@ -14,7 +14,7 @@ from ir_planner.scene import PlanningScene
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 _SAMPLES = 400
-_HALVINGS = 30
+_PARTS, _ROUNDS = 32, 6  # 2^30 parts of the time between two samples
 
 
 def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float) -> BoolArray:
@@ -29,7 +29,7 @@ def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float)
 def spans_outside(
     trajectory: JointTrajectory, scene: PlanningScene, station: str, margin: float
 ) -> list[tuple[float, float]]:
-    """Times [s] between which the tcp is outside, found by sampling and halving; each a little longer than
+    """Times [s] between which the tcp is outside, found by sampling and dividing; each a little longer than
     it is.
     """
 
@@ -41,10 +41,10 @@ def spans_outside(
     edges = [float(times[0])] if not flags[0] else []
     for k in np.flatnonzero(flags[:-1] != flags[1:]):
         low, high = float(times[k]), float(times[k + 1])
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            same = bool(inside(np.array([middle]))[0]) == bool(flags[k])
-            low, high = (middle, high) if same else (low, middle)
+        for _ in range(_ROUNDS):
+            parts = np.linspace(low, high, _PARTS + 1)
+            changed = int(np.argmax(np.append(inside(parts[1:-1]) != flags[k], True))) + 1
+            low, high = float(parts[changed - 1]), float(parts[changed])
         edges.append(low if flags[k] else high)
     if not flags[-1]:
         edges.append(float(times[-1]))
