@@ -43,7 +43,7 @@ Chain::Chain(int count, const double* joint_origin, const double* joint_axis, co
   }
   for (int k = 0; k < n; ++k) {
     const double* pose = joint_origin + 16 * k;
-    double turn[9], shift[3], turned[9];
+    double turn[9], shift[3], turned[9], local[3];
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) turn[3 * i + j] = pose[4 * i + j];
       shift[i] = pose[4 * i + 3];
@@ -51,7 +51,8 @@ Chain::Chain(int count, const double* joint_origin, const double* joint_axis, co
     frame_about(joint_axis + 3 * k, &internal[9 * (k + 1)]);
     multiply(turn, &internal[9 * (k + 1)], turned);
     transposed_times(&internal[9 * k], turned, 3, joints[k].turn);
-    transposed_times(&internal[9 * k], shift, 1, joints[k].shift);
+    transposed_times(&internal[9 * k], shift, 1, local);
+    joints[k].shift = Local(local);
     for (int j = 0; j < 3; ++j) {
       int used = 0;
       for (int i = 0; i < 3; ++i)
@@ -75,9 +76,7 @@ void Chain::forward(const Double8* q, Frame<Double8>* frames) const {
   frames[0] = f;
   Double8 sines[most_at_once], cosines[most_at_once];
   for (int k = 0; k < n; ++k) {
-    if (k % most_at_once == 0) {  // ahead of the chain: they don't wait for each other
-      for (int j = k; j < std::min(n, k + most_at_once); ++j) sincos(q[j], sines[j - k], cosines[j - k]);
-    }
+    if (k % most_at_once == 0) sincos(std::min(n - k, most_at_once), q + k, sines, cosines);
     const Joint& joint = joints[k];
     const Vec<Double8> columns[3] = {f.x, f.y, f.z}, origin = place(f, joint.shift);
     Vec<Double8> turned[3];

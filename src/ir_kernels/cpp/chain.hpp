@@ -10,14 +10,48 @@
 
 namespace ir {
 
-struct Joint {
-  double turn[9];   // fixed rotation from the previous internal frame to this one at q = 0, row major
-  int only[3];      // of each of its columns the only row that isn't 0, or -1
-  double shift[3];  // origin of this one in the previous internal frame
-};
-
 template <class V> struct Frame {
   Vec<V> x, y, z, origin;
+};
+
+// A vector in a link's internal frame, in both precisions; most coordinates are 0 and cost nothing.
+class Local {
+ public:
+  Local() = default;
+  explicit Local(const double v[3]) {
+    for (int i = 0; i < 3; ++i) exact_[i] = v[i], rounded_[i] = static_cast<float>(v[i]), has_[i] = v[i] != 0.0;
+  }
+  double operator[](int i) const { return exact_[i]; }
+  bool is_zero() const { return !has_[0] && !has_[1] && !has_[2]; }
+  // p + this vector, seen from the world
+  template <class V> IR_INLINE Vec<V> after(Vec<V> p, const Frame<V>& f) const {
+    if (has_[0]) p = p + at<V>(0) * f.x;
+    if (has_[1]) p = p + at<V>(1) * f.y;
+    if (has_[2]) p = p + at<V>(2) * f.z;
+    return p;
+  }
+  // p - this vector
+  template <class V> IR_INLINE Vec<V> before(Vec<V> p, const Frame<V>& f) const {
+    if (has_[0]) p = p - at<V>(0) * f.x;
+    if (has_[1]) p = p - at<V>(1) * f.y;
+    if (has_[2]) p = p - at<V>(2) * f.z;
+    return p;
+  }
+
+ private:
+  template <class V> IR_INLINE V at(int i) const {
+    if constexpr (sizeof(Scalar<V>) == 4) return splat<V>(rounded_[i]);
+    else return splat<V>(exact_[i]);
+  }
+  double exact_[3];
+  float rounded_[3];
+  bool has_[3];
+};
+
+struct Joint {
+  double turn[9];  // fixed rotation from the previous internal frame to this one at q = 0, row major
+  int only[3];     // of each of its columns the only row that isn't 0, or -1
+  Local shift;     // origin of this one in the previous internal frame
 };
 
 struct Chain {
@@ -39,10 +73,6 @@ struct Chain {
   static constexpr int most_at_once = 16;  // joints whose sines are computed ahead
 };
 
-template <class V> IR_INLINE Vec<V> place(const Frame<V>& f, const double p[3]) {
-  const V x = splat<V>(Scalar<V>(p[0])), y = splat<V>(Scalar<V>(p[1])), z = splat<V>(Scalar<V>(p[2]));
-  return {f.origin.x + x * f.x.x + y * f.y.x + z * f.z.x, f.origin.y + x * f.x.y + y * f.y.y + z * f.z.y,
-          f.origin.z + x * f.x.z + y * f.y.z + z * f.z.z};
-}
+template <class V> IR_INLINE Vec<V> place(const Frame<V>& f, const Local& p) { return p.after(f.origin, f); }
 
 }  // namespace ir

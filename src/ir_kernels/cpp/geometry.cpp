@@ -63,8 +63,9 @@ void write_jacobians(const ir::Chain& chain, const double* tcp, const double* q,
   std::vector<ir::Double8> lanes(chain.n);
   std::vector<ir::Frame<ir::Double8>> frames(chain.n + 1);
   const double own[3] = {tcp[3], tcp[7], tcp[11]};
-  double point[3];
-  chain.to_internal(chain.n, own, point);
+  double local[3];
+  chain.to_internal(chain.n, own, local);
+  const ir::Local point(local);
   for (std::size_t first = 0; first < count; first += 8) {
     const int used = static_cast<int>(std::min<std::size_t>(8, count - first));
     for (int j = 0; j < chain.n; ++j)
@@ -97,13 +98,20 @@ ir::Model model_of(const Array& joint_origin, const Array& joint_axis, const Arr
     ir::Capsule capsule;
     capsule.link = static_cast<int>(link.data()[c]);
     expect(capsule.link >= 0 && capsule.link <= m.chain.n, "a capsule's link is out of range");
-    m.chain.to_internal(capsule.link, ends.data() + 6 * c, capsule.p0);
-    m.chain.to_internal(capsule.link, ends.data() + 6 * c + 3, capsule.p1);
-    double square = 0.0;
-    for (int i = 0; i < 3; ++i) square += (capsule.p1[i] - capsule.p0[i]) * (capsule.p1[i] - capsule.p0[i]);
+    double p0[3], p1[3];
+    m.chain.to_internal(capsule.link, ends.data() + 6 * c, p0);
+    m.chain.to_internal(capsule.link, ends.data() + 6 * c + 3, p1);
+    double middle[3], axis[3], square = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      middle[i] = 0.5 * (p0[i] + p1[i]);
+      axis[i] = 0.5 * (p1[i] - p0[i]);
+      square += axis[i] * axis[i];
+    }
+    capsule.middle = ir::Local(middle);
+    capsule.axis = ir::Local(axis);
     capsule.radius = radius.data()[c];
-    capsule.half = 0.5 * std::sqrt(square);
-    capsule.inverse_square = square > 0.0 ? 1.0 / square : 0.0;
+    capsule.half = std::sqrt(square);
+    capsule.inverse_square = square > 0.0 ? 0.25 / square : 0.0;
     m.capsules.push_back(capsule);
   }
   for (py::ssize_t b = 0; b < bodies; ++b) {

@@ -166,43 +166,59 @@ template <class V> IR_INLINE Vec<V> select(Mask<V> m, Vec<V> a, Vec<V> b) {
   return {m ? a.x : b.x, m ? a.y : b.y, m ? a.z : b.z};
 }
 
-// Sine and cosine to 2 ulp for |x| < 1e5 rad (Cody and Waite's reduction, minimax polynomials of Cephes); beyond
-// that lane by lane with the library's.
-IR_INLINE void sincos(Double8 x, Double8& s, Double8& c) {
-  if (__builtin_expect(any(abs(x) > 1e5), 0)) {
-    for (int k = 0; k < 8; ++k) {
-      s[k] = std::sin(x[k]);
-      c[k] = std::cos(x[k]);
-    }
-    return;
+typedef double Double2 __attribute__((vector_size(16), aligned(8), may_alias));
+
+// Eight rows of n values as n columns.
+IR_INLINE void load_columns(const double* const row[8], int n, Double8* column) {
+  int j = 0;
+  for (; j + 1 < n; j += 2) {  // two neighbours at a time, first of every second row
+    const auto two = [&](int k) { return *reinterpret_cast<const Double2*>(row[k] + j); };
+    const auto four = [&](int k) { return __builtin_shufflevector(two(k), two(k + 2), 0, 1, 2, 3); };
+    const Double8 even = __builtin_shufflevector(four(0), four(4), 0, 1, 2, 3, 4, 5, 6, 7);
+    const Double8 odd = __builtin_shufflevector(four(1), four(5), 0, 1, 2, 3, 4, 5, 6, 7);
+    column[j] = __builtin_shufflevector(even, odd, 0, 8, 2, 10, 4, 12, 6, 14);
+    column[j + 1] = __builtin_shufflevector(even, odd, 1, 9, 3, 11, 5, 13, 7, 15);
   }
+  if (j < n)
+    for (int k = 0; k < 8; ++k) column[j][k] = row[k][j];
+}
+
+// Sine and cosine to about one unit in the last place, for |x| <= reducible: reduction by pi/2 in parts, then the
+// polynomials of fdlibm.
+constexpr double reducible = 1e5;
+
+IR_INLINE void sincos_reducible(Double8 x, Double8& s, Double8& c) {
   const double magic = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to whole numbers
   const Double8 shifted = x * 0.63661977236758134308 + magic;
-  Int8 quadrant;
-  std::memcpy(&quadrant, &shifted, sizeof quadrant);
+  const Int8 quarter = (Int8)shifted;
   const Double8 k = shifted - magic;
-  Double8 r = x - k * 1.57079625129699707031;
-  r -= k * 7.54978941586159635335e-8;
-  r -= k * 5.39030285815811905290e-15;
-  const Double8 z = r * r;
-  Double8 ps = splat<Double8>(1.58962301576546568060e-10);
-  ps = ps * z - 2.50507477628578072866e-8;
-  ps = ps * z + 2.75573136213857245213e-6;
-  ps = ps * z - 1.98412698295895385996e-4;
-  ps = ps * z + 8.33333333332211858878e-3;
-  ps = ps * z - 1.66666666666666307295e-1;
-  ps = r + r * z * ps;
-  Double8 pc = splat<Double8>(-1.13585365213876817300e-11);
-  pc = pc * z + 2.08757008419747316778e-9;
-  pc = pc * z - 2.75573141792967388112e-7;
-  pc = pc * z + 2.48015872888517045348e-5;
-  pc = pc * z - 1.38888888888730564116e-3;
-  pc = pc * z + 4.16666666666665929218e-2;
-  pc = 1.0 - 0.5 * z + z * z * pc;
-  const Int8 odd = (quadrant & 1) != 0;
-  const Double8 sine = select<Double8>(odd, pc, ps), cosine = select<Double8>(odd, ps, pc);
-  s = select<Double8>((quadrant & 2) != 0, -sine, sine);
-  c = select<Double8>(((quadrant + 1) & 2) != 0, -cosine, cosine);
+  Double8 r = x - k * 1.57079632673412561417e+00;  // exact: 33 bits times the few of k
+  r -= k * 6.07710050650619224932e-11;
+  const Double8 z = r * r, z2 = z * z;
+  const Double8 sine = r + r * z * ((-1.66666666666666324348e-01 + z * 8.33333333332248946124e-03) +
+                               z2 * ((-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06) +
+                                     z2 * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
+  const Double8 cosine = 1.0 - 0.5 * z + z2 * ((4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) +
+                                          z2 * ((2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
+                                                z2 * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)));
+  const Int8 odd = (quarter & 1) != 0;
+  s = (Double8)((Int8)(odd ? cosine : sine) ^ (quarter & 2) << 62);
+  c = (Double8)((Int8)(odd ? sine : cosine) ^ ((quarter + 1) & 2) << 62);
+}
+
+// Of n angles; where one is out of reach of the reduction the C library is asked, lane by lane.
+IR_INLINE void sincos(int n, const Double8* x, Double8* s, Double8* c) {
+  Double8 largest{};
+  for (int i = 0; i < n; ++i) largest = max(largest, abs(x[i]));
+  if (__builtin_expect(any(largest > reducible), 0)) {
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < 8; ++k) {
+        s[i][k] = std::sin(x[i][k]);
+        c[i][k] = std::cos(x[i][k]);
+      }
+    return;
+  }
+  for (int i = 0; i < n; ++i) sincos_reducible(x[i], s[i], c[i]);
 }
 
 }  // namespace ir

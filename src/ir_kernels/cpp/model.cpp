@@ -11,13 +11,17 @@ namespace {
 double reach_of(const Model& m) {
   std::vector<double> to_joint(m.chain.n + 1, 0.0);
   for (int k = 0; k < m.chain.n; ++k) {
-    const double* s = m.chain.joints[k].shift;
+    const Local& s = m.chain.joints[k].shift;
     to_joint[k + 1] = to_joint[k] + std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
   }
   double reach = 0.0;
-  for (const Capsule& c : m.capsules)
-    for (const double* p : {c.p0, c.p1})
-      reach = std::max(reach, to_joint[c.link] + std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) + c.radius);
+  for (const Capsule& c : m.capsules) {
+    for (const double sign : {-1.0, 1.0}) {
+      double square = 0.0;
+      for (int i = 0; i < 3; ++i) square += std::pow(c.middle[i] + sign * c.axis[i], 2);
+      reach = std::max(reach, to_joint[c.link] + std::sqrt(square) + c.radius);
+    }
+  }
   return reach;
 }
 
@@ -142,10 +146,9 @@ template <class V> IR_INLINE void narrow(const Vec<Double8>& low, const Vec<Doub
 template <class V> void Placement<V>::place(const double* const* rows, int count) {
   const int n = model_.chain.n;
   for (int part = 0; part < Lanes<V>::width / 8; ++part) {
-    for (int k = 0; k < 8; ++k) {
-      const double* row = rows[std::min(8 * part + k, count - 1)];
-      for (int j = 0; j < n; ++j) q_[j][k] = row[j];
-    }
+    const double* row[8];
+    for (int k = 0; k < 8; ++k) row[k] = rows[std::min(8 * part + k, count - 1)];
+    load_columns(row, n, q_.data());
     model_.chain.forward(q_.data(), exact[part].data());
   }
   const auto& high = exact[Lanes<V>::width / 8 - 1];
@@ -154,18 +157,24 @@ template <class V> void Placement<V>::place(const double* const* rows, int count
     Frame<V>& f = state.frames[link];
     narrow(exact[0][link].x, high[link].x, f.x);
     narrow(exact[0][link].y, high[link].y, f.y);
-    narrow(exact[0][link].z, high[link].z, f.z);
-    narrow(exact[0][link].origin, high[link].origin, f.origin);
+    const int only = link > 0 ? model_.chain.joints[link - 1].only[2] : -1;
+    if (only >= 0) {  // the joint's axis is one of the frame before
+      const Frame<V>& g = state.frames[link - 1];
+      f.z = splat<V>(Scalar<V>(model_.chain.joints[link - 1].turn[3 * only + 2])) * (only == 0 ? g.x : only == 1 ? g.y : g.z);
+    } else {
+      narrow(exact[0][link].z, high[link].z, f.z);
+    }
+    if (link > 0 && model_.chain.joints[link - 1].shift.is_zero()) f.origin = state.frames[link - 1].origin;
+    else narrow(exact[0][link].origin, high[link].origin, f.origin);
   }
-  const V one_half = splat<V>(Scalar<V>(0.5));
   for (std::size_t c = 0; c < model_.capsules.size(); ++c) {
     const Capsule& capsule = model_.capsules[c];
     if (capsule.link == 0 && placed_) continue;
     const Frame<V>& f = state.frames[capsule.link];
-    const Vec<V> a = ir::place(f, capsule.p0), b = ir::place(f, capsule.p1);
-    state.a[c] = a;
-    state.b[c] = b;
-    state.middle[c] = one_half * (a + b);
+    const Vec<V> middle = ir::place(f, capsule.middle);
+    state.middle[c] = middle;
+    state.a[c] = capsule.axis.before(middle, f);
+    state.b[c] = capsule.axis.after(middle, f);
   }
   placed_ = true;
 }

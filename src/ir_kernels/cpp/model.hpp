@@ -23,7 +23,7 @@ template <class S> struct Body {
 
 struct Capsule {
   int link;
-  double p0[3], p1[3];  // internal frame of the link
+  Local middle, axis;  // half an axis: from the middle to the second end
   double radius, half, inverse_square;
 };
 

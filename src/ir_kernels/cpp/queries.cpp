@@ -72,8 +72,10 @@ struct GatheredBody {
 };
 
 IR_INLINE void put(Gathered& to, Int8 where, const Capsule& c, const std::vector<Frame<Double8>>& frames) {
-  to.a = select(where, place(frames[c.link], c.p0), to.a);
-  to.b = select(where, place(frames[c.link], c.p1), to.b);
+  const Frame<Double8>& f = frames[c.link];
+  const Vec<Double8> middle = place(f, c.middle);
+  to.a = select(where, c.axis.before(middle, f), to.a);
+  to.b = select(where, c.axis.after(middle, f), to.b);
   to.inverse_square = where ? splat<Double8>(c.inverse_square) : to.inverse_square;
   to.radius = where ? splat<Double8>(c.radius) : to.radius;
 }

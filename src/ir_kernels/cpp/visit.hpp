@@ -135,13 +135,20 @@ template <class V, class Policy> IR_INLINE void visit_solids(const Model& model,
 
 template <class V, class Policy> IR_INLINE void visit_self(const Model& model, const State<V>& s, Policy& policy) {
   using S = Scalar<V>;
-  const std::size_t outside = model.environment.size();
-  for (std::size_t i = 0; i < model.self_pairs.size(); ++i) {
-    const SelfPair& pair = model.self_pairs[i];
-    const Vec<V> gap = s.middle[pair.a] - s.middle[pair.b];
-    if (!may_matter<V>(dot(gap, gap), policy.own(i) + policy.shift.self_reach[i])) continue;
-    if (policy.shift.of[outside + i] == -std::numeric_limits<S>::infinity()) continue;
-    policy.take(static_cast<int>(outside + i), static_cast<int>(i), self_distance(model, s, pair));
+  const int outside = static_cast<int>(model.environment.size()), count = static_cast<int>(model.self_pairs.size());
+  for (int first = 0; first < count; first += 32) {
+    std::uint32_t left = 0;  // all tests first, without a branch that could be mispredicted
+    for (int i = first; i < std::min(first + 32, count); ++i) {
+      const SelfPair& pair = model.self_pairs[i];
+      const Vec<V> gap = s.middle[pair.a] - s.middle[pair.b];
+      const bool near = may_matter<V>(dot(gap, gap), policy.own(i) + policy.shift.self_reach[i]);
+      left |= static_cast<std::uint32_t>(near) << (i - first);
+    }
+    for (; left != 0; left &= left - 1) {
+      const int i = first + __builtin_ctz(left);
+      if (policy.shift.of[outside + i] == -std::numeric_limits<S>::infinity()) continue;
+      policy.take(outside + i, i, self_distance(model, s, model.self_pairs[i]));
+    }
   }
 }
 
