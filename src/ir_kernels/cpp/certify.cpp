@@ -103,6 +103,7 @@ template <class V> struct Proof {
   }
   IR_INLINE Float16 farthest(std::size_t first) const { return tight ? splat<Float16>(1e15f) : far[first / 16]; }
   IR_INLINE V allowed(V m) const { return m + margin + (tight ? max(proved, V{}) : V{}); }
+  IR_INLINE bool known(int) const { return false; }
   IR_INLINE bool done() const { return false; }
 
   IR_INLINE void take(int z, int index, V distance) {

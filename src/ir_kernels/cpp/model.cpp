@@ -103,13 +103,17 @@ void Model::finish() {
     }
     leaves.push_back(leaf);
   }
+  ball_radius.assign((capsules.size() + 15) / 16 * 16, 0.0f);
+  for (std::size_t c = 0; c < capsules.size(); ++c)
+    ball_radius[c] = static_cast<float>(capsules[c].half + capsules[c].radius);
   pair_of.assign(capsules.size() * kind.size(), -1);
   for (std::size_t z = 0; z < environment.size(); ++z)
     pair_of[environment[z][0] * kind.size() + environment[z][1]] = static_cast<std::int32_t>(z);
   for (SelfPair& pair : self_pairs) {
     const bool first = capsules[pair.a].link >= capsules[pair.b].link;
     const Capsule &a = capsules[pair.a], &b = capsules[pair.b];
-    pair.around = a.radius + b.radius + a.half + b.half;
+    pair.radii = a.radius + b.radius;
+    pair.around = pair.radii + a.half + b.half;
     pair.outer = first ? pair.a : pair.b;
     pair.inner = first ? pair.b : pair.a;
   }

@@ -30,7 +30,8 @@ struct Capsule {
 struct SelfPair {
   int a, b;          // capsules
   int outer, inner;  // the same, the outer one on the link that is farther from the base
-  double around;     // sum of the radii and half lengths
+  double radii;      // their sum
+  double around;     // and the half lengths
 };
 
 // Boxes along the world's axes (relative to the base's origin), for culling: of a body, and of up to sixteen neighbours.
@@ -56,6 +57,7 @@ class Model {
   std::vector<std::int32_t> pair_of;  // capsule x body -> pair, -1: not kept
   std::vector<int> planes;
   std::vector<Leaf> leaves;
+  std::vector<float> ball_radius;  // of each capsule, whole sixteens
   double float_margin;  // [m] more than 16 lanes of floats lose
   bool wide;            // too large for floats: 8 lanes of doubles throughout
 
@@ -106,12 +108,13 @@ template <class V> IR_INLINE Vec<V> splat3(const Scalar<V> v[3]) {
 // Not inlined: one instance for all queries keeps the build short.
 template <class V> V axis_distance(const Model& model, int body, int capsule_index, const Vec<V>& a, const Vec<V>& b);
 
-template <class V> IR_INLINE V self_distance(const Model& model, const State<V>& s, const SelfPair& pair) {
+// Squared distance of the axes.
+template <class V> IR_INLINE V square_between(const Model& model, const State<V>& s, const SelfPair& pair) {
   using S = Scalar<V>;
   const Capsule &first = model.capsules[pair.a], &second = model.capsules[pair.b];
   const auto p = segment_segment(s.a[pair.a], s.b[pair.a] - s.a[pair.a], splat<V>(S(first.inverse_square)),
                                  s.a[pair.b], s.b[pair.b] - s.a[pair.b], splat<V>(S(second.inverse_square)));
-  return sqrt(dot(p.gap, p.gap)) - S(first.radius + second.radius);
+  return dot(p.gap, p.gap);
 }
 
 template <class V> IR_INLINE V environment_distance(const Model& model, const State<V>& s, int c, int body) {
@@ -122,7 +125,10 @@ template <class V> IR_INLINE V environment_distance(const Model& model, const St
 
 template <class V> V pair_distance(const Model& model, const State<V>& s, int z) {
   const int outside = static_cast<int>(model.environment.size());
-  if (z >= outside) return self_distance(model, s, model.self_pairs[z - outside]);
+  if (z >= outside) {
+    const SelfPair& pair = model.self_pairs[z - outside];
+    return sqrt(square_between(model, s, pair)) - Scalar<V>(pair.radii);
+  }
   return environment_distance(model, s, model.environment[z][0], model.environment[z][1]);
 }
 

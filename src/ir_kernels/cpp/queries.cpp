@@ -16,13 +16,14 @@ template <class V> struct Nearest {
   const Shifts<S>& shift;
   V best;  // least distance - offset so far
   Mask<V> pair;
-  S limit;  // the highest lane of best
+  int hint;  // the pair that was taken first, or -1
 
   IR_INLINE V outside(int) const { return best + slack_of(V{}); }
   IR_INLINE V own(std::size_t) const { return best + slack_of(V{}); }
   IR_INLINE Float16 farthest(std::size_t) const {
-    return splat<Float16>(static_cast<float>(limit + shift.highest + slack_of(V{})));
+    return splat<Float16>(static_cast<float>(highest(best) + shift.highest + slack_of(V{})));
   }
+  IR_INLINE bool known(int z) const { return z == hint; }
   IR_INLINE bool done() const { return false; }
   IR_INLINE void take(int z, int, V distance) {
     const V excess = distance - shift.of[z];
@@ -31,7 +32,6 @@ template <class V> struct Nearest {
     const Mask<V> better = (excess < best) | ((excess == best) & (index < pair));
     best = better ? excess : best;
     pair = better ? index : pair;
-    limit = highest<V>(best);
   }
 };
 
@@ -47,6 +47,7 @@ template <class V> struct Above {
   IR_INLINE Float16 farthest(std::size_t) const {
     return splat<Float16>(static_cast<float>(shift.highest + slack_of(V{})));
   }
+  IR_INLINE bool known(int) const { return false; }
   IR_INLINE bool done() const { return !any(free); }
   IR_INLINE void take(int z, int, V distance) { free = free & (distance > shift.of[z]); }
 };
@@ -247,15 +248,13 @@ void min_distance_in(const Model& model, const double* q, std::size_t count, con
   constexpr int width = Lanes<V>::width;
   const Shifts<S> shift(model, offset);
   Placement<V> placement(model);
-  Nearest<V> policy{shift, {}, {}, {}};
-  int hint = -1;
+  Nearest<V> policy{shift, {}, {}, -1};
   for (std::size_t first = 0; first < count; first += width) {
     const Rows<width> rows(q, first, count, model.chain.n);
     placement.place(rows.row, rows.count);
-    policy.limit = std::numeric_limits<S>::infinity();
-    policy.best = V{} + policy.limit;
+    policy.best = V{} + std::numeric_limits<S>::infinity();
     policy.pair = Mask<V>{} + std::numeric_limits<std::int32_t>::max();
-    if (hint >= 0) policy.take(hint, 0, pair_distance(model, placement.state, hint));
+    if (policy.hint >= 0) policy.take(policy.hint, 0, pair_distance(model, placement.state, policy.hint));
     visit(model, placement.state, policy);
     const Mask<V> chosen = policy.best < std::numeric_limits<S>::infinity() ? policy.pair : Mask<V>{} - 1;
     int nearest[width];
@@ -269,7 +268,7 @@ void min_distance_in(const Model& model, const double* q, std::size_t count, con
       }
       continue;
     }
-    hint = nearest[rows.count - 1];
+    policy.hint = nearest[rows.count - 1];
     for (int part = 0; 8 * part < rows.count; ++part) {
       const int lanes = std::min(8, rows.count - 8 * part);
       write(model, witness(model, placement.exact[part], nearest + 8 * part, lanes), lanes, first + 8 * part, result);

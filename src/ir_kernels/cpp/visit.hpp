@@ -2,7 +2,7 @@
 //
 // A policy says how far is near enough: a pair z of capsule c may be skipped where its distance certainly exceeds
 // outside(c) + shift.of[z] (self pair i: own(i) + shift.of[z]) in every lane; else take(z, c or i, distance) gets the exact
-// values. farthest(first) is the highest lane of outside(c) +
+// values. known(z): they were taken before. farthest(first) is the highest lane of outside(c) +
 // the highest shift, for sixteen capsules from `first`.
 // shift.of[z] = -inf: the pair doesn't count.
 #pragma once
@@ -48,87 +48,123 @@ template <class V> IR_INLINE bool may_matter(V square, V need) {
   return any_not_above<V>(square, positive * positive);
 }
 
+// Whether the pair was taken.
 template <class V, class Policy>
-IR_INLINE void visit_body(const Model& model, const State<V>& s, int c, int body, Policy& policy) {
+IR_INLINE bool visit_body(const Model& model, const State<V>& s, int c, int body, Policy& policy) {
   using S = Scalar<V>;
   const std::int32_t z = model.pair_of[c * model.kind.size() + body];
-  if (z < 0) return;
+  if (z < 0 || policy.known(z)) return false;
   const S shift = policy.shift.of[z];
-  if (shift == -std::numeric_limits<S>::infinity()) return;
+  if (shift == -std::numeric_limits<S>::infinity()) return false;
   const Capsule& capsule = model.capsules[c];
   const S radius = static_cast<S>(capsule.radius);
   const Body<S>& f = model.bodies<S>()[body];
   const V need = policy.outside(c) + (shift + radius);
-  if (!may_matter<V>(square_beyond(to_local<V>(f, s.middle[c]), f.half), need + static_cast<S>(capsule.half))) return;
+  if (!may_matter<V>(square_beyond(to_local<V>(f, s.middle[c]), f.half), need + static_cast<S>(capsule.half))) return false;
   const Vec<V> a = to_local<V>(f, s.a[c]), b = to_local<V>(f, s.b[c]);
-  if (!may_matter<V>(square_apart(a, b, f.half), need)) return;
+  if (!may_matter<V>(square_apart(a, b, f.half), need)) return false;
   policy.take(z, c, axis_distance<V>(model, body, c, a, b) - radius);
+  return true;
 }
 
 template <class V, class Policy>
-IR_INLINE void visit_planes(const Model& model, const State<V>& s, Policy& policy) {
+IR_INLINE bool visit_plane(const Model& model, const State<V>& s, int c, int body, Policy& policy) {
   using S = Scalar<V>;
-  for (const int body : model.planes) {
-    const Body<S>& f = model.bodies<S>()[body];
-    const auto height = [&](const Vec<V>& p) {
-      return f.axis[2][0] * p.x + (f.axis[2][1] * p.y + (f.axis[2][2] * p.z - f.offset[2]));
-    };
-    for (int c = static_cast<int>(model.capsules.size()) - 1; c >= 0; --c) {
-      const std::int32_t z = model.pair_of[c * model.kind.size() + body];
-      if (z < 0 || policy.shift.of[z] == -std::numeric_limits<S>::infinity()) continue;
-      const V distance = min(height(s.a[c]), height(s.b[c])) - static_cast<S>(model.capsules[c].radius);
-      if (any_not_above<V>(distance, policy.outside(c) + policy.shift.of[z])) policy.take(z, c, distance);
-    }
-  }
+  const std::int32_t z = model.pair_of[c * model.kind.size() + body];
+  if (z < 0 || policy.known(z) || policy.shift.of[z] == -std::numeric_limits<S>::infinity()) return false;
+  const V distance = environment_distance(model, s, c, body);
+  if (!any_not_above<V>(distance, policy.outside(c) + policy.shift.of[z])) return false;
+  policy.take(z, c, distance);
+  return true;
 }
 
 // Balls around sixteen capsules, each in all configurations of the group: around the capsule's middle in one of them.
 struct Balls {
   Float16 x, y, z, radius;
+  std::uint32_t moving;  // the places with a capsule, and one that isn't part of the base
 };
+
+// The largest lane of each of sixteen.
+IR_INLINE Float16 highest_of_each(const Float16* v) {
+  Float16 pairs[8], fours[4], eights[2];
+  for (int i = 0; i < 8; ++i) {
+    const Float16 a = v[2 * i], b = v[2 * i + 1];
+    pairs[i] = max(__builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29),
+                   __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31));
+  }
+  for (int i = 0; i < 4; ++i) {
+    const Float16 a = pairs[2 * i], b = pairs[2 * i + 1];
+    fours[i] = max(__builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
+                   __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31));
+  }
+  const auto halved = [](Float16 a, Float16 b) {
+    return max(__builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27),
+               __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15, 20, 21, 22, 23, 28, 29, 30, 31));
+  };
+  for (int i = 0; i < 2; ++i) eights[i] = halved(fours[2 * i], fours[2 * i + 1]);
+  return halved(eights[0], eights[1]);
+}
+IR_INLINE Float16 highest_of_each(const Double8* v) {
+  Float16 r;
+  for (int k = 0; k < 16; ++k) r[k] = static_cast<float>(highest(v[k]));
+  return r;
+}
 
 template <class V> IR_INLINE Balls balls_around(const Model& model, const State<V>& s, std::size_t first) {
   constexpr int lane = Lanes<V>::width / 2;
-  Balls b;
-  b.x = b.y = b.z = splat<Float16>(1e30f);  // link 0, and places without a capsule: nowhere
-  Float16 spread{}, own{};
-  const std::size_t count = std::min<std::size_t>(16, model.capsules.size() - first);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Capsule& capsule = model.capsules[first + k];
-    if (capsule.link == 0) continue;
+  float x[16] = {}, y[16] = {}, z[16] = {};
+  V square[16];
+  Balls balls;
+  balls.moving = 0;
+  for (std::size_t k = 0; k < 16; ++k) {
+    square[k] = V{};
+    if (first + k >= model.capsules.size() || model.capsules[first + k].link == 0) continue;
+    balls.moving |= 1u << k;
     const Vec<V>& m = s.middle[first + k];
-    const Scalar<V> x = m.x[lane], y = m.y[lane], z = m.z[lane];
-    const V dx = m.x - x, dy = m.y - y, dz = m.z - z;
-    spread[k] = static_cast<float>(highest<V>(dx * dx + dy * dy + dz * dz));
-    own[k] = static_cast<float>(capsule.half + capsule.radius);
-    b.x[k] = static_cast<float>(x);
-    b.y[k] = static_cast<float>(y);
-    b.z[k] = static_cast<float>(z);
+    const Vec<V> away = m - Vec<V>{splat<V>(m.x[lane]), splat<V>(m.y[lane]), splat<V>(m.z[lane])};
+    square[k] = dot(away, away);
+    x[k] = static_cast<float>(m.x[lane]);
+    y[k] = static_cast<float>(m.y[lane]);
+    z[k] = static_cast<float>(m.z[lane]);
   }
-  b.radius = sqrt(spread) + own;
-  return b;
+  balls.x = load<Float16>(x);
+  balls.y = load<Float16>(y);
+  balls.z = load<Float16>(z);
+  balls.radius = sqrt(highest_of_each(square)) + load<Float16>(&model.ball_radius[first]);
+  return balls;
 }
 
-// Which balls come nearer than `reach` to a box along the world's axes.
+// Which balls come nearer than `reach` to a box along the world's axes, or to a plane.
 IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const float low[3], const float high[3]) {
-  const Float16 zero{}, limit = clamp(reach, zero, splat<Float16>(1e15f));  // finite: nowhere stays out
+  const Float16 zero{}, limit = clamp(reach, zero, splat<Float16>(1e15f));
   const Float16 x = max(max(low[0] - b.x, b.x - high[0]), zero);
   const Float16 y = max(max(low[1] - b.y, b.y - high[1]), zero);
   const Float16 z = max(max(low[2] - b.z, b.z - high[2]), zero);
-  return bits(x * x + y * y + z * z <= limit * limit);
+  return bits(x * x + y * y + z * z <= limit * limit) & b.moving;
+}
+IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const Body<float>& plane) {
+  const float* axis = plane.axis[2];
+  const float offset = plane.offset[2], slack = 1e-6f * (1.0f + std::fabs(offset));
+  return bits(axis[0] * b.x + axis[1] * b.y + axis[2] * b.z <= reach + (offset + slack)) & b.moving;
 }
 
-template <class V, class Policy> IR_INLINE void visit_solids(const Model& model, const State<V>& s, Policy& policy) {
+// The planes and solids, beside sixteen capsules at a time.
+template <class V, class Policy> IR_INLINE void visit_bodies(const Model& model, const State<V>& s, Policy& policy) {
   for (std::size_t first = 0; first < model.capsules.size(); first += 16) {
     const Balls balls = balls_around(model, s, first);
-    const auto reach = [&] { return (balls.radius + policy.farthest(first)) * 1.00001f + 1e-5f; };
+    Float16 reach;
+    const auto update = [&] { reach = (balls.radius + policy.farthest(first)) * 1.00001f + 1e-5f; };
+    update();
+    const auto visit_each = [&](std::uint32_t left, int body, auto visit_one) {
+      for (; left != 0; left &= left - 1)
+        if (visit_one(model, s, static_cast<int>(first) + __builtin_ctz(left), body, policy)) update();
+    };
+    for (const int body : model.planes) visit_each(near(balls, reach, model.bodies_float[body]), body, visit_plane<V, Policy>);
     for (const Leaf& leaf : model.leaves) {
-      if (model.leaves.size() > 1 && near(balls, reach(), leaf.low, leaf.high) == 0) continue;
-      for (const Box& box : leaf.boxes) {
-        for (std::uint32_t left = near(balls, reach(), box.low, box.high); left != 0; left &= left - 1)
-          visit_body(model, s, static_cast<int>(first) + __builtin_ctz(left), box.body, policy);
-      }
       if (policy.done()) return;
+      if (model.leaves.size() > 1 && near(balls, reach, leaf.low, leaf.high) == 0) continue;
+      for (const Box& box : leaf.boxes)
+        visit_each(near(balls, reach, box.low, box.high), box.body, visit_body<V, Policy>);
     }
   }
 }
@@ -146,8 +182,12 @@ template <class V, class Policy> IR_INLINE void visit_self(const Model& model, c
     }
     for (; left != 0; left &= left - 1) {
       const int i = first + __builtin_ctz(left);
-      if (policy.shift.of[outside + i] == -std::numeric_limits<S>::infinity()) continue;
-      policy.take(outside + i, i, self_distance(model, s, model.self_pairs[i]));
+      const S shift = policy.shift.of[outside + i];
+      if (policy.known(outside + i) || shift == -std::numeric_limits<S>::infinity()) continue;
+      const SelfPair& pair = model.self_pairs[i];
+      const V square = square_between(model, s, pair);
+      const S radii = static_cast<S>(pair.radii);
+      if (may_matter<V>(square, policy.own(i) + (shift + radii))) policy.take(outside + i, i, sqrt(square) - radii);
     }
   }
 }
@@ -156,9 +196,7 @@ template <class V, class Policy> IR_INLINE void visit_self(const Model& model, c
 template <class V, class Policy> IR_INLINE void visit(const Model& model, const State<V>& s, Policy& policy) {
   visit_self(model, s, policy);
   if (policy.done()) return;
-  visit_planes(model, s, policy);
-  if (policy.done()) return;
-  visit_solids(model, s, policy);
+  visit_bodies(model, s, policy);
 }
 
 }  // namespace ir
