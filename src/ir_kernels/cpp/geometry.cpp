@@ -180,7 +180,7 @@ ir::Model model_of(const Array& joint_origin, const Array& joint_axis, const Arr
     return result;
   };
   m.environment = pairs_of(environment, capsules, bodies);
-  for (const auto& pair : pairs_of(self_pairs, capsules, capsules)) m.self_pairs.push_back({pair[0], pair[1], 0, 0, 0.0});
+  for (const auto& pair : pairs_of(self_pairs, capsules, capsules)) m.self_pairs.push_back({pair[0], pair[1], 0, 0, 0.0, 0.0});
   m.finish();
   return m;
 }
