@@ -3,12 +3,13 @@
 
 namespace ir {
 
-const Circle circle = [] {
-  Circle table;
-  for (int k = 0; k < 64; ++k) {
+const Quarter quarter = [] {
+  Quarter table;
+  for (int k = 0; k <= 16; ++k) {
     table.c[k] = std::cos(k * (3.14159265358979323846 / 32));
     table.s[k] = std::sin(k * (3.14159265358979323846 / 32));
   }
+  table.c[16] = 0.0;
   return table;
 }();
 

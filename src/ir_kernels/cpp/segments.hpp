@@ -15,10 +15,10 @@ template <class V> struct Touch {
 
 template <class V> struct Limits;
 template <> struct Limits<Float16> {
-  static constexpr float tiny = 1e-30f, parallel = 1e-10f, nudge = 1e-6f, still = 2e-7f;
+  static constexpr float tiny = 1e-30f, parallel = 1e-10f, nudge = 1e-6f, still = 1e-6f;
 };
 template <> struct Limits<Double8> {
-  static constexpr double tiny = 1e-200, parallel = 1e-24, nudge = 1e-9, still = 1e-14;
+  static constexpr double tiny = 1e-200, parallel = 1e-24, nudge = 1e-9, still = 1e-9;
 };
 
 template <class V> IR_INLINE V excess(V x, V e) { return x - clamp(x, -e, e); }
@@ -166,13 +166,14 @@ template <class V> IR_INLINE V nearest_to_cylinder(Vec<V> a, Vec<V> d, V radius,
   const V leave = min(min(max(bottom, top), closest + width), one);
   crossing = (room > 0) & (enter < leave);
   V low = splat<V>(-1), high = splat<V>(2), t = clamp(closest, zero, one);
-  for (int k = 0; k < 64; ++k) {
+  Mask<V> moving = ~crossing;
+  for (int k = 0; k < 64 && any(moving); ++k) {  // a lane that has arrived doesn't wait for the others
     const Vec<V> p = a + t * d;
-    const V rho = sqrt(max(p.x * p.x + p.y * p.y, tiny));
-    const V radial = (p.x * d.x + p.y * d.y) / rho;  // slope of rho
+    const V rho = sqrt(max(p.x * p.x + p.y * p.y, tiny)), inverse = 1 / rho;
+    const V radial = (p.x * d.x + p.y * d.y) * inverse;  // slope of rho
     const V out = max(rho - radius, zero), up = excess(p.z, half);
     const V slope = out * radial + up * d.z;
-    const V bend = select<V>(out > 0, radial * radial + out * (flat - radial * radial) / rho, zero) +
+    const V bend = select<V>(out > 0, radial * radial + out * (flat - radial * radial) * inverse, zero) +
                    select<V>(up != 0, d.z * d.z, zero);
     const Mask<V> rising = slope > 0, falling = slope < 0;
     high = select<V>(rising, t, high);
@@ -181,10 +182,9 @@ template <class V> IR_INLINE V nearest_to_cylinder(Vec<V> a, Vec<V> d, V radius,
     const V middle = (low + high) * Scalar<V>(0.5);
     const V beyond = select<V>(rising, select<V>(low < 0, zero, middle), select<V>(high > 1, one, middle));
     next = select<V>((next <= max(low, zero)) | (next >= min(high, one)), beyond, next);
-    next = select<V>((rising | falling) & ~crossing, next, t);
-    const Mask<V> moves = abs(next - t) > Limits<V>::still;
+    next = select<V>((rising | falling) & moving, next, t);
+    moving = moving & (abs(next - t) > Limits<V>::still);
     t = next;
-    if (!any(moves)) break;
   }
   return t;
 }
@@ -201,14 +201,29 @@ template <class V> IR_INLINE Touch<V> outside_cylinder(Vec<V> a, Vec<V> d, V rad
   return r;
 }
 
-// Cosine and sine of k turns / 64.
-struct Circle {
-  double c[64], s[64];
+// Cosine and sine of k / 64 turns, a quarter of the circle.
+struct Quarter {
+  double c[17], s[17];
 };
-extern const Circle circle;
+extern const Quarter quarter;
 
-// Penetration of a segment that crosses the cylinder: caps, side, and the rims swept along the segment, whose
-// directions are perpendicular to it: the best of 64 on that circle, then golden section between its neighbours.
+// How far a segment overlaps a cylinder in the directions c u + s v, u horizontal, both perpendicular to the segment and
+// on its side of the cylinder's centre: then c, s >= 0 wherever the overlap is least.
+template <class V> struct Rim {
+  V radius, half, p, r, w;  // p, r: how far the segment is along u and v; w: the height of v
+
+  IR_INLINE V side(V s) const { return sqrt(max(1 - s * s * w * w, splat<V>(Limits<V>::tiny))); }
+  IR_INLINE V overlap(V c, V s) const { return radius * side(s) + s * (half * w - r) - c * p; }
+  // derivatives by the angle
+  IR_INLINE void slope(V c, V s, V& first, V& second) const {
+    const V inverse = 1 / side(s), cross = s * c * w * inverse, k = half * w - r;
+    first = p * s + k * c - radius * w * cross;
+    second = p * c - k * s - radius * w * ((c * c - s * s) * w * inverse + cross * cross * w * inverse);
+  }
+};
+
+// Penetration of a segment that crosses the cylinder: caps, side, and the rims swept along the segment: the best of 17
+// directions, then Newton steps kept between its neighbours.
 template <class V> __attribute__((noinline)) void depth_in_cylinder(const Vec<V>& a, const Vec<V>& b, V radius, V half,
                                                                     V& depth, Vec<V>& n) {
   using S = Scalar<V>;
@@ -218,58 +233,51 @@ template <class V> __attribute__((noinline)) void depth_in_cylinder(const Vec<V>
   n = {zero, zero, one};
   shallower<V>(half + max(a.z, b.z), {zero, zero, -one}, depth, n);
   const auto normalised = [&](const Vec<V>& v) { return (1 / sqrt(max(dot(v, v), tiny))) * v; };
-  const auto overlap = [&](const Vec<V>& u) {
-    return radius * sqrt(u.x * u.x + u.y * u.y) + half * abs(u.z) - ahead(u, a, b);
-  };
   const V flat = d.x * d.x + d.y * d.y;
   const V t = clamp(-(a.x * d.x + a.y * d.y) / max(flat, tiny), zero, one);
   Vec<V> radial{a.x + t * d.x, a.y + t * d.y, zero};
   const V away = dot(radial, radial);
-  radial = select(away > flat * Limits<V>::parallel + tiny, radial,
-                  select(flat > tiny, Vec<V>{-d.y, d.x, zero}, Vec<V>{one, zero, zero}));
-  radial = normalised(radial);
-  shallower(overlap(radial), radial, depth, n);
+  const Vec<V> across = select(flat > tiny, Vec<V>{-d.y, d.x, zero}, Vec<V>{one, zero, zero});
+  radial = normalised(select(away > flat * Limits<V>::parallel + tiny, radial, across));
+  shallower(radius - ahead(radial, a, b), radial, depth, n);
   const Vec<V> opposite{-radial.x, -radial.y, zero};
-  shallower(overlap(opposite), opposite, depth, n);
-  const Vec<V> u = normalised(select(abs(d.x) < abs(d.z), Vec<V>{zero, d.z, -d.y}, Vec<V>{d.y, -d.x, zero}));
-  const Vec<V> v = normalised(cross(d, u));
-  const auto at = [&](V c, V s) { return c * u + s * v; };
-  V least = splat<V>(S(1e30)), best = zero;
-  for (int k = 0; k < 64; ++k) {
-    const V now = overlap(at(splat<V>(S(circle.c[k])), splat<V>(S(circle.s[k]))));
+  shallower(radius - ahead(opposite, a, b), opposite, depth, n);
+  const auto facing = [&](const Vec<V>& v) { return select(dot(v, a) < 0, Vec<V>{-v.x, -v.y, -v.z}, v); };
+  const Vec<V> u = facing(normalised(across)), v = facing(normalised(cross(d, u)));
+  const Rim<V> rim{radius, half, dot(u, a), dot(v, a), abs(v.z)};
+  V least = splat<V>(S(1e30)), bc = one, bs = zero, low = zero, high = zero;
+  constexpr S step = S(0.0985);  // more than the tangent of 1/64 turn
+  for (int k = 0; k <= 16; ++k) {
+    const V c = splat<V>(S(quarter.c[k])), s = splat<V>(S(quarter.s[k])), now = rim.overlap(c, s);
     const Mask<V> m = now < least;
-    least = select<V>(m, now, least);
-    best = select<V>(m, splat<V>(S(k)), best);
+    least = min(now, least);
+    bc = select<V>(m, c, bc);
+    bs = select<V>(m, s, bs);
+    low = select<V>(m, splat<V>(k == 0 ? S(0) : -step), low);
+    high = select<V>(m, splat<V>(k == 16 ? S(0) : step), high);
   }
-  V bc, bs;  // cosine and sine of the best
-  for (int k = 0; k < Lanes<V>::width; ++k) {
-    const int which = static_cast<int>(best[k]);
-    bc[k] = S(circle.c[which]);
-    bs[k] = S(circle.s[which]);
+  // from there by the angle whose tangent is x
+  V x = zero, c = bc, s = bs;
+  Mask<V> moving = d.x == d.x;
+  for (int k = 0; k < 64 && any(moving); ++k) {
+    V slope, bend;
+    rim.slope(c, s, slope, bend);
+    high = select<V>(slope > 0, x, high);
+    low = select<V>(slope > 0, low, x);
+    V next = x - slope * (1 + x * x) / max(bend, tiny);
+    next = select<V>((next > low) & (next < high), next, (low + high) * S(0.5));
+    next = select<V>(moving, next, x);
+    moving = moving & (abs(next - x) > Limits<V>::still);
+    x = next;
+    const V scale = 1 / sqrt(1 + x * x);
+    c = scale * (bc - x * bs);
+    s = scale * (bs + x * bc);
   }
-  // directions (1, w) in the frame of the best and its perpendicular, |w| <= tan(turn / 64)
-  const auto turned = [&](V w) { return normalised(at(bc - w * bs, bs + w * bc)); };
-  const S golden = S(0.61803398874989484820);
-  V low = splat<V>(S(-0.0985)), high = splat<V>(S(0.0985));
-  V left = high - golden * (high - low), right = low + golden * (high - low);
-  V at_left = overlap(turned(left)), at_right = overlap(turned(right));
-  for (int k = 0; k < (Lanes<V>::width == 16 ? 20 : 40); ++k) {
-    const Mask<V> m = at_left < at_right;
-    high = select<V>(m, right, high);
-    low = select<V>(m, low, left);
-    const V kept = select<V>(m, left, right), at_kept = select<V>(m, at_left, at_right);
-    const V fresh = select<V>(m, high - golden * (high - low), low + golden * (high - low));
-    const V at_fresh = overlap(turned(fresh));
-    left = select<V>(m, fresh, kept);
-    right = select<V>(m, kept, fresh);
-    at_left = select<V>(m, at_fresh, at_kept);
-    at_right = select<V>(m, at_kept, at_fresh);
-  }
-  const Vec<V> rim = turned((low + high) * S(0.5));
-  const V rim_depth = overlap(rim);
+  const Vec<V> direction = c * u + s * v;
+  const V rim_depth = rim.overlap(c, s);
   const Mask<V> m = (dot(d, d) > S(1e-12)) & (rim_depth < depth);
   depth = select<V>(m, rim_depth, depth);
-  n = select(m, rim, n);
+  n = select(m, direction, n);
 }
 
 template <class V> __attribute__((noinline)) Touch<V> segment_cylinder(const Vec<V>& a, const Vec<V>& b, V radius,
