@@ -101,7 +101,7 @@ template <class V> struct Proof {
     const SelfPair& pair = model.self_pairs[i];
     return allowed(moved[pair.outer * (model.chain.n + 1) + model.capsules[pair.inner].link]);
   }
-  IR_INLINE Float16 farthest(std::size_t first) const { return tight ? splat<Float16>(1e15f) : far[first / 16]; }
+  IR_INLINE Float16 farthest(std::size_t first, int) const { return tight ? splat<Float16>(1e15f) : far[first / 16]; }
   IR_INLINE V allowed(V m) const { return m + margin + (tight ? max(proved, V{}) : V{}); }
   IR_INLINE bool known(int) const { return false; }
   IR_INLINE bool done() const { return false; }

@@ -151,6 +151,19 @@ template <class V> IR_INLINE Scalar<V> highest(V v) {
   return r;
 }
 
+// The largest of lanes 8 part to 8 part + 7.
+IR_INLINE float highest_of_eight(Float16 v, int part) {
+  typedef float Float8 __attribute__((vector_size(32)));
+  typedef float Float4 __attribute__((vector_size(16)));
+  const Float8 a = part == 0 ? __builtin_shufflevector(v, v, 0, 1, 2, 3, 4, 5, 6, 7)
+                             : __builtin_shufflevector(v, v, 8, 9, 10, 11, 12, 13, 14, 15);
+  const Float4 low = __builtin_shufflevector(a, a, 0, 1, 2, 3), high = __builtin_shufflevector(a, a, 4, 5, 6, 7);
+  const Float4 b = low > high ? low : high;
+  const Float4 turned = __builtin_shufflevector(b, b, 2, 3, 0, 1), c = b > turned ? b : turned;
+  return c[0] > c[1] ? c[0] : c[1];
+}
+IR_INLINE double highest_of_eight(Double8 v, int) { return highest(v); }
+
 // Three lanes-wide coordinates.
 template <class V> struct Vec {
   V x, y, z;

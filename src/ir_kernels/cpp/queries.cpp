@@ -21,8 +21,8 @@ template <class V> struct Nearest {
 
   IR_INLINE V outside(int) const { return best + slack_of(V{}); }
   IR_INLINE V own(std::size_t) const { return best + slack_of(V{}); }
-  IR_INLINE Float16 farthest(std::size_t) const {
-    return splat<Float16>(static_cast<float>(highest(best) + shift.highest + slack_of(V{})));
+  IR_INLINE Float16 farthest(std::size_t, int part) const {
+    return splat<Float16>(static_cast<float>(highest_of_eight(best, part) + shift.highest + slack_of(V{})));
   }
   IR_INLINE bool known(int z) const { return z == hint; }
   IR_INLINE bool done() const { return false; }
@@ -45,7 +45,7 @@ template <class V> struct Above {
     return free ? V{} + slack_of(V{}) : V{} - std::numeric_limits<S>::infinity();
   }
   IR_INLINE V own(std::size_t) const { return outside(0); }
-  IR_INLINE Float16 farthest(std::size_t) const {
+  IR_INLINE Float16 farthest(std::size_t, int) const {
     return splat<Float16>(static_cast<float>(shift.highest + slack_of(V{})));
   }
   IR_INLINE bool known(int) const { return false; }

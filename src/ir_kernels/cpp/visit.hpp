@@ -2,8 +2,8 @@
 //
 // A policy says how far is near enough: a pair z of capsule c may be skipped where its distance certainly exceeds
 // outside(c) + shift.of[z] (self pair i: own(i) + shift.of[z]) in every lane; else take(z, c or i, distance) gets the exact
-// values. known(z): they were taken before. farthest(first) is the highest lane of outside(c) +
-// the highest shift, for sixteen capsules from `first`.
+// values. known(z): they were taken before. farthest(first, part) is
+// the highest of eight lanes of outside(c) + the highest shift, for sixteen capsules from `first`.
 // shift.of[z] = -inf: the pair doesn't count.
 #pragma once
 
@@ -78,15 +78,21 @@ IR_INLINE bool visit_plane(const Model& model, const State<V>& s, int c, int bod
   return true;
 }
 
-// Balls around sixteen capsules, each in all configurations of the group: around the capsule's middle in one of them.
+// Balls around sixteen capsules, each in eight configurations: around the capsule's middle in the fifth of them.
 struct Balls {
   Float16 x, y, z, radius;
-  std::uint32_t moving;  // the places with a capsule, and one that isn't part of the base
 };
+template <class V> constexpr int eights = Lanes<V>::width / 8;
 
-// The largest lane of each of sixteen.
-IR_INLINE Float16 highest_of_each(const Float16* v) {
-  Float16 pairs[8], fours[4], eights[2];
+// In all lanes what is in the fifth of their eight.
+IR_INLINE Float16 fifth(Float16 v) {
+  return __builtin_shufflevector(v, v, 4, 4, 4, 4, 4, 4, 4, 4, 12, 12, 12, 12, 12, 12, 12, 12);
+}
+IR_INLINE Double8 fifth(Double8 v) { return splat<Double8>(v[4]); }
+
+// The largest of each eight lanes of sixteen registers.
+IR_INLINE void highest_of_each(const Float16* v, Float16 to[2]) {
+  Float16 pairs[8], fours[4], both[2];
   for (int i = 0; i < 8; ++i) {
     const Float16 a = v[2 * i], b = v[2 * i + 1];
     pairs[i] = max(__builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29),
@@ -97,74 +103,89 @@ IR_INLINE Float16 highest_of_each(const Float16* v) {
     fours[i] = max(__builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
                    __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31));
   }
-  const auto halved = [](Float16 a, Float16 b) {
-    return max(__builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27),
-               __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15, 20, 21, 22, 23, 28, 29, 30, 31));
+  const auto even = [](Float16 a, Float16 b) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27);
   };
-  for (int i = 0; i < 2; ++i) eights[i] = halved(fours[2 * i], fours[2 * i + 1]);
-  return halved(eights[0], eights[1]);
+  const auto odd = [](Float16 a, Float16 b) {
+    return __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15, 20, 21, 22, 23, 28, 29, 30, 31);
+  };
+  for (int i = 0; i < 2; ++i) {
+    const Float16 a = fours[2 * i], b = fours[2 * i + 1];
+    both[i] = max(even(a, b), odd(a, b));  // four registers' first eight, their second eight, the next four's
+  }
+  to[0] = even(both[0], both[1]);
+  to[1] = odd(both[0], both[1]);
 }
-IR_INLINE Float16 highest_of_each(const Double8* v) {
-  Float16 r;
-  for (int k = 0; k < 16; ++k) r[k] = static_cast<float>(highest(v[k]));
-  return r;
+IR_INLINE void highest_of_each(const Double8* v, Float16 to[1]) {
+  for (int k = 0; k < 16; ++k) to[0][k] = static_cast<float>(highest(v[k]));
 }
 
-template <class V> IR_INLINE Balls balls_around(const Model& model, const State<V>& s, std::size_t first) {
-  constexpr int lane = Lanes<V>::width / 2;
-  float x[16] = {}, y[16] = {}, z[16] = {};
+// Returns the places with a capsule, and one that isn't part of the base.
+template <class V>
+IR_INLINE std::uint32_t put_balls(const Model& model, const State<V>& s, std::size_t first, Balls balls[eights<V>]) {
+  float x[eights<V>][16] = {}, y[eights<V>][16] = {}, z[eights<V>][16] = {};
   V square[16];
-  Balls balls;
-  balls.moving = 0;
+  std::uint32_t moving = 0;
   for (std::size_t k = 0; k < 16; ++k) {
     square[k] = V{};
     if (first + k >= model.capsules.size() || model.capsules[first + k].link == 0) continue;
-    balls.moving |= 1u << k;
+    moving |= 1u << k;
     const Vec<V>& m = s.middle[first + k];
-    const Vec<V> away = m - Vec<V>{splat<V>(m.x[lane]), splat<V>(m.y[lane]), splat<V>(m.z[lane])};
+    const Vec<V> away = m - Vec<V>{fifth(m.x), fifth(m.y), fifth(m.z)};
     square[k] = dot(away, away);
-    x[k] = static_cast<float>(m.x[lane]);
-    y[k] = static_cast<float>(m.y[lane]);
-    z[k] = static_cast<float>(m.z[lane]);
+    for (int part = 0; part < eights<V>; ++part) {
+      x[part][k] = static_cast<float>(m.x[8 * part + 4]);
+      y[part][k] = static_cast<float>(m.y[8 * part + 4]);
+      z[part][k] = static_cast<float>(m.z[8 * part + 4]);
+    }
   }
-  balls.x = load<Float16>(x);
-  balls.y = load<Float16>(y);
-  balls.z = load<Float16>(z);
-  balls.radius = sqrt(highest_of_each(square)) + load<Float16>(&model.ball_radius[first]);
-  return balls;
+  Float16 spread[eights<V>];
+  highest_of_each(square, spread);
+  for (int part = 0; part < eights<V>; ++part)
+    balls[part] = {load<Float16>(x[part]), load<Float16>(y[part]), load<Float16>(z[part]),
+                   sqrt(spread[part]) + load<Float16>(&model.ball_radius[first])};
+  return moving;
 }
 
 // Which balls come nearer than `reach` to a box along the world's axes, or to a plane.
-IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const float low[3], const float high[3]) {
+template <class Solid> IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const Solid& box) {
   const Float16 zero{}, limit = clamp(reach, zero, splat<Float16>(1e15f));
-  const Float16 x = max(max(low[0] - b.x, b.x - high[0]), zero);
-  const Float16 y = max(max(low[1] - b.y, b.y - high[1]), zero);
-  const Float16 z = max(max(low[2] - b.z, b.z - high[2]), zero);
-  return bits(x * x + y * y + z * z <= limit * limit) & b.moving;
+  const Float16 x = max(max(box.low[0] - b.x, b.x - box.high[0]), zero);
+  const Float16 y = max(max(box.low[1] - b.y, b.y - box.high[1]), zero);
+  const Float16 z = max(max(box.low[2] - b.z, b.z - box.high[2]), zero);
+  return bits(x * x + y * y + z * z <= limit * limit);
 }
 IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const Body<float>& plane) {
   const float* axis = plane.axis[2];
   const float offset = plane.offset[2], slack = 1e-6f * (1.0f + std::fabs(offset));
-  return bits(axis[0] * b.x + axis[1] * b.y + axis[2] * b.z <= reach + (offset + slack)) & b.moving;
+  return bits(axis[0] * b.x + axis[1] * b.y + axis[2] * b.z <= reach + (offset + slack));
 }
 
 // The planes and solids, beside sixteen capsules at a time.
 template <class V, class Policy> IR_INLINE void visit_bodies(const Model& model, const State<V>& s, Policy& policy) {
   for (std::size_t first = 0; first < model.capsules.size(); first += 16) {
-    const Balls balls = balls_around(model, s, first);
-    Float16 reach;
-    const auto update = [&] { reach = (balls.radius + policy.farthest(first)) * 1.00001f + 1e-5f; };
+    Balls balls[eights<V>];
+    Float16 reach[eights<V>];
+    const std::uint32_t moving = put_balls(model, s, first, balls);
+    const auto update = [&] {
+      for (int part = 0; part < eights<V>; ++part)
+        reach[part] = (balls[part].radius + policy.farthest(first, part)) * 1.00001f + 1e-5f;
+    };
     update();
+    const auto some = [&](const auto& body) {
+      std::uint32_t found = near(balls[0], reach[0], body);
+      if constexpr (eights<V> == 2) found |= near(balls[1], reach[1], body);
+      return found & moving;
+    };
     const auto visit_each = [&](std::uint32_t left, int body, auto visit_one) {
       for (; left != 0; left &= left - 1)
         if (visit_one(model, s, static_cast<int>(first) + __builtin_ctz(left), body, policy)) update();
     };
-    for (const int body : model.planes) visit_each(near(balls, reach, model.bodies_float[body]), body, visit_plane<V, Policy>);
+    for (const int body : model.planes) visit_each(some(model.bodies_float[body]), body, visit_plane<V, Policy>);
     for (const Leaf& leaf : model.leaves) {
       if (policy.done()) return;
-      if (model.leaves.size() > 1 && near(balls, reach, leaf.low, leaf.high) == 0) continue;
-      for (const Box& box : leaf.boxes)
-        visit_each(near(balls, reach, box.low, box.high), box.body, visit_body<V, Policy>);
+      if (model.leaves.size() > 1 && some(leaf) == 0) continue;
+      for (const Box& box : leaf.boxes) visit_each(some(box), box.body, visit_body<V, Policy>);
     }
   }
 }
