@@ -6,6 +6,8 @@
 namespace ir {
 namespace {
 
+constexpr double aligned = 1e-15;  // sines and cosines below count as zero
+
 void multiply(const double a[9], const double b[9], double r[9]) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) r[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
@@ -16,50 +18,69 @@ void transposed_times(const double a[9], const double* b, int columns, double* r
       r[columns * i + j] = a[i] * b[j] + a[3 + i] * b[columns + j] + a[6 + i] * b[2 * columns + j];
 }
 
-// A rotation whose third column is the unit vector `axis`, made of zeros and ones where the axis is.
-void frame_about(const double axis[3], double r[9]) {
-  int least = 0;
-  for (int i = 1; i < 3; ++i)
-    if (std::fabs(axis[i]) < std::fabs(axis[least])) least = i;
-  double x[3] = {0, 0, 0};
-  x[least] = 1.0;
-  double length = 0.0;
-  for (int i = 0; i < 3; ++i) x[i] -= axis[least] * axis[i];
-  for (double c : x) length += c * c;
-  for (double& c : x) c /= std::sqrt(length);
-  const double y[3] = {axis[1] * x[2] - axis[2] * x[1], axis[2] * x[0] - axis[0] * x[2],
-                       axis[0] * x[1] - axis[1] * x[0]};
+void cross(const double a[3], const double b[3], double r[3]) {
+  r[0] = a[1] * b[2] - a[2] * b[1], r[1] = a[2] * b[0] - a[0] * b[2], r[2] = a[0] * b[1] - a[1] * b[0];
+}
+double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Columns x, y, z: z the unit vector `axis`, x perpendicular to it and to `next`; where that leaves it open, made of
+// zeros and ones where the axis is.
+void frame_about(const double axis[3], const double next[3], double r[9]) {
+  double x[3], y[3];
+  cross(axis, next, x);
+  if (dot(x, x) < aligned * aligned) {
+    int least = 0;
+    for (int i = 1; i < 3; ++i)
+      if (std::fabs(axis[i]) < std::fabs(axis[least])) least = i;
+    for (int i = 0; i < 3; ++i) x[i] = (i == least) - axis[least] * axis[i];
+  }
+  const double length = std::sqrt(dot(x, x));
+  for (double& c : x) c /= length;
+  cross(axis, x, y);
   for (int i = 0; i < 3; ++i) r[3 * i] = x[i], r[3 * i + 1] = y[i], r[3 * i + 2] = axis[i];
 }
 
 }  // namespace
 
 Chain::Chain(int count, const double* joint_origin, const double* joint_axis, const double* base_pose)
-    : n(count), joints(count), internal(9 * (count + 1), 0.0) {
+    : n(count), joints(count), internal(9 * (count + 1)) {
+  // the joints' rotations at q = 0, their origins, and their axes, each in the frame of the link before
+  std::vector<double> turn(9 * n), shift(3 * n), axis(3 * (n + 1), 0.0);
+  for (int k = 0; k < n; ++k) {
+    const double* pose = joint_origin + 16 * k;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) turn[9 * k + 3 * i + j] = pose[4 * i + j];
+      shift[3 * k + i] = pose[4 * i + 3];
+    }
+    for (int i = 0; i < 3; ++i) axis[3 * k + i] = dot(&turn[9 * k + 3 * i], joint_axis + 3 * k);
+  }
+  for (int k = 0; k < n; ++k) frame_about(joint_axis + 3 * k, &axis[3 * (k + 1)], &internal[9 * (k + 1)]);
+  multiply(&turn[0], &internal[9], &internal[0]);  // of the base: what the first one is at q = 0
+  for (int k = 0; k < n; ++k) {
+    double turned[9], step[9], local[3];
+    multiply(&turn[9 * k], &internal[9 * (k + 1)], turned);
+    transposed_times(&internal[9 * k], turned, 3, step);  // from frame to frame at q = 0
+    transposed_times(&internal[9 * k], &shift[3 * k], 1, local);
+    Joint& joint = joints[k];
+    joint.shift = Local(local);
+    // the axis is (0, -sine, cosine), x is (cos offset, cosine sin offset, sine sin offset)
+    joint.cosine = step[8], joint.sine = -step[5];
+    joint.turn = std::fabs(joint.sine) < aligned && joint.cosine > 0 ? Joint::parallel
+                 : std::fabs(joint.cosine) < aligned                 ? Joint::perpendicular
+                                                                     : Joint::oblique;
+    joint.offset = std::atan2(joint.cosine * step[3] + joint.sine * step[6], step[0]);
+  }
+  double base_turn[9];
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) base_turn[3 * i + j] = base_pose[4 * i + j];
     base_origin[i] = base_pose[4 * i + 3];
-    internal[4 * i] = 1.0;
   }
-  for (int k = 0; k < n; ++k) {
-    const double* pose = joint_origin + 16 * k;
-    double turn[9], shift[3], turned[9], local[3];
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) turn[3 * i + j] = pose[4 * i + j];
-      shift[i] = pose[4 * i + 3];
-    }
-    frame_about(joint_axis + 3 * k, &internal[9 * (k + 1)]);
-    multiply(turn, &internal[9 * (k + 1)], turned);
-    transposed_times(&internal[9 * k], turned, 3, joints[k].turn);
-    transposed_times(&internal[9 * k], shift, 1, local);
-    joints[k].shift = Local(local);
-    for (int j = 0; j < 3; ++j) {
-      int used = 0;
-      for (int i = 0; i < 3; ++i)
-        if (joints[k].turn[3 * i + j] != 0.0) ++used, joints[k].only[j] = i;
-      if (used != 1) joints[k].only[j] = -1;
-    }
-  }
+  double columns[9];
+  multiply(base_turn, &internal[0], columns);
+  const auto column = [&](int j) {
+    return Vec<Double8>{splat<Double8>(columns[j]), splat<Double8>(columns[3 + j]), splat<Double8>(columns[6 + j])};
+  };
+  base = {column(0), column(1), column(2), Vec<Double8>{}};
 }
 
 void Chain::to_internal(int link, const double point[3], double result[3]) const {
@@ -67,32 +88,23 @@ void Chain::to_internal(int link, const double point[3], double result[3]) const
 }
 
 void Chain::forward(const Double8* q, Frame<Double8>* frames) const {
-  Frame<Double8> f;
-  const auto column = [&](int j) {
-    return Vec<Double8>{splat<Double8>(base_turn[j]), splat<Double8>(base_turn[3 + j]), splat<Double8>(base_turn[6 + j])};
-  };
-  f.x = column(0), f.y = column(1), f.z = column(2);
-  f.origin = Vec<Double8>{};
+  Frame<Double8> f = base;
   frames[0] = f;
-  Double8 sines[most_at_once], cosines[most_at_once];
+  Double8 angles[most_at_once], sines[most_at_once], cosines[most_at_once];
   for (int k = 0; k < n; ++k) {
-    if (k % most_at_once == 0) sincos(std::min(n - k, most_at_once), q + k, sines, cosines);
     const Joint& joint = joints[k];
-    const Vec<Double8> columns[3] = {f.x, f.y, f.z}, origin = place(f, joint.shift);
-    Vec<Double8> turned[3];
-    for (int j = 0; j < 3; ++j) {
-      if (joint.only[j] >= 0) {  // axes along or across each other: most robots
-        turned[j] = splat<Double8>(joint.turn[3 * joint.only[j] + j]) * columns[joint.only[j]];
-      } else {
-        turned[j] = splat<Double8>(joint.turn[j]) * f.x + splat<Double8>(joint.turn[3 + j]) * f.y +
-                    splat<Double8>(joint.turn[6 + j]) * f.z;
-      }
+    if (k % most_at_once == 0) {
+      const int ahead = std::min(n - k, most_at_once);
+      for (int j = 0; j < ahead; ++j) angles[j] = q[k + j] + joints[k + j].offset;
+      sincos(ahead, angles, sines, cosines);
     }
     const Double8 s = sines[k % most_at_once], c = cosines[k % most_at_once];
-    f.x = c * turned[0] + s * turned[1];
-    f.y = c * turned[1] - s * turned[0];
-    f.z = turned[2];
-    f.origin = origin;
+    Vec<Double8> y, axis;
+    joint.tilt(f, y, axis);
+    f.origin = place(f, joint.shift);
+    f.y = c * y - s * f.x;
+    f.x = c * f.x + s * y;
+    f.z = axis;
     frames[k + 1] = f;
   }
 }

@@ -1,7 +1,7 @@
 // A serial chain of revolute joints, forward kinematics for eight configurations at a time.
 //
-// Every link carries an internal frame whose z axis is its joint's axis (chosen once, at construction), so that a joint
-// turns x and y of the frame and leaves z alone. World coordinates are taken relative to the base's origin.
+// Every link carries an internal frame (chosen once, at construction): z is its joint's axis, x the common normal of that
+// and the next one, as Denavit and Hartenberg have it. World coordinates are taken relative to the base's origin.
 #pragma once
 
 #include <vector>
@@ -48,15 +48,31 @@ class Local {
   bool has_[3];
 };
 
+// From the frame before: about its x by alpha, which brings its z to the joint's axis, then about that by q + offset.
 struct Joint {
-  double turn[9];  // fixed rotation from the previous internal frame to this one at q = 0, row major
-  int only[3];     // of each of its columns the only row that isn't 0, or -1
-  Local shift;     // origin of this one in the previous internal frame
+  enum Turn { parallel, perpendicular, oblique };
+  Turn turn;
+  double cosine, sine;  // of alpha; perpendicular: 0 and 1
+  double offset;        // [rad]
+  Local shift;          // origin in the frame before
+
+  // y after the first turn, and the axis
+  template <class V> IR_INLINE void tilt(const Frame<V>& f, Vec<V>& y, Vec<V>& axis) const {
+    if (turn == parallel) {
+      y = f.y, axis = f.z;
+    } else if (turn == perpendicular) {
+      y = f.z, axis = {-f.y.x, -f.y.y, -f.y.z};
+    } else {
+      const V c = splat<V>(Scalar<V>(cosine)), s = splat<V>(Scalar<V>(sine));
+      y = c * f.y + s * f.z, axis = c * f.z - s * f.y;
+    }
+  }
 };
 
 struct Chain {
   int n = 0;
-  double base_turn[9], base_origin[3];
+  double base_origin[3];
+  Frame<Double8> base;
   std::vector<Joint> joints;
   std::vector<double> internal;  // (n + 1) x 9: internal frame in the link's own frame, row major
 

@@ -161,14 +161,17 @@ template <class V> void Placement<V>::place(const double* const* rows, int count
     Frame<V>& f = state.frames[link];
     narrow(exact[0][link].x, high[link].x, f.x);
     narrow(exact[0][link].y, high[link].y, f.y);
-    const int only = link > 0 ? model_.chain.joints[link - 1].only[2] : -1;
-    if (only >= 0) {  // the joint's axis is one of the frame before
-      const Frame<V>& g = state.frames[link - 1];
-      f.z = splat<V>(Scalar<V>(model_.chain.joints[link - 1].turn[3 * only + 2])) * (only == 0 ? g.x : only == 1 ? g.y : g.z);
-    } else {
-      narrow(exact[0][link].z, high[link].z, f.z);
+    if (link == 0) {
+      narrow(exact[0][0].z, high[0].z, f.z);
+      f.origin = Vec<V>{};
+      continue;
     }
-    if (link > 0 && model_.chain.joints[link - 1].shift.is_zero()) f.origin = state.frames[link - 1].origin;
+    const Joint& joint = model_.chain.joints[link - 1];
+    const Frame<V>& before = state.frames[link - 1];
+    Vec<V> ignored;
+    if (joint.turn == Joint::oblique) narrow(exact[0][link].z, high[link].z, f.z);
+    else joint.tilt(before, ignored, f.z);
+    if (joint.shift.is_zero()) f.origin = before.origin;
     else narrow(exact[0][link].origin, high[link].origin, f.origin);
   }
   for (std::size_t c = 0; c < model_.capsules.size(); ++c) {
