@@ -103,9 +103,9 @@ class CollisionModel:
         values = np.asarray(value, dtype=np.float64)
         if values.shape not in ((), (len(self.pairs),)):
             raise InputError(f"{name} has shape {values.shape}: expected one number or ({len(self.pairs)},)")
-        if np.isnan(values).any() or (values == np.inf).any():
+        if not (values < np.inf).all():
             raise InputError(f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair")
-        return np.ascontiguousarray(np.broadcast_to(values, len(self.pairs)))
+        return np.ascontiguousarray(values) if values.ndim else np.full(len(self.pairs), values)
 
     def distances(self, q: ArrayLike) -> FloatArray:
         """(N, Z): signed distances [m] of all pairs at q (N, n)."""
