@@ -10,7 +10,7 @@
 namespace ir::dynamics {
 namespace {
 
-// Sum of x - x over all that was read: zero, or NaN when something was not finite. Costs nothing beside the recursion.
+// Sum of x - x over all that is looked at: zero, or NaN when something was not finite. Costs nothing beside the recursion.
 template <class V>
 struct Finite {
   V sum{};
@@ -31,7 +31,7 @@ inline void angles(const Model<T>& m, const V* q, V* s, V* c) {
 
 template <class V, class T>
 inline V friction(const Drive<T>& d, V qd) {
-  const V coulomb = qd > 0 ? splat<V>(d.coulomb) : (qd < 0 ? splat<V>(-d.coulomb) : V{});
+  const V coulomb = qd != 0 ? with_sign_of(qd, splat<V>(d.coulomb)) : V{};
   return qd * d.viscous + coulomb;
 }
 
@@ -44,14 +44,12 @@ bool inverse_dynamics_of(const Model<T>& m, const double* q, const double* qd, c
     load_columns(q, N, n, first, Q);
     load_columns(qd, N, n, first, D);
     load_columns(qdd, N, n, first, A);
-    finite.look(Q, n);
-    finite.look(D, n);
-    finite.look(A, n);
     angles<kJoints>(m, Q, s, c);
     newton_euler<kJoints>(m, s, c, D, A, t);
     for (int i = 0; i < n; ++i) t[i] += A[i] * m.drive[i].rotor + friction(m.drive[i], D[i]);
     const int b = m.balance.joint;
     if (b >= 0) t[b] -= balance_torque(m.balance, s[b], c[b]);
+    finite.look(t, n);  // what isn't finite makes its own joint's torque so
     store_columns(t, N, n, first, tau);
   }
   return finite.all();

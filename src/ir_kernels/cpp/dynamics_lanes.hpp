@@ -56,6 +56,13 @@ inline V max(V a, V b) {
 }
 inline Doubles abs(Doubles a) { return (Doubles)((Integers)a & 0x7fffffffffffffffLL); }
 inline Floats abs(Floats a) { return (Floats)((FloatMask)a & 0x7fffffff); }
+// x, negated where s is negative
+inline Doubles with_sign_of(Doubles s, Doubles x) {
+  return (Doubles)((Integers)x ^ ((Integers)s & (std::int64_t)0x8000000000000000ULL));
+}
+inline Floats with_sign_of(Floats s, Floats x) {
+  return (Floats)((FloatMask)x ^ ((FloatMask)s & (std::int32_t)0x80000000U));
+}
 inline Doubles copysign(Doubles size, Doubles sign) {
   return (Doubles)(((Integers)size & 0x7fffffffffffffffLL) | ((Integers)sign & (std::int64_t)0x8000000000000000ULL));
 }
@@ -97,8 +104,8 @@ inline void sincos_reducible(Doubles x, Doubles& s, Doubles& c) {
                                           z2 * ((2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
                                                 z2 * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)));
   const Integers odd = (quarter & 1) != 0;
-  s = (Doubles)((Integers)(odd ? cosine : sine) ^ (quarter & 2) << 62);
-  c = (Doubles)((Integers)(odd ? sine : cosine) ^ ((quarter + 1) & 2) << 62);
+  s = with_sign_of((Doubles)(quarter << 62), odd ? cosine : sine);
+  c = with_sign_of((Doubles)((quarter + 1) << 62), odd ? sine : cosine);
 }
 
 inline void sincos_reducible(Floats x, Floats& s, Floats& c) {
@@ -113,17 +120,17 @@ inline void sincos_reducible(Floats x, Floats& s, Floats& c) {
   const Floats cosine =
       1.0f - 0.5f * z + z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f));
   const FloatMask odd = (quarter & 1) != 0;
-  s = (Floats)((FloatMask)(odd ? cosine : sine) ^ (quarter & 2) << 30);
-  c = (Floats)((FloatMask)(odd ? sine : cosine) ^ ((quarter + 1) & 2) << 30);
+  s = with_sign_of((Floats)(quarter << 30), odd ? cosine : sine);
+  c = with_sign_of((Floats)((quarter + 1) << 30), odd ? sine : cosine);
 }
 
 // Of `n` angles; where one is out of reach of the reduction the C library is asked, lane by lane.
 template <int kCount = 0, class V>
 inline void sincos(int n, const V* x, V* s, V* c) {
   if (kCount) n = kCount;
-  V largest{};
-  for (int i = 0; i < n; ++i) largest = max(largest, abs(x[i]));
-  if (__builtin_expect(any(largest > (ScalarOf<V>)kReducible<V>), 0)) {
+  V squares{};
+  for (int i = 0; i < n; ++i) squares += x[i] * x[i];
+  if (__builtin_expect(any(squares > (ScalarOf<V>)(kReducible<V> * kReducible<V>)), 0)) {
     for (int i = 0; i < n; ++i)
       for (int l = 0; l < Lanes<V>::width; ++l) {
         s[i][l] = std::sin(x[i][l]);
