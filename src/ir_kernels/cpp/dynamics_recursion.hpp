@@ -114,6 +114,7 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
   force[0] = {square * -first.hx - qdd[0] * first.hy, qdd[0] * first.hx - square * first.hy, zero};
   moment[0] = {zero, zero, qdd[0] * first.zz + a.y * first.hx - a.x * first.hy};
   if (n > 1) a = move_field(m.joint[1], square, qdd[0], a);
+#pragma GCC unroll 8
   for (int i = 1; i < n; ++i) {
     const Joint<T>& j = m.joint[i];
     const Vector<S> w_before = into_link(j, sn[i], cs[i], w);
@@ -159,6 +160,7 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
       if (next.has[2]) a = a + Vector<S>{K.xz * next.r[2], K.yz * next.r[2], K.zz * next.r[2]};
     }
   }
+#pragma GCC unroll 8
   for (int i = n - 1; i > 0; --i) {
     const Joint<T>& j = m.joint[i];
     tau[i] = moment[i].z;
