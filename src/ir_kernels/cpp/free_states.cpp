@@ -17,7 +17,8 @@ template <class V> struct Free {
 
   IR_INLINE V outside(int) const { return free ? V{} + slack : V{} - std::numeric_limits<S>::infinity(); }
   IR_INLINE V own(std::size_t) const { return outside(0); }
-  IR_INLINE Float16 farthest(std::size_t) const { return splat<Float16>(static_cast<float>(shift.highest + slack)); }
+  IR_INLINE Float16 farthest(std::size_t, int) const { return splat<Float16>(static_cast<float>(shift.highest + slack)); }
+  IR_INLINE bool known(int) const { return false; }
   IR_INLINE bool done() const { return !any(free); }
   IR_INLINE void take(int z, int, V distance) { free = free & (distance > shift.of[z]); }
 };

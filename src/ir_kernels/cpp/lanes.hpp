@@ -1,11 +1,13 @@
-// Lanes: one operation on 16 floats or 8 doubles, written with the vector types of GCC and Clang, so that the same
-// source serves AVX-512, AVX2 and plain SSE2 (where the compiler splits them). Lanes never mix: what one lane computes
+// Lanes: one operation on several floats or doubles, written with the vector types of GCC and Clang, so that the same
+// source serves AVX-512, AVX2 and plain SSE2 (where the compiler splits long ones). Lanes never mix: what one lane computes
 // does not depend on its neighbours.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <type_traits>
 
 #if defined(__SSE2__)
 #include <immintrin.h>
@@ -18,16 +20,11 @@ typedef double Double8 __attribute__((vector_size(64)));
 typedef std::int32_t Int16 __attribute__((vector_size(64)));
 typedef std::int64_t Int8 __attribute__((vector_size(64)));
 
-template <class V> struct Lanes;
-template <> struct Lanes<Float16> {
-  using Scalar = float;
-  using Mask = Int16;
-  static constexpr int width = 16;
-};
-template <> struct Lanes<Double8> {
-  using Scalar = double;
-  using Mask = Int8;
-  static constexpr int width = 8;
+template <class V, class = void> struct Lanes;
+template <class V> struct Lanes<V, std::void_t<decltype(V{}[0] + V{})>> {  // vector types
+  using Scalar = std::decay_t<decltype(V{}[0])>;
+  using Mask = decltype(V{} < V{});
+  static constexpr int width = sizeof(V) / sizeof(Scalar);
 };
 template <class V> using Scalar = typename Lanes<V>::Scalar;
 template <class V> using Mask = typename Lanes<V>::Mask;
@@ -46,7 +43,10 @@ template <> IR_INLINE Double8 max(Double8 a, Double8 b) { return (Double8)_mm512
 
 template <class V> IR_INLINE V splat(Scalar<V> x) { return V{} + x; }
 template <class V> IR_INLINE V clamp(V x, V low, V high) { return min(max(x, low), high); }
-template <class V> IR_INLINE V abs(V x) { return max(x, -x); }
+template <class V> constexpr Scalar<Mask<V>> sign_bit = std::numeric_limits<Scalar<Mask<V>>>::min();
+template <class V> IR_INLINE V abs(V x) { return (V)((Mask<V>)x & ~sign_bit<V>); }
+// x, negated where s is negative
+template <class V> IR_INLINE V with_sign_of(V s, V x) { return (V)((Mask<V>)x ^ ((Mask<V>)s & sign_bit<V>)); }
 template <class V> IR_INLINE V select(Mask<V> m, V a, V b) { return m ? a : b; }
 
 template <class V> IR_INLINE V load(const Scalar<V>* from) {
@@ -56,42 +56,21 @@ template <class V> IR_INLINE V load(const Scalar<V>* from) {
 }
 template <class V> IR_INLINE void store(Scalar<V>* to, V v) { std::memcpy(to, &v, sizeof v); }
 
-IR_INLINE Float16 sqrt(Float16 x) {
+template <class V> IR_INLINE V sqrt(V x) {
 #if defined(__AVX512F__)
-  return (Float16)_mm512_sqrt_ps((__m512)x);
-#elif defined(__SSE2__)
-  Float16 r;
-  for (int k = 0; k < 4; ++k) {
-    __m128 part;
-    std::memcpy(&part, (const char*)&x + 16 * k, 16);
-    part = _mm_sqrt_ps(part);
-    std::memcpy((char*)&r + 16 * k, &part, 16);
-  }
-  return r;
-#else
-  Float16 r;
-  for (int k = 0; k < 16; ++k) r[k] = std::sqrt(x[k]);
-  return r;
+  if constexpr (sizeof(V) == 64 && sizeof(Scalar<V>) == 4) return (V)_mm512_sqrt_ps((__m512)x);
+  else if constexpr (sizeof(V) == 64) return (V)_mm512_sqrt_pd((__m512d)x);
 #endif
-}
-
-IR_INLINE Double8 sqrt(Double8 x) {
-#if defined(__AVX512F__)
-  return (Double8)_mm512_sqrt_pd((__m512d)x);
-#elif defined(__SSE2__)
-  Double8 r;
-  for (int k = 0; k < 4; ++k) {
-    __m128d part;
-    std::memcpy(&part, (const char*)&x + 16 * k, 16);
-    part = _mm_sqrt_pd(part);
-    std::memcpy((char*)&r + 16 * k, &part, 16);
+  V r;
+#if defined(__SSE2__)
+  for (int k = 0; k < Lanes<V>::width; k += 16 / sizeof(Scalar<V>)) {
+    if constexpr (sizeof(Scalar<V>) == 4) _mm_storeu_ps((float*)&r + k, _mm_sqrt_ps(_mm_loadu_ps((const float*)&x + k)));
+    else _mm_storeu_pd((double*)&r + k, _mm_sqrt_pd(_mm_loadu_pd((const double*)&x + k)));
   }
-  return r;
 #else
-  Double8 r;
-  for (int k = 0; k < 8; ++k) r[k] = std::sqrt(x[k]);
-  return r;
+  for (int k = 0; k < Lanes<V>::width; ++k) r[k] = std::sqrt(x[k]);
 #endif
+  return r;
 }
 
 // One bit per lane that is set.
@@ -129,7 +108,15 @@ IR_INLINE std::uint32_t bits(Int8 m) {
   return r;
 #endif
 }
-template <class M> IR_INLINE bool any(M m) { return bits(m) != 0; }
+template <class M> IR_INLINE bool any(M m) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof(M) == 64) return _mm512_test_epi32_mask((__m512i)m, (__m512i)m) != 0;
+#endif
+  std::int64_t part[sizeof(M) / 8], seen = 0;
+  std::memcpy(part, &m, sizeof m);
+  for (const std::int64_t p : part) seen |= p;
+  return seen != 0;
+}
 
 // Whether a <= b in some lane.
 template <class V> IR_INLINE bool any_not_above(V a, V b) {
@@ -197,35 +184,48 @@ IR_INLINE void load_columns(const double* const row[8], int n, Double8* column) 
 }
 
 // Sine and cosine to about one unit in the last place, for |x| <= reducible: reduction by pi/2 in parts, then the
-// polynomials of fdlibm.
-constexpr double reducible = 1e5;
+// polynomials of fdlibm (double) and Cephes (float).
+template <class V> constexpr Scalar<V> reducible = sizeof(Scalar<V>) == 8 ? 1e5 : 1e3;
 
-IR_INLINE void sincos_reducible(Double8 x, Double8& s, Double8& c) {
-  const double magic = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to whole numbers
-  const Double8 shifted = x * 0.63661977236758134308 + magic;
-  const Int8 quarter = (Int8)shifted;
-  const Double8 k = shifted - magic;
-  Double8 r = x - k * 1.57079632673412561417e+00;  // exact: 33 bits times the few of k
-  r -= k * 6.07710050650619224932e-11;
-  const Double8 z = r * r, z2 = z * z;
-  const Double8 sine = r + r * z * ((-1.66666666666666324348e-01 + z * 8.33333333332248946124e-03) +
-                               z2 * ((-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06) +
-                                     z2 * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
-  const Double8 cosine = 1.0 - 0.5 * z + z2 * ((4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) +
-                                          z2 * ((2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
-                                                z2 * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)));
-  const Int8 odd = (quarter & 1) != 0;
-  s = (Double8)((Int8)(odd ? cosine : sine) ^ (quarter & 2) << 62);
-  c = (Double8)((Int8)(odd ? sine : cosine) ^ ((quarter + 1) & 2) << 62);
+template <class V> IR_INLINE void sincos_reducible(V x, V& s, V& c) {
+  constexpr bool exact = sizeof(Scalar<V>) == 8;
+  constexpr Scalar<V> magic = exact ? 6755399441055744.0 : 12582912.0;  // adding it rounds to whole numbers
+  constexpr int to_sign = 8 * sizeof(Scalar<V>) - 2;
+  const V shifted = x * Scalar<V>(0.63661977236758134308) + magic;
+  const Mask<V> quarter = (Mask<V>)shifted;
+  const V k = shifted - magic;
+  V sine, cosine;
+  if constexpr (exact) {
+    V r = x - k * 1.57079632673412561417e+00;  // exact: 33 bits times the few of k
+    r -= k * 6.07710050650619224932e-11;
+    const V z = r * r, z2 = z * z;
+    sine = r + r * z * ((-1.66666666666666324348e-01 + z * 8.33333333332248946124e-03) +
+                        z2 * ((-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06) +
+                              z2 * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
+    cosine = 1.0 - 0.5 * z + z2 * ((4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) +
+                                   z2 * ((2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
+                                         z2 * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)));
+  } else {
+    V r = x - k * 1.5703125f;
+    r -= k * 4.837512969970703125e-4f;
+    r -= k * 7.549789948768648e-8f;
+    const V z = r * r;
+    sine = r + r * z * (-1.6666654611e-1f + z * (8.3321608736e-3f + z * -1.9515295891e-4f));
+    cosine = 1.0f - 0.5f * z + z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f));
+  }
+  const Mask<V> odd = (quarter & 1) != 0;
+  s = with_sign_of((V)(quarter << to_sign), odd ? cosine : sine);
+  c = with_sign_of((V)((quarter + 1) << to_sign), odd ? sine : cosine);
 }
 
-// Of n angles; where one is out of reach of the reduction the C library is asked, lane by lane.
-IR_INLINE void sincos(int n, const Double8* x, Double8* s, Double8* c) {
-  Double8 largest{};
-  for (int i = 0; i < n; ++i) largest = max(largest, abs(x[i]));
-  if (__builtin_expect(any(largest > reducible), 0)) {
+// Of `n` angles; where one is out of reach of the reduction the C library is asked, lane by lane.
+template <int known_n = 0, class V> IR_INLINE void sincos(int n, const V* x, V* s, V* c) {
+  if (known_n) n = known_n;
+  V squares{};
+  for (int i = 0; i < n; ++i) squares += x[i] * x[i];
+  if (__builtin_expect(any(squares > reducible<V> * reducible<V>), 0)) {
     for (int i = 0; i < n; ++i)
-      for (int k = 0; k < 8; ++k) {
+      for (int k = 0; k < Lanes<V>::width; ++k) {
         s[i][k] = std::sin(x[i][k]);
         c[i][k] = std::cos(x[i][k]);
       }

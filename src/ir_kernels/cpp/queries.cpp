@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "free_states.hpp"
 #include "visit.hpp"
 #include "witness.hpp"
 
@@ -34,23 +35,6 @@ template <class V> struct Nearest {
     best = better ? excess : best;
     pair = better ? index : pair;
   }
-};
-
-template <class V> struct Above {
-  using S = Scalar<V>;
-  const Shifts<S>& shift;
-  Mask<V> free;
-
-  IR_INLINE V outside(int) const {
-    return free ? V{} + slack_of(V{}) : V{} - std::numeric_limits<S>::infinity();
-  }
-  IR_INLINE V own(std::size_t) const { return outside(0); }
-  IR_INLINE Float16 farthest(std::size_t, int) const {
-    return splat<Float16>(static_cast<float>(shift.highest + slack_of(V{})));
-  }
-  IR_INLINE bool known(int) const { return false; }
-  IR_INLINE bool done() const { return !any(free); }
-  IR_INLINE void take(int z, int, V distance) { free = free & (distance > shift.of[z]); }
 };
 
 // The rows of a batch, a lane group at a time.
@@ -98,23 +82,6 @@ void min_distance_in(const Model& model, const double* q, std::size_t count, con
   }
 }
 
-template <class V>
-void is_free_in(const Model& model, const double* q, std::size_t count, const double* threshold, bool* result) {
-  using S = Scalar<V>;
-  constexpr int width = Lanes<V>::width;
-  const Shifts<S> shift(model, threshold);
-  Placement<V> placement(model);
-  Above<V> policy{shift, {}};
-  for (std::size_t first = 0; first < count; first += width) {
-    const Rows<width> rows(q, first, count, model.chain.n);
-    placement.place(rows.row, rows.count);
-    policy.free = Mask<V>{} - 1;
-    visit(model, placement.state, policy);
-    const std::uint32_t free = bits(policy.free);
-    for (int k = 0; k < rows.count; ++k) result[first + k] = free >> k & 1;
-  }
-}
-
 }  // namespace
 
 void distances(const Model& model, const double* q, std::size_t count, double* result) {
@@ -137,8 +104,7 @@ void min_distance(const Model& model, const double* q, std::size_t count, const 
 }
 
 void is_free(const Model& model, const double* q, std::size_t count, const double* threshold, bool* result) {
-  if (model.wide) is_free_in<Double8>(model, q, count, threshold, result);
-  else is_free_in<Float16>(model, q, count, threshold, result);
+  FreeStates(model, threshold).look(q, count, result);
 }
 
 void witnesses(const Model& model, const double* q, std::size_t count, const std::int64_t* pair,

@@ -47,7 +47,8 @@ template <class V> struct Within {
   S slack;  // [m] more than the lanes lose
   IR_INLINE V outside(int) const { return splat<V>(slack); }
   IR_INLINE V own(std::size_t) const { return splat<V>(slack); }
-  IR_INLINE Float16 farthest(std::size_t) const { return splat<Float16>(static_cast<float>(shift.highest + slack)); }
+  IR_INLINE Float16 farthest(std::size_t, int) const { return splat<Float16>(static_cast<float>(shift.highest + slack)); }
+  IR_INLINE bool known(int) const { return false; }
   IR_INLINE bool done() const { return false; }
   IR_INLINE void take(int z, int, V distance) {
     for (std::uint32_t left = bits(distance < shift.of[z] + slack); left != 0; left &= left - 1)
@@ -145,7 +146,9 @@ double SplineCost::drives(double step) {
   const auto& arm = core_.model;
   Lane cost{}, of_step{};
   for (Group& g : groups_) {
-    for (int j = 0; j < n_; ++j) sincos(g.q[j] + arm.joint[j].theta0, g.s[j], g.c[j]);
+    Lane theta[dynamics::kMaxJoints];
+    for (int j = 0; j < n_; ++j) theta[j] = g.q[j] + arm.joint[j].theta0;
+    sincos(n_, theta, g.s, g.c);
     dynamics::newton_euler(arm, g.s, g.c, g.qd, g.qdd, g.tau, true, dynamics::Trace<Lane>{g.link});
     if (arm.balance.joint >= 0) {
       const int b = arm.balance.joint;
