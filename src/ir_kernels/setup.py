@@ -83,6 +83,14 @@ class BuildBothVariants(build_ext):
                 file=sys.stderr,
             )
 
+    def copy_file(self, infile, outfile, *args, **options):
+        """Beside its place and renamed: who has the old file mapped keeps it, nobody finds half a file."""
+        beside = f"{outfile}.new"
+        copied = super().copy_file(infile, beside, *args, **options)
+        if not self.dry_run:
+            os.replace(beside, outfile)
+        return outfile, copied[1]
+
     def build_extensions(self):
         with ThreadPoolExecutor(os.cpu_count() or 2) as self.pool:
             super().build_extensions()
@@ -114,20 +122,21 @@ class BuildBothVariants(build_ext):
         super(BuildBothVariants, own).build_extension(ext)
 
 
-setup(
-    name=PACKAGE,
-    version="0.1.0",
-    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed"]},
-    data_files=[
-        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
-        (f"share/{PACKAGE}", ["package.xml"]),
-    ],
-    ext_modules=extensions(),
-    cmdclass={"build_ext": BuildBothVariants},
-    install_requires=["numpy"],
-    python_requires=">=3.10",
-    zip_safe=False,
-    description="Compiled core: kinematics, exact distances, certified motion, dynamics, inverse kinematics.",
-    license="Apache-2.0",
-)
+if __name__ == "__main__":  # pip and colcon run it under that name too
+    setup(
+        name=PACKAGE,
+        version="0.1.0",
+        packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+        package_data={PACKAGE: ["py.typed"]},
+        data_files=[
+            ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+            (f"share/{PACKAGE}", ["package.xml"]),
+        ],
+        ext_modules=extensions(),
+        cmdclass={"build_ext": BuildBothVariants},
+        install_requires=["numpy"],
+        python_requires=">=3.10",
+        zip_safe=False,
+        description="Kinematics, exact distances, certified motion, dynamics, inverse kinematics, compiled.",
+        license="Apache-2.0",
+    )
