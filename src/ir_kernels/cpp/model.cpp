@@ -103,9 +103,13 @@ void Model::finish() {
     }
     leaves.push_back(leaf);
   }
-  ball_radius.assign((capsules.size() + 15) / 16 * 16, 0.0f);
-  for (std::size_t c = 0; c < capsules.size(); ++c)
+  const std::size_t sixteens = (capsules.size() + 15) / 16;
+  ball_radius.assign(16 * sixteens, 0.0f);
+  moving.assign(sixteens, 0);
+  for (std::size_t c = 0; c < capsules.size(); ++c) {
     ball_radius[c] = static_cast<float>(capsules[c].half + capsules[c].radius);
+    if (capsules[c].link > 0) moving[c / 16] |= 1u << (c % 16);
+  }
   pair_of.assign(capsules.size() * kind.size(), -1);
   for (std::size_t z = 0; z < environment.size(); ++z)
     pair_of[environment[z][0] * kind.size() + environment[z][1]] = static_cast<std::int32_t>(z);
@@ -121,7 +125,8 @@ void Model::finish() {
 
 template <class V> Placement<V>::Placement(const Model& model) : model_(model), q_(model.chain.n) {
   state.frames.resize(model.chain.n + 1);
-  for (auto* points : {&state.a, &state.b, &state.middle}) points->resize(model.capsules.size());
+  for (auto* points : {&state.a, &state.b}) points->resize(model.capsules.size());
+  state.middle.resize((model.capsules.size() + 15) / 16 * 16);
   for (auto& frames : exact) frames.resize(model.chain.n + 1);
 }
 

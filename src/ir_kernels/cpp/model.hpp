@@ -57,7 +57,8 @@ class Model {
   std::vector<std::int32_t> pair_of;  // capsule x body -> pair, -1: not kept
   std::vector<int> planes;
   std::vector<Leaf> leaves;
-  std::vector<float> ball_radius;  // of each capsule, whole sixteens
+  std::vector<float> ball_radius;     // of each capsule, whole sixteens
+  std::vector<std::uint32_t> moving;  // a bit per capsule that isn't part of the base, in sixteens
   double float_margin;  // [m] more than 16 lanes of floats lose
   bool wide;            // too large for floats: 8 lanes of doubles throughout
 
@@ -72,7 +73,7 @@ class Model {
   void finish();
 };
 
-// Frames of the links (0..n), ends and middles of all capsules, in lanes.
+// Frames of the links (0..n), ends and middles of all capsules (and zeros up to whole sixteens), in lanes.
 template <class V> struct State {
   std::vector<Frame<V>> frames;
   std::vector<Vec<V>> a, b, middle;

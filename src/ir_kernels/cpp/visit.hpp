@@ -90,18 +90,19 @@ IR_INLINE Float16 fifth(Float16 v) {
 }
 IR_INLINE Double8 fifth(Double8 v) { return splat<Double8>(v[4]); }
 
-// The largest of each eight lanes of sixteen registers.
-IR_INLINE void highest_of_each(const Float16* v, Float16 to[2]) {
+// Of sixteen registers, of(0) to of(15), one number per eight lanes: to[0] has the first eight's, to[1] the second's.
+// In three steps, lanes are merged with those two, one and four places further.
+template <class Of, class Merge> IR_INLINE void across(Of of, Merge merge, Float16 to[2]) {
   Float16 pairs[8], fours[4], both[2];
   for (int i = 0; i < 8; ++i) {
-    const Float16 a = v[2 * i], b = v[2 * i + 1];
-    pairs[i] = max(__builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29),
-                   __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31));
+    const Float16 a = of(2 * i), b = of(2 * i + 1);
+    pairs[i] = merge(0, __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29),
+                     __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31));
   }
   for (int i = 0; i < 4; ++i) {
     const Float16 a = pairs[2 * i], b = pairs[2 * i + 1];
-    fours[i] = max(__builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-                   __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31));
+    fours[i] = merge(1, __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
+                     __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31));
   }
   const auto even = [](Float16 a, Float16 b) {
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27);
@@ -111,40 +112,36 @@ IR_INLINE void highest_of_each(const Float16* v, Float16 to[2]) {
   };
   for (int i = 0; i < 2; ++i) {
     const Float16 a = fours[2 * i], b = fours[2 * i + 1];
-    both[i] = max(even(a, b), odd(a, b));  // four registers' first eight, their second eight, the next four's
+    both[i] = merge(2, even(a, b), odd(a, b));  // four registers' first eight, their second eight, the next four's
   }
   to[0] = even(both[0], both[1]);
   to[1] = odd(both[0], both[1]);
 }
-IR_INLINE void highest_of_each(const Double8* v, Float16 to[1]) {
-  for (int k = 0; k < 16; ++k) to[0][k] = static_cast<float>(highest(v[k]));
+template <class V, class Of> IR_INLINE void highest_across(Of of, Float16 to[eights<V>]) {
+  if constexpr (eights<V> == 2) across(of, [](int, Float16 a, Float16 b) { return max(a, b); }, to);
+  else
+    for (int k = 0; k < 16; ++k) to[0][k] = static_cast<float>(highest(of(k)));
+}
+template <class V, class Of> IR_INLINE void fifth_across(Of of, Float16 to[eights<V>]) {
+  if constexpr (eights<V> == 2) across(of, [](int step, Float16 a, Float16 b) { return step == 2 ? b : a; }, to);
+  else
+    for (int k = 0; k < 16; ++k) to[0][k] = static_cast<float>(of(k)[4]);
 }
 
-// Returns the places with a capsule, and one that isn't part of the base.
-template <class V>
-IR_INLINE std::uint32_t put_balls(const Model& model, const State<V>& s, std::size_t first, Balls balls[eights<V>]) {
-  float x[eights<V>][16] = {}, y[eights<V>][16] = {}, z[eights<V>][16] = {};
+template <class V> IR_INLINE void put_balls(const Vec<V> middle[16], const float own[16],
+                                            Balls balls[eights<V>]) {
   V square[16];
-  std::uint32_t moving = 0;
-  for (std::size_t k = 0; k < 16; ++k) {
-    square[k] = V{};
-    if (first + k >= model.capsules.size() || model.capsules[first + k].link == 0) continue;
-    moving |= 1u << k;
-    const Vec<V>& m = s.middle[first + k];
-    const Vec<V> away = m - Vec<V>{fifth(m.x), fifth(m.y), fifth(m.z)};
+  for (int k = 0; k < 16; ++k) {
+    const Vec<V> away = middle[k] - Vec<V>{fifth(middle[k].x), fifth(middle[k].y), fifth(middle[k].z)};
     square[k] = dot(away, away);
-    for (int part = 0; part < eights<V>; ++part) {
-      x[part][k] = static_cast<float>(m.x[8 * part + 4]);
-      y[part][k] = static_cast<float>(m.y[8 * part + 4]);
-      z[part][k] = static_cast<float>(m.z[8 * part + 4]);
-    }
   }
-  Float16 spread[eights<V>];
-  highest_of_each(square, spread);
+  Float16 x[eights<V>], y[eights<V>], z[eights<V>], spread[eights<V>];
+  fifth_across<V>([&](int k) { return middle[k].x; }, x);
+  fifth_across<V>([&](int k) { return middle[k].y; }, y);
+  fifth_across<V>([&](int k) { return middle[k].z; }, z);
+  highest_across<V>([&](int k) { return square[k]; }, spread);
   for (int part = 0; part < eights<V>; ++part)
-    balls[part] = {load<Float16>(x[part]), load<Float16>(y[part]), load<Float16>(z[part]),
-                   sqrt(spread[part]) + load<Float16>(&model.ball_radius[first])};
-  return moving;
+    balls[part] = {x[part], y[part], z[part], sqrt(spread[part]) + load<Float16>(own)};
 }
 
 // Which balls come nearer than `reach` to a box along the world's axes, or to a plane.
@@ -166,7 +163,8 @@ template <class V, class Policy> IR_INLINE void visit_bodies(const Model& model,
   for (std::size_t first = 0; first < model.capsules.size(); first += 16) {
     Balls balls[eights<V>];
     Float16 reach[eights<V>];
-    const std::uint32_t moving = put_balls(model, s, first, balls);
+    put_balls<V>(&s.middle[first], &model.ball_radius[first], balls);
+    const std::uint32_t moving = model.moving[first / 16];
     const auto update = [&] {
       for (int part = 0; part < eights<V>; ++part)
         reach[part] = (balls[part].radius + policy.farthest(first, part)) * 1.00001f + 1e-5f;

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ir_kernels import compiled
 from ir_kernels.errors import InputError
 
 Array = NDArray[np.float64]
@@ -45,9 +46,13 @@ def shaped(name: str, value: Any, *shape: int | None) -> Array:
     return array
 
 
+def _all_finite(array: Array) -> bool:
+    return bool(np.isfinite(array).all() if compiled.MODULE is None else compiled.MODULE.all_finite(array))
+
+
 def finite(name: str, array: Array) -> Array:
     """`array`, or InputError that says where it is not finite."""
-    if not np.isfinite(array).all():
+    if not _all_finite(array):
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise InputError(f"{name}{where} is {array[tuple(where)]}: it has to be finite")
     return array

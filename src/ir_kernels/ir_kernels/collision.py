@@ -97,6 +97,7 @@ class CollisionModel:
         self._geometry: Geometry = geometry(chain, capsules, bodies, self_pairs, ignored_pairs)
         self.pairs: tuple[Pair, ...] = self._geometry.pairs
         self._core = core_of(self._geometry, compiled.MODULE)
+        self._no_offset = np.zeros(len(self.pairs))
 
     def _per_pair(self, value: ArrayLike, name: str) -> FloatArray:
         """`value` for every pair: one number, or (Z,); -inf is allowed, NaN and +inf aren't."""
@@ -118,7 +119,7 @@ class CollisionModel:
         With the safety distances as offset it is the pair that comes nearest to violating its own; an offset
         of -inf leaves a pair out.
         """
-        shift = self._per_pair(0.0 if offset is None else offset, "offset")
+        shift = self._no_offset if offset is None else self._per_pair(offset, "offset")
         distance, pair, point_a, point_b, normal = self._core.min_distance(self.chain.checked(q), shift)
         return MinDistance(distance, pair, point_a, point_b, normal)
 
