@@ -24,7 +24,7 @@ from ir_kernels import FREE, UNDECIDED, Chain, CollisionModel
 
 Array = NDArray[np.float64]
 SAMPLES = 4000  # configurations per batch: a hundred edges
-REPETITIONS = 60
+REPETITIONS, TURNS = 60, 10
 EDGE, SAFETY, ROOM = 0.8, 0.02, 0.005  # rad, m, m
 EDGES, FINE = 2500, 0.0005  # per cell; rad
 AGREEMENT = 25_000  # configurations per cell compared with Coal
@@ -81,8 +81,10 @@ def _speed(name: str, cell: Cell, rng: np.random.Generator) -> tuple[list[Row], 
     model, capsules, bodies = model_of(cell)
     path, random = path_like(cell, rng), uniform(cell, rng, SAMPLES)
     coal, bullet = Coal(model, capsules, bodies), Bullet(cell, model, bodies)
-    ours = best(lambda: model.min_distance(path), SAMPLES, REPETITIONS)
-    theirs = best(lambda: coal.compute_all(path[:COAL_SAMPLES]), COAL_SAMPLES, 5)
+    ours = theirs = np.inf
+    for _ in range(TURNS):  # in turns: the processor's pace changes
+        ours = min(ours, best(lambda: model.min_distance(path), SAMPLES, REPETITIONS))
+        theirs = min(theirs, best(lambda: coal.compute_all(path[:COAL_SAMPLES]), COAL_SAMPLES, 5))
     pybullet = best(lambda: [bullet.compute(q) for q in path[:BULLET_SAMPLES]], BULLET_SAMPLES, 2)
     others = {
         "minimum distance, random": best(lambda: model.min_distance(random), SAMPLES, REPETITIONS),

@@ -169,23 +169,23 @@ void slopes(const Model& model, const std::vector<Frame<Double8>>& frames, const
   }
 }
 
+// As rows of three.
+IR_INLINE void store_rows(const Vec<Double8>& v, int count, double* to) {
+  const Double8 first = __builtin_shufflevector(v.x, v.y, 0, 8, 0, 1, 9, 0, 2, 10);
+  const Double8 second = __builtin_shufflevector(v.z, v.x, 2, 11, 0, 3, 12, 0, 4, 13);
+  const Double8 third = __builtin_shufflevector(v.y, v.z, 5, 13, 0, 6, 14, 0, 7, 15);
+  const Double8 rows[3] = {__builtin_shufflevector(first, v.z, 0, 1, 8, 3, 4, 9, 6, 7),
+                           __builtin_shufflevector(second, v.y, 0, 1, 11, 3, 4, 12, 6, 7),
+                           __builtin_shufflevector(third, v.x, 0, 1, 14, 3, 4, 15, 6, 7)};
+  std::memcpy(to, rows, count == 8 ? sizeof rows : 3 * sizeof(double) * count);
+}
+
 void write(const Model& model, const WitnessLanes& w, int count, std::size_t first, const WitnessArrays& to) {
-  const double* base = model.chain.base_origin;
-  const Double8 columns[9] = {w.point_a.x + base[0], w.point_a.y + base[1], w.point_a.z + base[2],
-                              w.point_b.x + base[0], w.point_b.y + base[1], w.point_b.z + base[2],
-                              w.normal.x,            w.normal.y,            w.normal.z};
-  double values[9][8], distance[8];
-  std::memcpy(values, columns, sizeof values);
-  std::memcpy(distance, &w.distance, sizeof distance);
-  for (int k = 0; k < count; ++k) {
-    const std::size_t row = first + k;
-    to.distance[row] = distance[k];
-    for (int i = 0; i < 3; ++i) {
-      to.point_a[3 * row + i] = values[i][k];
-      to.point_b[3 * row + i] = values[3 + i][k];
-      to.normal[3 * row + i] = values[6 + i][k];
-    }
-  }
+  const Vec<Double8> origin = splat3<Double8>(model.chain.base_origin);
+  std::memcpy(to.distance + first, &w.distance, sizeof(double) * count);
+  store_rows(w.point_a + origin, count, to.point_a + 3 * first);
+  store_rows(w.point_b + origin, count, to.point_b + 3 * first);
+  store_rows(w.normal, count, to.normal + 3 * first);
 }
 
 }  // namespace ir
