@@ -96,6 +96,7 @@ template <class V> struct Proof {
       : shift(threshold), model(m), margin(rounding), tight(with_bound),
         moved(m.capsules.size() * (m.chain.n + 1)), far(m.capsules.size() / 16 + 1) {}
 
+  static constexpr bool one_bound = false;
   IR_INLINE V outside(int c) const { return allowed(moved[c * (model.chain.n + 1)]); }
   IR_INLINE V own(std::size_t i) const {
     const SelfPair& pair = model.self_pairs[i];

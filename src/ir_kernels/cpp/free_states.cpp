@@ -15,6 +15,7 @@ template <class V> struct Free {
   S slack;  // [m] more than the lower bounds of visit.hpp lose
   Mask<V> free;
 
+  static constexpr bool one_bound = true;
   IR_INLINE V outside(int) const { return free ? V{} + slack : V{} - std::numeric_limits<S>::infinity(); }
   IR_INLINE V own(std::size_t) const { return outside(0); }
   IR_INLINE Float16 farthest(std::size_t, int) const { return splat<Float16>(static_cast<float>(shift.highest + slack)); }

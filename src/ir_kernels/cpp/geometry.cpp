@@ -180,7 +180,11 @@ ir::Model model_of(const Array& joint_origin, const Array& joint_axis, const Arr
     return result;
   };
   m.environment = pairs_of(environment, capsules, bodies);
-  for (const auto& pair : pairs_of(self_pairs, capsules, capsules)) m.self_pairs.push_back({pair[0], pair[1], 0, 0, 0.0, 0.0});
+  for (const auto& pair : pairs_of(self_pairs, capsules, capsules)) {
+    ir::SelfPair self{};  // finish() has the rest
+    self.a = pair[0], self.b = pair[1];
+    m.self_pairs.push_back(self);
+  }
   m.finish();
   return m;
 }

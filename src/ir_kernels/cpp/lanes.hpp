@@ -128,6 +128,15 @@ template <class V> IR_INLINE bool any_not_above(V a, V b) {
 #endif
 }
 
+// Of sixteen lanes where a <= b.
+IR_INLINE std::uint32_t bits_not_above(Float16 a, Float16 b) {
+#if defined(__AVX512F__)
+  return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LE_OQ);
+#else
+  return bits(a <= b);
+#endif
+}
+
 // The largest lane.
 template <class V> IR_INLINE Scalar<V> highest(V v) {
 #if defined(__AVX512F__)

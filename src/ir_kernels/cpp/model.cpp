@@ -85,22 +85,30 @@ void Model::finish() {
   float_margin = 32.0 * std::ldexp(1.0, -24) * extent;
   wide = extent > 12.0;
   split(order, 0, static_cast<int>(order.size()), centre);
-  const float infinity = std::numeric_limits<float>::infinity();
+  const auto box_of = [](const double low[3], const double high[3], int body) {
+    Box box{};
+    for (int i = 0; i < 3; ++i) {
+      const double c = 0.5 * (low[i] + high[i]), h = 0.5 * (high[i] - low[i]);
+      box.centre[i] = static_cast<float>(c);
+      box.half[i] = static_cast<float>(h + 1e-6 * (1.0 + std::fabs(c) + h));
+    }
+    box.body = body;
+    return box;
+  };
   for (std::size_t first = 0; first < order.size(); first += 16) {
-    Leaf leaf{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}, {}};
+    Leaf leaf;
+    double low[3], high[3];
     for (std::size_t at = first; at < std::min(first + 16, order.size()); ++at) {
       const int k = order[at];
-      Box box{};
-      box.body = k;
+      double l[3], h[3];
       for (int i = 0; i < 3; ++i) {
-        const double slack = 1e-6 * (1.0 + std::fabs(centre[k][i]) + radius[k][i]);
-        box.low[i] = static_cast<float>(centre[k][i] - radius[k][i] - slack);
-        box.high[i] = static_cast<float>(centre[k][i] + radius[k][i] + slack);
-        leaf.low[i] = std::min(leaf.low[i], box.low[i]);
-        leaf.high[i] = std::max(leaf.high[i], box.high[i]);
+        l[i] = centre[k][i] - radius[k][i], h[i] = centre[k][i] + radius[k][i];
+        low[i] = at == first ? l[i] : std::min(low[i], l[i]);
+        high[i] = at == first ? h[i] : std::max(high[i], h[i]);
       }
-      leaf.boxes.push_back(box);
+      leaf.boxes.push_back(box_of(l, h, k));
     }
+    leaf.around = box_of(low, high, -1);
     leaves.push_back(leaf);
   }
   const std::size_t sixteens = (capsules.size() + 15) / 16;
@@ -118,6 +126,9 @@ void Model::finish() {
     const Capsule &a = capsules[pair.a], &b = capsules[pair.b];
     pair.radii = a.radius + b.radius;
     pair.around = pair.radii + a.half + b.half;
+    pair.longer = a.half > b.half ? pair.a : pair.b;
+    pair.shorter = a.half > b.half ? pair.b : pair.a;
+    pair.longer_half = std::max(a.half, b.half);
     pair.outer = first ? pair.a : pair.b;
     pair.inner = first ? pair.b : pair.a;
   }

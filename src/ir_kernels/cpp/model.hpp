@@ -32,15 +32,17 @@ struct SelfPair {
   int outer, inner;  // the same, the outer one on the link that is farther from the base
   double radii;      // their sum
   double around;     // and the half lengths
+  int longer, shorter;
+  double longer_half;
 };
 
 // Boxes along the world's axes (relative to the base's origin), for culling: of a body, and of up to sixteen neighbours.
 struct Box {
-  float low[3], high[3];
+  float centre[3], half[3];
   int body;
 };
 struct Leaf {
-  float low[3], high[3];
+  Box around;
   std::vector<Box> boxes;
 };
 

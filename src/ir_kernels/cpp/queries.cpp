@@ -20,6 +20,7 @@ template <class V> struct Nearest {
   Mask<V> pair;
   int hint;  // the pair that was taken first, or -1
 
+  static constexpr bool one_bound = true;
   IR_INLINE V outside(int) const { return best + slack_of(V{}); }
   IR_INLINE V own(std::size_t) const { return best + slack_of(V{}); }
   IR_INLINE Float16 farthest(std::size_t, int part) const {

@@ -45,6 +45,7 @@ template <class V> struct Within {
   const Shifts<S>& shift;
   std::vector<int>* hits;
   S slack;  // [m] more than the lanes lose
+  static constexpr bool one_bound = true;
   IR_INLINE V outside(int) const { return splat<V>(slack); }
   IR_INLINE V own(std::size_t) const { return splat<V>(slack); }
   IR_INLINE Float16 farthest(std::size_t, int) const { return splat<Float16>(static_cast<float>(shift.highest + slack)); }

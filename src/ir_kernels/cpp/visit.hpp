@@ -2,7 +2,7 @@
 //
 // A policy says how far is near enough: a pair z of capsule c may be skipped where its distance certainly exceeds
 // outside(c) + shift.of[z] (self pair i: own(i) + shift.of[z]) in every lane; else take(z, c or i, distance) gets the exact
-// values. known(z): they were taken before. farthest(first, part) is
+// values. known(z): they were taken before. one_bound: own(i) is the same for all i. farthest(first, part) is
 // the highest of eight lanes of outside(c) + the highest shift, for sixteen capsules from `first`.
 // shift.of[z] = -inf: the pair doesn't count.
 #pragma once
@@ -72,7 +72,9 @@ IR_INLINE bool visit_plane(const Model& model, const State<V>& s, int c, int bod
   using S = Scalar<V>;
   const std::int32_t z = model.pair_of[c * model.kind.size() + body];
   if (z < 0 || policy.known(z) || policy.shift.of[z] == -std::numeric_limits<S>::infinity()) return false;
-  const V distance = environment_distance(model, s, c, body);
+  const Body<S>& f = model.bodies<S>()[body];
+  const auto height = [&](const Vec<V>& p) { return f.axis[2][0] * p.x + (f.axis[2][1] * p.y + f.axis[2][2] * p.z); };
+  const V distance = min(height(s.a[c]), height(s.b[c])) - (f.offset[2] + static_cast<S>(model.capsules[c].radius));
   if (!any_not_above<V>(distance, policy.outside(c) + policy.shift.of[z])) return false;
   policy.take(z, c, distance);
   return true;
@@ -144,35 +146,38 @@ template <class V> IR_INLINE void put_balls(const Vec<V> middle[16], const float
     balls[part] = {x[part], y[part], z[part], sqrt(spread[part]) + load<Float16>(own)};
 }
 
-// Which balls come nearer than `reach` to a box along the world's axes, or to a plane.
-template <class Solid> IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const Solid& box) {
-  const Float16 zero{}, limit = clamp(reach, zero, splat<Float16>(1e15f));
-  const Float16 x = max(max(box.low[0] - b.x, b.x - box.high[0]), zero);
-  const Float16 y = max(max(box.low[1] - b.y, b.y - box.high[1]), zero);
-  const Float16 z = max(max(box.low[2] - b.z, b.z - box.high[2]), zero);
-  return bits(x * x + y * y + z * z <= limit * limit);
+// Which balls come nearer than `reach` to a box along the world's axes, or to a plane; `square` of what is positive of it.
+IR_INLINE std::uint32_t near(const Balls& b, const Float16&, const Float16& square, const Box& box) {
+  const Float16 zero{};
+  const Float16 x = max(abs(b.x - box.centre[0]) - box.half[0], zero);
+  const Float16 y = max(abs(b.y - box.centre[1]) - box.half[1], zero);
+  const Float16 z = max(abs(b.z - box.centre[2]) - box.half[2], zero);
+  return bits_not_above(x * x + y * y + z * z, square);
 }
-IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const Body<float>& plane) {
+IR_INLINE std::uint32_t near(const Balls& b, const Float16& reach, const Float16&, const Body<float>& plane) {
   const float* axis = plane.axis[2];
   const float offset = plane.offset[2], slack = 1e-6f * (1.0f + std::fabs(offset));
-  return bits(axis[0] * b.x + axis[1] * b.y + axis[2] * b.z <= reach + (offset + slack));
+  return bits_not_above(axis[0] * b.x + axis[1] * b.y + axis[2] * b.z, reach + (offset + slack));
 }
 
 // The planes and solids, beside sixteen capsules at a time.
 template <class V, class Policy> IR_INLINE void visit_bodies(const Model& model, const State<V>& s, Policy& policy) {
   for (std::size_t first = 0; first < model.capsules.size(); first += 16) {
     Balls balls[eights<V>];
-    Float16 reach[eights<V>];
+    Float16 reach[eights<V>], square[eights<V>];
     put_balls<V>(&s.middle[first], &model.ball_radius[first], balls);
     const std::uint32_t moving = model.moving[first / 16];
     const auto update = [&] {
-      for (int part = 0; part < eights<V>; ++part)
+      for (int part = 0; part < eights<V>; ++part) {
         reach[part] = (balls[part].radius + policy.farthest(first, part)) * 1.00001f + 1e-5f;
+        const Float16 positive = clamp(reach[part], Float16{}, splat<Float16>(1e15f));
+        square[part] = positive * positive;
+      }
     };
     update();
     const auto some = [&](const auto& body) {
-      std::uint32_t found = near(balls[0], reach[0], body);
-      if constexpr (eights<V> == 2) found |= near(balls[1], reach[1], body);
+      std::uint32_t found = near(balls[0], reach[0], square[0], body);
+      if constexpr (eights<V> == 2) found |= near(balls[1], reach[1], square[1], body);
       return found & moving;
     };
     const auto visit_each = [&](std::uint32_t left, int body, auto visit_one) {
@@ -182,27 +187,51 @@ template <class V, class Policy> IR_INLINE void visit_bodies(const Model& model,
     for (const int body : model.planes) visit_each(some(model.bodies_float[body]), body, visit_plane<V, Policy>);
     for (const Leaf& leaf : model.leaves) {
       if (policy.done()) return;
-      if (model.leaves.size() > 1 && some(leaf) == 0) continue;
+      if (model.leaves.size() > 1 && some(leaf.around) == 0) continue;
       for (const Box& box : leaf.boxes) visit_each(some(box), box.body, visit_body<V, Policy>);
     }
   }
+}
+
+// Whether the longer axis and the ball around the other one may come near enough.
+template <class V, class Policy>
+IR_INLINE bool ball_may_matter(const Model& model, const State<V>& s, int i, const Policy& policy) {
+  using S = Scalar<V>;
+  const SelfPair& pair = model.self_pairs[i];
+  const Vec<V>& from = s.middle[pair.longer];
+  const Vec<V> axis = s.b[pair.longer] - from, gap = s.middle[pair.shorter] - from;
+  const V along = dot(gap, axis) * static_cast<S>(4 * model.capsules[pair.longer].inverse_square);
+  const Vec<V> apart = gap - clamp(along, splat<V>(-1), splat<V>(1)) * axis;
+  return may_matter<V>(dot(apart, apart), policy.own(i) + (policy.shift.self_reach[i] - static_cast<S>(pair.longer_half)));
 }
 
 template <class V, class Policy> IR_INLINE void visit_self(const Model& model, const State<V>& s, Policy& policy) {
   using S = Scalar<V>;
   const int outside = static_cast<int>(model.environment.size()), count = static_cast<int>(model.self_pairs.size());
   for (int first = 0; first < count; first += 32) {
-    std::uint32_t left = 0;  // all tests first, without a branch that could be mispredicted
-    for (int i = first; i < std::min(first + 32, count); ++i) {
+    const int last = std::min(first + 32, count);
+    std::uint32_t left = 0;  // all balls first, without a branch that could be mispredicted
+    S limit[32];             // square of how near the middles may come
+    if constexpr (Policy::one_bound) {
+      const S bound = highest<V>(policy.own(0));
+      for (int i = first; i < last; ++i) {
+        const S need = std::max(bound + policy.shift.self_reach[i], S(0));
+        limit[i - first] = need * need;
+      }
+    }
+    for (int i = first; i < last; ++i) {
       const SelfPair& pair = model.self_pairs[i];
       const Vec<V> gap = s.middle[pair.a] - s.middle[pair.b];
-      const bool near = may_matter<V>(dot(gap, gap), policy.own(i) + policy.shift.self_reach[i]);
+      bool near;
+      if constexpr (Policy::one_bound) near = any_not_above<V>(dot(gap, gap), splat<V>(limit[i - first]));
+      else near = may_matter<V>(dot(gap, gap), policy.own(i) + policy.shift.self_reach[i]);
       left |= static_cast<std::uint32_t>(near) << (i - first);
     }
     for (; left != 0; left &= left - 1) {
       const int i = first + __builtin_ctz(left);
       const S shift = policy.shift.of[outside + i];
       if (policy.known(outside + i) || shift == -std::numeric_limits<S>::infinity()) continue;
+      if (!ball_may_matter(model, s, i, policy)) continue;
       const SelfPair& pair = model.self_pairs[i];
       const V square = square_between(model, s, pair);
       const S radii = static_cast<S>(pair.radii);
