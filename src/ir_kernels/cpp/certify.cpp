@@ -133,10 +133,12 @@ template <class V> struct Proof {
     for (std::size_t c = 0; c < model.capsules.size(); ++c) {
       V* to = &moved[c * (n + 1)];
       const int link = model.capsules[c].link;
+      const Vec<V> start = s.start(c), end = s.end(c);
       V m{};
       to[link] = m;
       for (int j = link - 1; j >= 0; --j) {
-        const Vec<V> a = cross(s.a[c] - s.frames[j + 1].origin, s.frames[j + 1].z), b = cross(s.b[c] - s.frames[j + 1].origin, s.frames[j + 1].z);
+        const Vec<V>&origin = s.origin[j + 1], &axis = s.axis[j + 1];
+        const Vec<V> a = cross(start - origin, axis), b = cross(end - origin, axis);
         const V reach = sqrt(max(dot(a, a), dot(b, b)));
         m = m + spread[j] * (reach + m + margin);
         to[j] = m;

@@ -121,6 +121,8 @@ void Model::finish() {
   pair_of.assign(capsules.size() * kind.size(), -1);
   for (std::size_t z = 0; z < environment.size(); ++z)
     pair_of[environment[z][0] * kind.size() + environment[z][1]] = static_cast<std::int32_t>(z);
+  capsules_of.assign(chain.n + 1, {});
+  for (std::size_t c = 0; c < capsules.size(); ++c) capsules_of[capsules[c].link].push_back(static_cast<int>(c));
   for (SelfPair& pair : self_pairs) {
     const bool first = capsules[pair.a].link >= capsules[pair.b].link;
     const Capsule &a = capsules[pair.a], &b = capsules[pair.b];
@@ -132,13 +134,6 @@ void Model::finish() {
     pair.outer = first ? pair.a : pair.b;
     pair.inner = first ? pair.b : pair.a;
   }
-}
-
-template <class V> Placement<V>::Placement(const Model& model) : model_(model), q_(model.chain.n) {
-  state.frames.resize(model.chain.n + 1);
-  for (auto* points : {&state.a, &state.b}) points->resize(model.capsules.size());
-  state.middle.resize((model.capsules.size() + 15) / 16 * 16);
-  for (auto& frames : exact) frames.resize(model.chain.n + 1);
 }
 
 namespace {
@@ -163,6 +158,24 @@ template <class V> IR_INLINE void narrow(const Vec<Double8>& low, const Vec<Doub
 
 }  // namespace
 
+template <class V> Placement<V>::Placement(const Model& model) : model_(model), q_(model.chain.n) {
+  for (auto* joints : {&state.origin, &state.axis}) joints->resize(model.chain.n + 1);
+  for (auto* capsules : {&state.middle, &state.half}) capsules->resize((model.capsules.size() + 15) / 16 * 16);
+  for (auto& frames : exact) frames.resize(model.chain.n + 1);
+  const Frame<Double8>& f = model.chain.base;
+  narrow(f.x, f.x, base_.x);
+  narrow(f.y, f.y, base_.y);
+  narrow(f.z, f.z, base_.z);
+  base_.origin = Vec<V>{};
+  for (const int c : model.capsules_of[0]) put(c, base_);
+}
+
+template <class V> IR_INLINE void Placement<V>::put(int capsule, const Frame<V>& f) {
+  const Capsule& c = model_.capsules[capsule];
+  state.middle[capsule] = ir::place(f, c.middle);
+  state.half[capsule] = c.axis.after(Vec<V>{}, f);
+}
+
 template <class V> void Placement<V>::place(const double* const* rows, int count) {
   const int n = model_.chain.n;
   for (int part = 0; part < Lanes<V>::width / 8; ++part) {
@@ -171,35 +184,23 @@ template <class V> void Placement<V>::place(const double* const* rows, int count
     load_columns(row, n, q_.data());
     model_.chain.forward(q_.data(), exact[part].data());
   }
-  const auto& high = exact[Lanes<V>::width / 8 - 1];
-  for (int link = 0; link <= n; ++link) {
-    if (link == 0 && placed_) continue;  // never moves
-    Frame<V>& f = state.frames[link];
-    narrow(exact[0][link].x, high[link].x, f.x);
-    narrow(exact[0][link].y, high[link].y, f.y);
-    if (link == 0) {
-      narrow(exact[0][0].z, high[0].z, f.z);
-      f.origin = Vec<V>{};
-      continue;
-    }
+  Frame<V> before = base_;
+  for (int link = 1; link <= n; ++link) {
+    const Frame<Double8>&low = exact[0][link], &high = exact[Lanes<V>::width / 8 - 1][link];
     const Joint& joint = model_.chain.joints[link - 1];
-    const Frame<V>& before = state.frames[link - 1];
+    Frame<V> f;
+    narrow(low.x, high.x, f.x);
+    narrow(low.y, high.y, f.y);
     Vec<V> ignored;
-    if (joint.turn == Joint::oblique) narrow(exact[0][link].z, high[link].z, f.z);
+    if (joint.turn == Joint::oblique) narrow(low.z, high.z, f.z);
     else joint.tilt(before, ignored, f.z);
     if (joint.shift.is_zero()) f.origin = before.origin;
-    else narrow(exact[0][link].origin, high[link].origin, f.origin);
+    else narrow(low.origin, high.origin, f.origin);
+    state.origin[link] = f.origin;
+    state.axis[link] = f.z;
+    for (const int c : model_.capsules_of[link]) put(c, f);
+    before = f;
   }
-  for (std::size_t c = 0; c < model_.capsules.size(); ++c) {
-    const Capsule& capsule = model_.capsules[c];
-    if (capsule.link == 0 && placed_) continue;
-    const Frame<V>& f = state.frames[capsule.link];
-    const Vec<V> middle = ir::place(f, capsule.middle);
-    state.middle[c] = middle;
-    state.a[c] = capsule.axis.before(middle, f);
-    state.b[c] = capsule.axis.after(middle, f);
-  }
-  placed_ = true;
 }
 
 template class Placement<Float16>;

@@ -58,6 +58,7 @@ class Model {
   std::vector<SelfPair> self_pairs;
   std::vector<std::int32_t> pair_of;  // capsule x body -> pair, -1: not kept
   std::vector<int> planes;
+  std::vector<std::vector<int>> capsules_of;  // each link
   std::vector<Leaf> leaves;
   std::vector<float> ball_radius;     // of each capsule, whole sixteens
   std::vector<std::uint32_t> moving;  // a bit per capsule that isn't part of the base, in sixteens
@@ -75,10 +76,12 @@ class Model {
   void finish();
 };
 
-// Frames of the links (0..n), ends and middles of all capsules (and zeros up to whole sixteens), in lanes.
+// In lanes: origins and axes of the joints (of 1..n, the link they move), middles of all capsules (and zeros up to whole
+// sixteens) and half of their axes.
 template <class V> struct State {
-  std::vector<Frame<V>> frames;
-  std::vector<Vec<V>> a, b, middle;
+  std::vector<Vec<V>> origin, axis, middle, half;
+  IR_INLINE Vec<V> start(int c) const { return middle[c] - half[c]; }
+  IR_INLINE Vec<V> end(int c) const { return middle[c] + half[c]; }
 };
 
 // Evaluates configurations, Lanes<V>::width at a time, without allocating again. The kinematics is always computed in
@@ -92,15 +95,22 @@ template <class V> class Placement {
   std::vector<Frame<Double8>> exact[2];  // the frames in double, of lanes 0..7 and 8..15
 
  private:
+  void put(int capsule, const Frame<V>& f);
   const Model& model_;
   std::vector<Double8> q_;
-  bool placed_ = false;
+  Frame<V> base_;
 };
 
 template <class V> IR_INLINE Vec<V> to_local(const Body<Scalar<V>>& f, const Vec<V>& p) {
   return {f.axis[0][0] * p.x + (f.axis[0][1] * p.y + (f.axis[0][2] * p.z - f.offset[0])),
           f.axis[1][0] * p.x + (f.axis[1][1] * p.y + (f.axis[1][2] * p.z - f.offset[1])),
           f.axis[2][0] * p.x + (f.axis[2][1] * p.y + (f.axis[2][2] * p.z - f.offset[2]))};
+}
+
+template <class V> IR_INLINE Vec<V> turn_local(const Body<Scalar<V>>& f, const Vec<V>& v) {
+  return {f.axis[0][0] * v.x + f.axis[0][1] * v.y + f.axis[0][2] * v.z,
+          f.axis[1][0] * v.x + f.axis[1][1] * v.y + f.axis[1][2] * v.z,
+          f.axis[2][0] * v.x + f.axis[2][1] * v.y + f.axis[2][2] * v.z};
 }
 
 template <class V> IR_INLINE Vec<V> splat3(const Scalar<V> v[3]) {
@@ -115,14 +125,15 @@ template <class V> V axis_distance(const Model& model, int body, int capsule_ind
 template <class V> IR_INLINE V square_between(const Model& model, const State<V>& s, const SelfPair& pair) {
   using S = Scalar<V>;
   const Capsule &first = model.capsules[pair.a], &second = model.capsules[pair.b];
-  const auto p = segment_segment(s.a[pair.a], s.b[pair.a] - s.a[pair.a], splat<V>(S(first.inverse_square)),
-                                 s.a[pair.b], s.b[pair.b] - s.a[pair.b], splat<V>(S(second.inverse_square)));
+  const Vec<V>&a = s.half[pair.a], &b = s.half[pair.b];
+  const auto p = segment_segment(s.start(pair.a), a + a, splat<V>(S(first.inverse_square)), s.start(pair.b), b + b,
+                                 splat<V>(S(second.inverse_square)));
   return dot(p.gap, p.gap);
 }
 
 template <class V> IR_INLINE V environment_distance(const Model& model, const State<V>& s, int c, int body) {
   const auto& f = model.bodies<Scalar<V>>()[body];
-  return axis_distance<V>(model, body, c, to_local<V>(f, s.a[c]), to_local<V>(f, s.b[c])) -
+  return axis_distance<V>(model, body, c, to_local<V>(f, s.start(c)), to_local<V>(f, s.end(c))) -
          Scalar<V>(model.capsules[c].radius);
 }
 

@@ -60,8 +60,9 @@ IR_INLINE bool visit_body(const Model& model, const State<V>& s, int c, int body
   const S radius = static_cast<S>(capsule.radius);
   const Body<S>& f = model.bodies<S>()[body];
   const V need = policy.outside(c) + (shift + radius);
-  if (!may_matter<V>(square_beyond(to_local<V>(f, s.middle[c]), f.half), need + static_cast<S>(capsule.half))) return false;
-  const Vec<V> a = to_local<V>(f, s.a[c]), b = to_local<V>(f, s.b[c]);
+  const Vec<V> middle = to_local<V>(f, s.middle[c]);
+  if (!may_matter<V>(square_beyond(middle, f.half), need + static_cast<S>(capsule.half))) return false;
+  const Vec<V> half = turn_local<V>(f, s.half[c]), a = middle - half, b = middle + half;
   if (!may_matter<V>(square_apart(a, b, f.half), need)) return false;
   policy.take(z, c, axis_distance<V>(model, body, c, a, b) - radius);
   return true;
@@ -74,7 +75,7 @@ IR_INLINE bool visit_plane(const Model& model, const State<V>& s, int c, int bod
   if (z < 0 || policy.known(z) || policy.shift.of[z] == -std::numeric_limits<S>::infinity()) return false;
   const Body<S>& f = model.bodies<S>()[body];
   const auto height = [&](const Vec<V>& p) { return f.axis[2][0] * p.x + (f.axis[2][1] * p.y + f.axis[2][2] * p.z); };
-  const V distance = min(height(s.a[c]), height(s.b[c])) - (f.offset[2] + static_cast<S>(model.capsules[c].radius));
+  const V distance = height(s.middle[c]) - abs(height(s.half[c])) - (f.offset[2] + static_cast<S>(model.capsules[c].radius));
   if (!any_not_above<V>(distance, policy.outside(c) + policy.shift.of[z])) return false;
   policy.take(z, c, distance);
   return true;
@@ -198,8 +199,8 @@ template <class V, class Policy>
 IR_INLINE bool ball_may_matter(const Model& model, const State<V>& s, int i, const Policy& policy) {
   using S = Scalar<V>;
   const SelfPair& pair = model.self_pairs[i];
-  const Vec<V>& from = s.middle[pair.longer];
-  const Vec<V> axis = s.b[pair.longer] - from, gap = s.middle[pair.shorter] - from;
+  const Vec<V>& axis = s.half[pair.longer];
+  const Vec<V> gap = s.middle[pair.shorter] - s.middle[pair.longer];
   const V along = dot(gap, axis) * static_cast<S>(4 * model.capsules[pair.longer].inverse_square);
   const Vec<V> apart = gap - clamp(along, splat<V>(-1), splat<V>(1)) * axis;
   return may_matter<V>(dot(apart, apart), policy.own(i) + (policy.shift.self_reach[i] - static_cast<S>(pair.longer_half)));

@@ -50,9 +50,25 @@ IR_INLINE Vec<Double8> normal_of(const Vec<Double8>& gap, Double8 distance, cons
   return select(apart, n, other);
 }
 
+// visit(lanes, pair) for each of the pairs among the lanes
+template <class Visit> IR_INLINE void each_pair(Int8 pair, Visit visit) {
+  for (std::uint32_t left = 0xff; left != 0;) {
+    const int z = static_cast<int>(pair[__builtin_ctz(left)]);
+    const Int8 same = pair == z;
+    left &= ~bits(same);
+    visit(same, z);
+  }
+}
+
+constexpr int own = 6;  // after the kinds of bodies
+
 // What each lane's axis finds at its body, in the world; `kinds` has a bit per kind among the lanes.
-Touch<Double8> touch_bodies(const Model& model, const Gathered& a, const GatheredBody& f, Int8 pair, Int8 kind,
-                            std::uint32_t kinds) {
+__attribute__((noinline)) Touch<Double8> touch_bodies(const Model& model, const Gathered& a, Int8 pair, Int8 kind,
+                                                      std::uint32_t kinds) {
+  GatheredBody f{};
+  each_pair(pair, [&](Int8 same, int z) {
+    if (z < static_cast<int>(model.environment.size())) put(f, same, model.bodies_double[model.environment[z][1]]);
+  });
   const Vec<Double8> la{dot(f.axis[0], a.a) - f.offset[0], dot(f.axis[1], a.a) - f.offset[1],
                         dot(f.axis[2], a.a) - f.offset[2]};
   const Vec<Double8> lb{dot(f.axis[0], a.b) - f.offset[0], dot(f.axis[1], a.b) - f.offset[1],
@@ -103,41 +119,35 @@ Touch<Double8> touch_bodies(const Model& model, const Gathered& a, const Gathere
 
 WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& frames, const std::int32_t pair[8]) {
   const int outside = static_cast<int>(model.environment.size());
-  Gathered a{}, b{};
-  GatheredBody f{};
-  constexpr int own = 6;  // after the kinds of bodies
-  std::uint32_t kinds = 0;
   typedef std::int32_t Short8 __attribute__((vector_size(32), aligned(4), may_alias));
   const Int8 index = __builtin_convertvector(*reinterpret_cast<const Short8*>(pair), Int8);
+  Gathered a{}, b{};
+  std::uint32_t kinds = 0;
   Int8 kind{};
-  for (std::uint32_t left = 0xff; left != 0;) {  // lanes with the same pair together
-    const int z = static_cast<int>(index[__builtin_ctz(left)]);
-    const Int8 same = index == z;
-    left &= ~bits(same);
+  each_pair(index, [&](Int8 same, int z) {
     int now = own;
     if (z >= outside) {
       const SelfPair& p = model.self_pairs[z - outside];
       put(a, same, model.capsules[p.a], frames);
       put(b, same, model.capsules[p.b], frames);
     } else {
-      const auto& [capsule_index, body] = model.environment[z];
-      put(a, same, model.capsules[capsule_index], frames);
-      put(f, same, model.bodies_double[body]);
-      now = model.kind[body];
+      put(a, same, model.capsules[model.environment[z][0]], frames);
+      now = model.kind[model.environment[z][1]];
     }
     kind = same ? Int8{} + now : kind;
     kinds |= 1u << now;
-  }
+  });
   Touch<Double8> touch{};
   Double8 radius_b{};
-  if (kinds != 1u << own) touch = touch_bodies(model, a, f, index, kind, kinds);
+  if (kinds != 1u << own) touch = touch_bodies(model, a, index, kind, kinds);
   if (kinds >> own & 1) {
-    const auto p = segment_segment(a.a, a.b - a.a, a.inverse_square, b.a, b.b - b.a, b.inverse_square);
+    const Vec<Double8> da = a.b - a.a, db = b.b - b.a;
+    const auto p = segment_segment(a.a, da, a.inverse_square, b.a, db, b.inverse_square);
     const Double8 distance = sqrt(dot(p.gap, p.gap));
     const Int8 m = kind == own;
     touch.distance = m ? distance : touch.distance;
     touch.t = m ? p.s : touch.t;
-    touch.normal = select(m, normal_of(p.gap, distance, a.b - a.a, b.b - b.a), touch.normal);
+    touch.normal = select(m, normal_of(p.gap, distance, da, db), touch.normal);
     radius_b = m ? b.radius : radius_b;
   }
   WitnessLanes w;
