@@ -1,7 +1,7 @@
 // A serial chain of revolute joints, forward kinematics for eight configurations at a time.
 //
-// Every link carries an internal frame (chosen once, at construction): z is its joint's axis, x the common normal of that
-// and the next one, as Denavit and Hartenberg have it. World coordinates are taken relative to the base's origin.
+// Every link carries an internal frame (chosen once, at construction): z is its joint's axis, x the common normal of
+// that and the next one, as Denavit and Hartenberg have it. World coordinates are taken relative to the base's origin.
 #pragma once
 
 #include <vector>

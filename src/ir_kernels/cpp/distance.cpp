@@ -1,4 +1,5 @@
 // The exact distance of a capsule's axis from each kind of body.
+#include "cylinder.hpp"
 #include "model.hpp"
 
 namespace ir {

@@ -1,8 +1,8 @@
 // Visits the pairs that may matter: whole lane groups are skipped by cheap lower bounds of the distance.
 //
 // A policy says how far is near enough: a pair z of capsule c may be skipped where its distance certainly exceeds
-// outside(c) + shift.of[z] (self pair i: own(i) + shift.of[z]) in every lane; else take(z, c or i, distance) gets the exact
-// values. known(z): they were taken before. one_bound: own(i) is the same for all i. farthest(first, part) is
+// outside(c) + shift.of[z] (self pair i: own(i) + shift.of[z]) in every lane; else take(z, c or i, distance) gets the
+// exact values. one_bound: own(i) is the same for all i. known(z): the pair was taken before. farthest(first, part) is
 // the highest of eight lanes of outside(c) + the highest shift, for sixteen capsules from `first`.
 // shift.of[z] = -inf: the pair doesn't count.
 #pragma once
@@ -75,7 +75,8 @@ IR_INLINE bool visit_plane(const Model& model, const State<V>& s, int c, int bod
   if (z < 0 || policy.known(z) || policy.shift.of[z] == -std::numeric_limits<S>::infinity()) return false;
   const Body<S>& f = model.bodies<S>()[body];
   const auto height = [&](const Vec<V>& p) { return f.axis[2][0] * p.x + (f.axis[2][1] * p.y + f.axis[2][2] * p.z); };
-  const V distance = height(s.middle[c]) - abs(height(s.half[c])) - (f.offset[2] + static_cast<S>(model.capsules[c].radius));
+  const S surface = f.offset[2] + static_cast<S>(model.capsules[c].radius);
+  const V distance = height(s.middle[c]) - abs(height(s.half[c])) - surface;
   if (!any_not_above<V>(distance, policy.outside(c) + policy.shift.of[z])) return false;
   policy.take(z, c, distance);
   return true;
@@ -147,7 +148,8 @@ template <class V> IR_INLINE void put_balls(const Vec<V> middle[16], const float
     balls[part] = {x[part], y[part], z[part], sqrt(spread[part]) + load<Float16>(own)};
 }
 
-// Which balls come nearer than `reach` to a box along the world's axes, or to a plane; `square` of what is positive of it.
+// Which balls come nearer than `reach` (`square` of what is positive of it) to a box along the world's axes, or to a
+// plane.
 IR_INLINE std::uint32_t near(const Balls& b, const Float16&, const Float16& square, const Box& box) {
   const Float16 zero{};
   const Float16 x = max(abs(b.x - box.centre[0]) - box.half[0], zero);
@@ -203,7 +205,8 @@ IR_INLINE bool ball_may_matter(const Model& model, const State<V>& s, int i, con
   const Vec<V> gap = s.middle[pair.shorter] - s.middle[pair.longer];
   const V along = dot(gap, axis) * static_cast<S>(4 * model.capsules[pair.longer].inverse_square);
   const Vec<V> apart = gap - clamp(along, splat<V>(-1), splat<V>(1)) * axis;
-  return may_matter<V>(dot(apart, apart), policy.own(i) + (policy.shift.self_reach[i] - static_cast<S>(pair.longer_half)));
+  const S reach = policy.shift.self_reach[i] - static_cast<S>(pair.longer_half);
+  return may_matter<V>(dot(apart, apart), policy.own(i) + reach);
 }
 
 template <class V, class Policy> IR_INLINE void visit_self(const Model& model, const State<V>& s, Policy& policy) {

@@ -1,5 +1,7 @@
 #include "witness.hpp"
 
+#include "cylinder.hpp"
+
 namespace ir {
 namespace {
 
