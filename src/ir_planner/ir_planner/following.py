@@ -1,7 +1,9 @@
 """A trajectory through given points: the joint spline of eq. (10), timed within the limits.
 
 Between the points the spline is free to swing; where that is not free, the points are joined by straight
-movements that stop at each. What violates a limit or a clearance is named with the first violation.
+movements that stop at each. Where no times are wished, the spline's path stays and its pace becomes the best:
+fastest, or as the objective and the wished duration ask for. What violates a limit or a clearance is named
+with the first violation.
 """
 
 import itertools
@@ -23,14 +25,20 @@ from ir_planner.goals import within_limits
 from ir_planner.journal import Journal
 from ir_planner.level_timing import fastest
 from ir_planner.movement import TimedMovement, distinct, stretched_to_wish, timed_movement
+from ir_planner.objective import pace_value
+from ir_planner.path_pace import Paced, along_its_path
 from ir_planner.regional import MovementPlan, end_in_collision
 from ir_planner.reporting import Evaluation, evaluate_trajectory
 from ir_planner.scene import PlanningScene
 from ir_planner.spline_timing import time_spline
 from ir_planner.time_law import StepLaws
+from ir_planner.timing import MotionLimits
 
 FloatArray = NDArray[np.float64]
 POINTS_MAX = 1000
+KEPT = 1e-3  # rad by which a pace may leave its path
+_AT_STOPS = ("clearance", "position")  # violations that straight steps avoid
+_TORQUE_SHARES = (0.97, 0.92, 0.85)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +104,10 @@ def _followed(
         given = np.diff(reference.times)
     with journal.stage("spline") as notes:
         journal.planner_id = "spline"
-        trajectory, evaluation = _spline(points, given, scene, options, journal.budget)
+        timed = _spline if given is not None else _best_pace
+        trajectory, evaluation = timed(points, given, scene, options, journal, notes)
         violation = evaluation.verification.violation
-        if violation is None or violation.what not in ("clearance", "position"):
+        if violation is None or violation.what not in _AT_STOPS:
             return trajectory, evaluation
         notes.append(violation.sentence)
     with journal.stage("stops") as notes:
@@ -130,15 +139,14 @@ def _spline(
     given: FloatArray | None,
     scene: PlanningScene,
     options: PlanOptions,
-    budget: Budget,
+    journal: Journal,
+    notes: list[str],
 ) -> tuple[JointTrajectory, Evaluation]:
-    names = scene.cell.robot.joint_names
-    for share in (0.97, 0.92, 0.85):
-        budget.check()
-        limits = scene.limits.scaled(
-            options.velocity_scaling, options.acceleration_scaling
-        ).with_torque_share(share)
-        quickest = time_spline(points, names, limits, scene.dynamics, given)
+    """The spline with the durations `given` (M-1,) s in their proportions."""
+    for share in _TORQUE_SHARES:
+        journal.budget.check()
+        limits = _limits(scene, options, share)
+        quickest = time_spline(points, scene.cell.robot.joint_names, limits, scene.dynamics, given)
         wished = given is not None and options.duration == 0.0
         trajectory = stretched(quickest, 1.0) if wished else stretched_to_wish(quickest, scene, options)
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance)
@@ -146,3 +154,72 @@ def _spline(
         if violation is None or violation.what != "torque":
             break
     return trajectory, evaluation
+
+
+def _best_pace(
+    points: FloatArray,
+    given: FloatArray | None,
+    scene: PlanningScene,
+    options: PlanOptions,
+    journal: Journal,
+    notes: list[str],
+) -> tuple[JointTrajectory, Evaluation]:
+    """The path of the spline whose intervals are timed by rules, at the best pace along it."""
+    hurry = replace(options, objective="time", duration=0.0)
+    quickest, evaluation = _spline(points, None, scene, hurry, journal, notes)
+    if evaluation.verification.violation is not None:
+        return quickest, evaluation
+    by_rules = quickest
+    pace = _paced(by_rules, points, scene, hurry, journal)
+    if pace is not None and pace.trajectory.duration < quickest.duration:
+        notes.append(_note(quickest, pace))
+        quickest = pace.trajectory
+    trajectory = stretched_to_wish(quickest, scene, options)
+    if options.duration > 0.0 or options.objective in ("energy", "time_and_energy"):
+        pace = _paced(by_rules, points, scene, options, journal)
+        if pace is not None and _value(pace.trajectory, scene, options) < _value(trajectory, scene, options):
+            notes.append(_note(trajectory, pace))
+            trajectory = pace.trajectory
+    return trajectory, evaluate_trajectory(trajectory, scene, options.safety_distance)
+
+
+def _paced(
+    trajectory: JointTrajectory,
+    points: FloatArray,
+    scene: PlanningScene,
+    options: PlanOptions,
+    journal: Journal,
+) -> Paced | None:
+    """The certified pace along a trajectory's path; None where there is none, or no work left for it."""
+    for share in _TORQUE_SHARES:
+        if journal.budget.exhausted:
+            return None
+        limits = _limits(scene, options, share)
+        pace = along_its_path(trajectory, points, scene, options, limits, journal.budget)
+        if pace is None or pace.deviation > KEPT:
+            journal.reject("no better pace along the path")
+            return None
+        verification = evaluate_trajectory(pace.trajectory, scene, options.safety_distance).verification
+        if verification.violation is None:
+            return pace
+        journal.reject(f"a pace along the path isn't certified: {verification.violation.what}")
+        if verification.violation.what != "torque":
+            return None
+    return None
+
+
+def _limits(scene: PlanningScene, options: PlanOptions, share: float) -> MotionLimits:
+    scaled = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
+    return scaled.with_torque_share(share)
+
+
+def _value(trajectory: JointTrajectory, scene: PlanningScene, options: PlanOptions) -> float:
+    """What decides between two paces on one path."""
+    return pace_value(trajectory, scene, options.objective, options.time_value)
+
+
+def _note(before: JointTrajectory, pace: Paced) -> str:
+    return (
+        f"pace: {pace.trajectory.duration:.3f} s instead of {before.duration:.3f} s, within "
+        f"{pace.deviation * 1e3:.2f} mrad of its path"
+    )
