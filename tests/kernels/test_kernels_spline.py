@@ -194,12 +194,10 @@ def test_derivatives_of_other_robots_are_those_of_differences(core: Any, n: int)
 
 
 @pytest.mark.parametrize("bodies", [COLUMNS, OPEN, (box("far", (60.0, 0.0, 0.0), (100.0, 1.0, 3.0)),), ()])
-def test_compiled_cores_agree_with_the_reference(core: Any, bodies: tuple[Body, ...]) -> None:
+def test_compiled_cores_agree_with_the_reference(compiled_core: Any, bodies: tuple[Body, ...]) -> None:
     """One scene is so large that lanes of doubles choose the pairs."""
-    if core is None:
-        pytest.skip("nothing compiled to compare with")
     control = motion(7, 13, around=WORKING)
-    found, expected = (kr210_cost(one, bodies).value(control, 0.15) for one in (core, None))
+    found, expected = (kr210_cost(one, bodies).value(control, 0.15) for one in (compiled_core, None))
     assert found.value == pytest.approx(expected.value, rel=1e-11)
     assert found.energy == pytest.approx(expected.energy, rel=1e-11)
     assert found.of_interval == pytest.approx(expected.of_interval, rel=1e-9)
