@@ -183,15 +183,17 @@ template <class V, class Policy> IR_INLINE void visit_bodies(const Model& model,
       if constexpr (eights<V> == 2) found |= near(balls[1], reach[1], square[1], body);
       return found & moving;
     };
-    const auto visit_each = [&](std::uint32_t left, int body, auto visit_one) {
+    const auto each = [&](std::uint32_t left, auto visit_one) {
       for (; left != 0; left &= left - 1)
-        if (visit_one(model, s, static_cast<int>(first) + __builtin_ctz(left), body, policy)) update();
+        if (visit_one(static_cast<int>(first) + __builtin_ctz(left))) update();
     };
-    for (const int body : model.planes) visit_each(some(model.bodies_float[body]), body, visit_plane<V, Policy>);
+    for (const int body : model.planes)
+      each(some(model.bodies_float[body]), [&](int c) { return visit_plane(model, s, c, body, policy); });
     for (const Leaf& leaf : model.leaves) {
       if (policy.done()) return;
       if (model.leaves.size() > 1 && some(leaf.around) == 0) continue;
-      for (const Box& box : leaf.boxes) visit_each(some(box), box.body, visit_body<V, Policy>);
+      for (const Box& box : leaf.boxes)
+        each(some(box), [&](int c) { return visit_body(model, s, c, box.body, policy); });
     }
   }
 }
