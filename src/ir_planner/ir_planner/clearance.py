@@ -15,7 +15,7 @@ from ir_planner.scene import PlanningScene
 FloatArray = NDArray[np.float64]
 _ZOOMS = 4
 _PER_ZOOM = 9
-_DIPS = 8  # local minima that are looked at closely
+_DIPS = 4  # local minima that are looked at closely
 
 
 @dataclass(frozen=True, eq=False)

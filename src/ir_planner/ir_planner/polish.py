@@ -16,11 +16,13 @@ _ROUNDS = 6
 _CORNER = 0.04  # what a corner costs, as a share of the straight movement's W: it takes time
 
 
-def fewest_corners(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray:
-    """The cheapest path over points of `path` (M, n): all shortcuts certified in one call, then shortest
-    path.
+def fewest_corners(
+    path: FloatArray, space: FreeSpace, weights: FloatArray, candidates: int = _POINTS
+) -> FloatArray:
+    """The cheapest path over points of `path` (M, n), `candidates` or as many as it has: all shortcuts
+    certified in one call, then shortest path.
     """
-    points = densified(path, _POINTS)
+    points = densified(path, candidates)
     count = len(points)
     first, last = np.triu_indices(count, 1)
     free = np.full((count, count), False)

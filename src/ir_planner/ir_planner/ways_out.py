@@ -32,6 +32,7 @@ METHODS = (MODIFIED_GA, TREE)
 _SEARCHED = 2  # raw ways per candidate that is wanted
 _DIFFERENT = 0.1  # rad: ways that end nearer to each other are one
 _END_SAMPLES = 24
+_CORNERS = 11  # points of a way between which shortcuts are tried
 _OUTSIDE_TRIES, _OUTSIDE_GOALS = 512, 8  # configurations drawn, and how many of those outside trees aim at
 _EDGE_SAMPLES = 12
 
@@ -198,7 +199,7 @@ def _cheapest(ways: list[Way], problem: Exit, wanted: int) -> list[Way]:
 
     shortened = []
     for way in sorted(ways, key=cost)[: _SEARCHED * wanted]:
-        path = _end_drawn_back(fewest_corners(way.points, space, weights), problem)
+        path = _end_drawn_back(fewest_corners(way.points, space, weights, _CORNERS), problem)
         shortened.append(Way(way.method, path if problem.contacts_end(path) else way.points))
     chosen: list[Way] = []
     for way in sorted(shortened, key=cost):
