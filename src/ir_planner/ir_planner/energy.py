@@ -16,6 +16,7 @@ from ir_planner.scene import PlanningScene
 
 FloatArray = NDArray[np.float64]
 STEP_S = 1e-3
+_PIECE = 20_000  # samples at a time: an hour has millions
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,8 @@ def movement_energy(
     count = max(int(np.ceil(span / step - 1e-9)), 1)
     dt = span / count
     times: FloatArray = begin + (np.arange(count, dtype=np.float64) + 0.5) * dt
-    motion = trajectory.sample(times)
-    torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
-    axes = scene.dynamics.axis_power(motion.qd, torque)
+    pieces = [times[k : k + _PIECE] for k in range(0, count, _PIECE)]
+    axes = np.concatenate([_axis_power(trajectory, scene, piece) for piece in pieces])
     if dt <= 0.0:  # a single point: nothing lasts
         nothing = np.zeros(0)
         return MovementEnergy(0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, 0.0, nothing, nothing)
@@ -63,6 +63,13 @@ def movement_energy(
         times=times,
         watts=watts,
     )
+
+
+def _axis_power(trajectory: JointTrajectory, scene: PlanningScene, times: FloatArray) -> FloatArray:
+    """What each axis takes from the DC bus (N, n) W at times (N,) s."""
+    motion = trajectory.sample(times)
+    torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
+    return scene.dynamics.axis_power(motion.qd, torque)
 
 
 def holding_watts(q: FloatArray, scene: PlanningScene) -> float:

@@ -21,6 +21,7 @@ FloatArray = NDArray[np.float64]
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported
+_MOST_STEPS = 5000  # of a movement that lasts long
 _DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it moves
 _TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
 _BESIDE = 5e-3  # weight of what breaks ties
@@ -64,9 +65,14 @@ def objective_weights(options: PlanOptions, scene: PlanningScene, path: FloatArr
     return ObjectiveWeights(1.0, options.time_value, still, _DRIVES_WATTS + options.time_value)
 
 
+def coarse_step(trajectory: JointTrajectory) -> float:
+    """Seconds between the samples by which movements are compared."""
+    return max(_COARSE_STEP, trajectory.duration / _MOST_STEPS)
+
+
 def pace_value(trajectory: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
     """J of a trajectory at the pace it has, or its joules where the objective is not J; sampled coarsely."""
-    energy = movement_energy(trajectory, scene, _COARSE_STEP)
+    energy = movement_energy(trajectory, scene, coarse_step(trajectory))
     if objective == "time_and_energy":
         return energy.total - energy.base + time_value * trajectory.duration
     return energy.total
@@ -77,7 +83,7 @@ def trajectory_value(trajectory: JointTrajectory, scene: PlanningScene, options:
     if options.objective == "time":
         return trajectory.duration
     if options.objective == "movement_cost":
-        times = np.arange(trajectory.times[0], trajectory.times[-1], _COARSE_STEP)
+        times = np.arange(trajectory.times[0], trajectory.times[-1], coarse_step(trajectory))
         return path_cost(scene.weights, trajectory.sample(times).q) * (1.0 + 1e-6 * trajectory.duration)
     return pace_value(trajectory, scene, options.objective, options.time_value)
 
