@@ -1,4 +1,4 @@
-"""Plan a movement, look at its joules, drive it, plan the way back with half the speed.
+"""Plan a movement, look at its joules, drive it, plan the movement back at half the speed.
 
 Start the nodes first (`.venv/bin/ir up`), then `.venv/bin/python examples/plan_and_drive.py`.
 """
@@ -13,9 +13,10 @@ def main() -> None:
         for goal, speed in (("A1 30 A2 -100 A3 100 A4 0 A5 20 A6 0", 1.0), ("home", 0.5)):
             plan = cell.plan_to(goal, PlanOptions(velocity_scaling=speed))
             report = plan.report
+            proof = "certified" if report.certified else "not certified"
             print(
                 f"{goal}: {report.duration:.2f} s, {report.energy:.0f} J, "
-                f"clearance {report.min_clearance:.3f} m, {'proved' if report.certified else 'not proved'}"
+                f"clearance {report.min_clearance:.3f} m, {proof}"
             )
             run = cell.execute(cell.get_trajectory(plan.trajectory_id))
             print(f"  driven: {run.energy:.0f} J, tool within {run.max_tool_deviation * 1000.0:.2f} mm")

@@ -1,6 +1,6 @@
-"""A soft PLC that runs a shift over Modbus TCP: works, pauses, hibernates, and wakes the robot again.
+"""A soft PLC that runs a shift over Modbus TCP: work, a pause, hibernation, wake-up.
 
-Start the driver first, with short transitions so that nobody has to wait half an hour:
+Start the driver first, with short transitions so that the example takes a minute:
 
     ir-sim-driver --ros-args -p modbus:=true -p transitions.hibernation_enter:=2.0
         -p transitions.hibernation_minimum_stay:=2.0 -p transitions.hibernation_leave:=3.0     (one line)
@@ -21,7 +21,7 @@ from pymodbus.client import ModbusTcpClient
 
 MODES = {0: "stand on motors", 1: "moving", 2: "stand on brakes", 3: "bus power off", 4: "hibernation"}
 POLL = 0.2  # s
-OFF_THE_NETWORK = 4  # Modbus exception of a controller that sleeps
+OFF_THE_NETWORK = 4  # Modbus exception of a controller in hibernation
 
 
 class SoftPlc:
@@ -30,7 +30,7 @@ class SoftPlc:
     def __init__(self, host: str, port: int) -> None:
         self._client = ModbusTcpClient(host, port=port)
         if not self._client.connect():
-            raise SystemExit(f"nobody listens on {host}:{port}: is the driver started with modbus:=true?")
+            raise SystemExit(f"no answer from {host}:{port}; is the driver started with modbus:=true?")
 
     def set(self, bit: str, level: bool) -> None:
         """Set one coil."""
@@ -47,7 +47,7 @@ class SoftPlc:
         if answer.isError():
             return "off the network" if answer.exception_code == OFF_THE_NETWORK else "no answer"
         watts = (answer.registers[3] << 16) + answer.registers[4]
-        return f"{MODES.get(answer.registers[0], 'on the way')}, {watts} W"
+        return f"{MODES.get(answer.registers[0], 'changing mode')}, {watts} W"
 
     def watch(self, seconds: float, until: str = "") -> None:
         """Print the mode when it changes, for so long or until it begins with a text."""

@@ -67,7 +67,7 @@ def test_every_line_of_the_readme_runs() -> None:
             [sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False
         )
         assert ran.returncode == 0, ran.stdout + ran.stderr
-        assert "proved" in ran.stdout
+        assert "certified" in ran.stdout
     for line in plc.splitlines():
         done = shell(line)
         assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"

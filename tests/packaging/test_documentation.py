@@ -1,0 +1,167 @@
+"""The documentation names what exists: links, files, functions, tests."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+PACKAGES = {path.name for path in (ROOT / "src").iterdir()}
+HISTORY = {"CHANGELOG.md"}  # names what existed when it was written
+
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+CODE = re.compile(r"`([^`\n]+)`")
+TEST = re.compile(r"^(?:tests/)?(?:\w+/)*(test_\w+\.py)?(?:::(\w+))?$")
+FILE = re.compile(r"^\.?[\w-]+(?:/[\w.-]+)+/?$|^[\w-]+\.(?:py|yaml|md|sh|cpp|hpp)$")
+
+
+def text_of(page: Path) -> str:
+    """The page without its code blocks."""
+    return re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
+
+
+def code_spans(page: Path) -> Iterator[str]:
+    return (match[1] for match in CODE.finditer(text_of(page)))
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", text_of(page), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_relative_links_lead_to_a_file_and_to_a_heading(page: Path) -> None:
+    broken = []
+    for target in LINK.findall(text_of(page)):
+        if re.match(r"\w+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        if not file.exists() or (anchor and file.suffix == ".md" and anchor not in anchors(file)):
+            broken.append(target)
+    assert broken == []
+
+
+def module_at(dotted: str) -> ModuleType | None:
+    """The module of that name, None where there is none."""
+    try:
+        return importlib.import_module(dotted)
+    except ModuleNotFoundError as missing:
+        if missing.name is not None and f"{dotted}.".startswith(f"{missing.name}."):
+            return None
+        raise
+
+
+def exists(dotted: str) -> bool:
+    """Whether package.module.name leads to a module or to what it holds."""
+    parts = dotted.split(".")
+    for count in range(len(parts), 0, -1):
+        found: object = module_at(".".join(parts[:count]))
+        if found is not None:
+            for part in parts[count:]:
+                fields = getattr(found, "__dataclass_fields__", {})
+                found = getattr(found, part, fields.get(part))
+                if found is None:
+                    return False
+            return True
+    return False
+
+
+def dotted_names(page: Path) -> Iterator[str]:
+    """`package.module.function` in the page; `.function` continues the name before it in the same line."""
+    for line in text_of(page).splitlines():
+        module = ""
+        for code in CODE.findall(line):
+            match = re.match(r"(\w*(?:\.\w+)+)(?:\(|$)", code)
+            if match is None or FILE.match(match[1]):
+                continue
+            dotted = module + match[1] if match[1].startswith(".") else match[1]
+            if dotted.partition(".")[0] in PACKAGES:
+                module = dotted.rpartition(".")[0]
+                yield dotted
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name not in HISTORY], ids=name_of)
+def test_functions_that_are_named_exist(page: Path) -> None:
+    assert [name for name in dotted_names(page) if not exists(name)] == []
+
+
+@cache
+def tests_by_file() -> dict[str, str]:
+    """Text of every test file, by its name."""
+    return {path.name: path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_tests_that_are_named_exist(page: Path) -> None:
+    """`file.py::test`; `::test` continues the file of the test before it."""
+    missing, file = [], ""
+    for code in code_spans(page):
+        match = TEST.match(code)
+        if match is None or not (match[1] or match[2]):
+            continue
+        file = match[1] or file
+        text = tests_by_file().get(file, "")
+        if not text or (match[2] and f"def {match[2]}(" not in text):
+            missing.append(code)
+    assert missing == []
+
+
+@cache
+def tracked_names() -> frozenset[str]:
+    """Names of all files and folders of the repository that hold something of its own."""
+    trees = (
+        "src",
+        "tests",
+        "docs",
+        "benchmarks",
+        "tools",
+        "examples",
+        "ros_ws",
+        "docker",
+        "requirements",
+        ".ci",
+    )
+    return frozenset(path.name for tree in trees for path in (ROOT / tree).rglob("*"))
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name not in HISTORY], ids=name_of)
+def test_files_that_are_named_exist(page: Path) -> None:
+    """A path from the root or from the page; a bare `name.py` anywhere; nothing in out/."""
+    missing = []
+    for code in code_spans(page):
+        name = code.split()[0]
+        if not FILE.match(name) or name.startswith(("out/", ".venv/", "ros_ws/install")):
+            continue
+        top = name.partition("/")[0]
+        if "/" not in name:
+            found = name in tracked_names() or (ROOT / name).exists()
+        elif (ROOT / top).exists() or top in PACKAGES:
+            found = any(
+                (base / name).exists()
+                for base in (ROOT, page.parent, ROOT / "src" / top, ROOT / "ros_ws/src")
+            )
+        else:
+            continue  # a type, a topic or a unit
+        if not found:
+            missing.append(name)
+    assert missing == []
+
+
+def test_a_name_that_does_not_exist_is_noticed() -> None:
+    assert exists("ir_kernels.ccd")
+    assert exists("ir_kernels")
+    assert not exists("ir_kernels.no_such_module.f")
+    assert not exists("ir_kernels.ccd.no_such_function")
