@@ -13,8 +13,8 @@ from _regional_ours import asked, until
 from _regional_tasks import Cost, Task
 from _regional_toppra import timed
 from ir_planner.errors import RequestError
-from ir_planner.following import Reference
 from ir_planner.planner import Planner
+from ir_planner.trajectories.through_points import Reference
 
 ITERATIONS = 2_000_000  # certified edges: more than a minute holds
 

@@ -9,7 +9,7 @@ import pinocchio
 from _kernels_peers import Coal
 from ir_kernels.dynamics_data import STANDARD_GRAVITY
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.scene import PlanningScene
+from ir_planner.scene.planning_scene import PlanningScene
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]

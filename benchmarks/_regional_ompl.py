@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from _regional_tasks import Task
-from ir_planner.scene import PROOF_TOLERANCE
+from ir_planner.scene.planning_scene import PROOF_TOLERANCE
 from numpy.typing import NDArray
 from ompl import base, geometric, util
 

@@ -12,8 +12,8 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
-from ir_planner.goals import Goal
 from ir_planner.planner import Planner
+from ir_planner.request.goals import Goal
 
 PLANNING_TIME = 1.0  # s
 ENDLESS = 100_000_000  # certified edges: more than the time holds

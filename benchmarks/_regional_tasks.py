@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ir_planner.energy import STEP_S, movement_energy
-from ir_planner.scene import PlanningScene, load_text, scene_with
+from ir_planner.checks.energy import STEP_S, movement_energy
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from numpy.typing import NDArray
 
 from ir_description import load_cell, load_power_data

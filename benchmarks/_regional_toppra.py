@@ -16,7 +16,7 @@ import numpy as np
 from _regional_ompl import RESOLUTION, Free, OmplPath
 from _regional_tasks import Cost, Task, cost_of
 from ir_msgs_py.trajectory import Samples
-from ir_planner.scene import PlanningScene
+from ir_planner.scene.planning_scene import PlanningScene
 from numpy.typing import NDArray
 from toppra import SplineInterpolator
 from toppra.algorithm import TOPPRA

@@ -13,8 +13,8 @@ from _kernels_peers import Coal
 from ir_msgs.srv import PlanServiceMovement
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.scene import PlanningScene
-from ir_planner.zones import tcp_inside
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.scene.zones import tcp_inside
 from numpy.typing import NDArray
 
 from ir_msgs_py import names

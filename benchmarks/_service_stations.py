@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.budget import Budget
-from ir_planner.interaction_point import searched_configurations
-from ir_planner.inverse_kinematics import free_configurations
-from ir_planner.scene import PlanningScene, load_text, scene_with
-from ir_planner.service_movement import ServiceRequest, plan_service
-from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
-from ir_planner.ways_out import Exit
-from ir_planner.withdrawal import withdraw
+from ir_planner.configurations.interaction_point import searched_configurations
+from ir_planner.configurations.inverse_kinematics import free_configurations
+from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
+from ir_planner.service.service_movement import ServiceRequest, plan_service
+from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.service.withdrawal import withdraw
+from ir_planner.service.withdrawal_paths import Exit
 from numpy.typing import NDArray
 
 from ir_description import Cell, Station, load_power_data

@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 from _regional_figures import Claim, at_least, at_most
 from _regional_tasks import CELLS, Task, tasks_of
-from ir_planner.budget import Budget
-from ir_planner.correction import Correction, corrected
-from ir_planner.free_space import FreeSpace
-from ir_planner.movement_cost import movement_cost, path_cost
-from ir_planner.polish import fewest_corners, pulled
-from ir_planner.regional_settings import GeneticSettings
+from ir_planner.checks.free_space import FreeSpace
+from ir_planner.request.work import Budget
+from ir_planner.scene.movement_cost import movement_cost, path_cost
+from ir_planner.search.correction import Correction, corrected
+from ir_planner.search.genetic_settings import GeneticSettings
+from ir_planner.search.shortcuts import fewest_corners, pulled
 from kernels import commit, machine
 
 DEFAULT = "default"

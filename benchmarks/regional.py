@@ -39,8 +39,8 @@ from _regional_ours import (
 from _regional_plot import plot
 from _regional_tasks import CELLS, Task, tasks_of
 from _regional_toppra import timed
-from ir_planner.goals import Goal
 from ir_planner.planner import Planner
+from ir_planner.request.goals import Goal
 from kernels import commit, machine
 
 METHODS = 3  # of the best known J

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from _kernels_dynamics import Claim
 from ir_kernels.search import BidirectionalTree
-from ir_planner.scene import PlanningScene, load_text, scene_with
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from kernels import commit, machine
 
 from ir_description import load_cell, load_power_data

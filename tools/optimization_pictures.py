@@ -17,11 +17,11 @@ import matplotlib as mpl
 import numpy as np
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.blending import stretched
-from ir_planner.energy import movement_energy
-from ir_planner.optimization import OptimizationPlan
+from ir_planner.checks.energy import movement_energy
 from ir_planner.planner import Planner
-from ir_planner.scene import PlanningScene
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.timing.blending import stretched
+from ir_planner.trajectories.optimization import OptimizationPlan
 from numpy.typing import NDArray
 
 mpl.use("Agg")

@@ -17,13 +17,14 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from ir_msgs_py.options import PlanOptions
-from ir_planner.budget import Budget
-from ir_planner.interaction_point import searched_configurations
-from ir_planner.scene import PlanningScene, load_text, scene_with
-from ir_planner.service_movement import ServicePlan, ServiceRequest, plan_service
-from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
-from ir_planner.ways_out import Exit
-from ir_planner.withdrawal import Walk, withdraw
+from ir_planner.configurations.interaction_point import searched_configurations
+from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
+from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
+from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.service.withdrawal import Walk, withdraw
+from ir_planner.service.withdrawal_paths import Exit
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 

@@ -17,7 +17,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.node import PlannerNode
+from ir_planner.node.node import PlannerNode
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile

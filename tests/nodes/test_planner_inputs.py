@@ -7,8 +7,8 @@ import pytest
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.node_inputs import LastState, measured_velocity, state_of
-from ir_planner.timing import STILL
+from ir_planner.node.inputs import LastState, measured_velocity, state_of
+from ir_planner.scene.motion_limits import STILL
 from sensor_msgs.msg import JointState
 
 from ir_description import load_cell

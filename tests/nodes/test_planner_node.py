@@ -28,7 +28,7 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros.conversions import trajectory_from_msg
-from ir_planner.node import PlannerNode
+from ir_planner.node.node import PlannerNode
 from rcl_interfaces.srv import SetParameters
 from rclpy.action import ActionClient
 from rclpy.parameter import Parameter

@@ -11,12 +11,12 @@ import pytest
 from ir_kernels.power import REGENERATIONS
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.blending import standing, stretched
-from ir_planner.budget import Budget
-from ir_planner.energy import holding_watts, movement_energy
-from ir_planner.movement import timed_movement
-from ir_planner.objective import best_stretch
-from ir_planner.scene import PlanningScene
+from ir_planner.checks.energy import holding_watts, movement_energy
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.timing.blending import standing, stretched
+from ir_planner.timing.movement import timed_movement
+from ir_planner.timing.objective import best_stretch
 
 Degrees = Callable[..., Any]
 

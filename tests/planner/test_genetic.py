@@ -14,16 +14,16 @@ from ir_kernels.collision import FREE
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
-from ir_planner.budget import Budget
-from ir_planner.correction import colliding_stretch, corrected, different
+from ir_planner.checks.free_space import FreeSpace
+from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
 from ir_planner.errors import CancelledError
-from ir_planner.free_space import FreeSpace
-from ir_planner.genetic import _Breeder, evolve, way_matrix
-from ir_planner.movement_cost import movement_cost, path_cost
-from ir_planner.regional import plan_regional
-from ir_planner.regional_settings import GeneticSettings
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
-from ir_planner.splines import spline_through, to_ppoly, virtual_knots
+from ir_planner.regional.regional import plan_regional
+from ir_planner.request.work import Budget
+from ir_planner.scene.movement_cost import movement_cost, path_cost
+from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
+from ir_planner.search.correction import colliding_stretch, corrected, different
+from ir_planner.search.genetic_settings import GeneticSettings
+from ir_planner.search.population import _Breeder, evolve, way_matrix
 from numpy.typing import NDArray
 
 from ir_description import cell_from_yaml, load_cell, load_power_data

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.goals import one_goal, parse_goal
+from ir_planner.request.goals import one_goal, parse_goal
 
 from ir_description import load_cell
 

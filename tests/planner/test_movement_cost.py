@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ir_planner.movement_cost import cheapest_chain, movement_cost, movement_weights, path_cost
+from ir_planner.scene.movement_cost import cheapest_chain, movement_cost, movement_weights, path_cost
 
 from ir_description import load_robot
 

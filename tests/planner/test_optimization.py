@@ -15,15 +15,15 @@ from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.budget import Budget
-from ir_planner.descents import Descents
-from ir_planner.energy import movement_energy
+from ir_planner.checks.energy import movement_energy
 from ir_planner.errors import CancelledError, RequestError
-from ir_planner.following import Reference
-from ir_planner.optimization import POINTS_MAX, OptimizationPlan, optimize_trajectory
-from ir_planner.pareto import non_dominated
+from ir_planner.optimize.descents import Descents
 from ir_planner.planner import Planner
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.trajectories.optimization import POINTS_MAX, OptimizationPlan, optimize_trajectory
+from ir_planner.trajectories.pareto import non_dominated
+from ir_planner.trajectories.through_points import Reference
 from numpy.typing import NDArray
 
 from ir_description import PowerData

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.blending import stretched
-from ir_planner.budget import Budget
-from ir_planner.energy import movement_energy
+from ir_planner.checks.energy import movement_energy
+from ir_planner.checks.verification import verify
+from ir_planner.curves.uniform_spline import along_path
 from ir_planner.errors import CancelledError, RequestError
-from ir_planner.fixed_path import FixedPath
-from ir_planner.following import KEPT, Reference, plan_through
-from ir_planner.passing import Passing
-from ir_planner.path_pace import Paced, _Descent, along_its_path
-from ir_planner.regional import MovementPlan
-from ir_planner.scene import PlanningScene
-from ir_planner.spline_timing import time_spline
-from ir_planner.uniform_spline import along_path
-from ir_planner.verification import verify
+from ir_planner.optimize.fixed_path import FixedPath
+from ir_planner.optimize.passing import Passing
+from ir_planner.optimize.path_timing import Paced, _Descent, along_its_path
+from ir_planner.regional.regional import MovementPlan
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.timing.blending import stretched
+from ir_planner.timing.spline_timing import time_spline
+from ir_planner.trajectories.through_points import KEPT, Reference, plan_through
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]

@@ -11,17 +11,17 @@ import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.bounds import PLANNING_TIME_MAX
-from ir_planner.budget import Budget
+from ir_planner.checks.free_space import FreeSpace
+from ir_planner.checks.states import too_near
 from ir_planner.errors import RequestError, UnknownNameError
-from ir_planner.following import Reference
-from ir_planner.free_space import FreeSpace
-from ir_planner.goals import Goal, parse_goal
 from ir_planner.planner import Planner
-from ir_planner.regional import too_near
-from ir_planner.scene import scene_with, with_parts
-from ir_planner.service import retreat_poses, service_lines
+from ir_planner.request.bounds import PLANNING_TIME_MAX
+from ir_planner.request.goals import Goal, parse_goal
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import scene_with, with_parts
+from ir_planner.service.service_lines import retreat_poses, service_lines
 from ir_planner.store import Store
+from ir_planner.trajectories.through_points import Reference
 
 from ir_description import load_cell
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.polynomials import extremes
+from ir_planner.curves.polynomials import extremes
 
 
 @given(st.integers(0, 100_000))

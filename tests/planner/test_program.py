@@ -11,10 +11,10 @@ import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.status import StatusCode
-from ir_planner.budget import Budget
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
-from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.request.work import Budget
 
 from ir_description import Cell, PowerData, load_cell
 

@@ -10,17 +10,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ir_msgs_py.options import PlanOptions
-from ir_planner.budget import Budget
+from ir_planner.checks.evaluation import evaluate_trajectory
+from ir_planner.curves.uniform_spline import UniformSpline, along_path
 from ir_planner.errors import RequestError
-from ir_planner.movement import timed_movement
-from ir_planner.objective import objective_value, trajectory_value
-from ir_planner.refinement import Refinement, movement_over
-from ir_planner.regional import plan_regional
-from ir_planner.reporting import evaluate_trajectory
-from ir_planner.scene import PlanningScene
-from ir_planner.service_movement import ServiceRequest, plan_service
-from ir_planner.service_settings import WithdrawalSettings
-from ir_planner.uniform_spline import UniformSpline, along_path
+from ir_planner.optimize.refinement import Refinement, movement_over
+from ir_planner.regional.regional import plan_regional
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.service.service_movement import ServiceRequest, plan_service
+from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.timing.movement import timed_movement
+from ir_planner.timing.objective import objective_value, trajectory_value
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 

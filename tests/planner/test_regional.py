@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
-from ir_planner.budget import Budget
 from ir_planner.errors import CancelledError
-from ir_planner.regional import plan_regional
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
+from ir_planner.regional.regional import plan_regional
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
 
 from ir_description import cell_from_yaml, load_cell, load_power_data
 

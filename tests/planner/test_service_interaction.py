@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ir_planner.budget import Budget
-from ir_planner.errors import RequestError
-from ir_planner.goals import parse_goal
-from ir_planner.interaction_point import (
+from ir_planner.configurations.interaction_point import (
     branches,
     distinct_configurations,
     random_starts,
     searched_configurations,
 )
-from ir_planner.inverse_kinematics import free_configurations
+from ir_planner.configurations.inverse_kinematics import free_configurations
+from ir_planner.configurations.set_back import LITERAL, SECANT, increments, shares_back
+from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
-from ir_planner.scene import PlanningScene
-from ir_planner.service_settings import InteractionSettings
-from ir_planner.set_back import LITERAL, SECANT, increments, shares_back
+from ir_planner.request.goals import parse_goal
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 distances = st.floats(0.0201, 1.0)

@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
-from ir_planner.budget import Budget
+from ir_planner.checks.evaluation import evaluate_trajectory
+from ir_planner.configurations.inverse_kinematics import free_configurations
 from ir_planner.errors import CancelledError, RequestError
-from ir_planner.inverse_kinematics import free_configurations
-from ir_planner.journal import Journal
 from ir_planner.planner import Planner
-from ir_planner.program import ProgramRequest, plan_program
-from ir_planner.reporting import evaluate_trajectory
-from ir_planner.scene import PlanningScene, load_text, scene_with
-from ir_planner.service_movement import ServicePlan, ServiceRequest, plan_service
-from ir_planner.service_settings import WithdrawalSettings
-from ir_planner.step_weights import accumulated_mass, step_weights
-from ir_planner.ways_out import Exit, ways_out
-from ir_planner.withdrawal import withdraw
-from ir_planner.work_area import WorkArea
+from ir_planner.program.program import ProgramRequest, plan_program
+from ir_planner.request.journal import Journal
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
+from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
+from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.service.step_weights import accumulated_mass, step_weights
+from ir_planner.service.withdrawal import withdraw
+from ir_planner.service.withdrawal_paths import Exit, ways_out
+from ir_planner.service.work_area import WorkArea
 
 from ir_description import Body, Cell, PowerData, load_cell
 

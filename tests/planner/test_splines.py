@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ir_planner.splines import (
+from ir_planner.curves.splines import (
     end_state,
     first_segment,
     last_segment,

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
-from ir_planner.scene import load_text, scene_with
-from ir_planner.standby import break_even, mode_watts, pause_energy, plan_standby
+from ir_planner.program.standby import break_even, mode_watts, pause_energy, plan_standby
+from ir_planner.scene.planning_scene import load_text, scene_with
 
 from ir_description import load_cell, load_power_data
 

@@ -13,20 +13,21 @@ import numpy as np
 import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.asynchronous import own_laws
-from ir_planner.blending import TimedPath, blended, largest_overlaps, standing, stretched
-from ir_planner.budget import Budget
-from ir_planner.energy import movement_energy
+from ir_planner.checks.energy import movement_energy
 from ir_planner.errors import RequestError
-from ir_planner.goals import Goal
-from ir_planner.level_timing import fastest
-from ir_planner.movement import timed_movement
-from ir_planner.objective import best_stretch
 from ir_planner.planner import Planner
-from ir_planner.scene import PlanningScene
-from ir_planner.spline_timing import time_spline
-from ir_planner.time_law import StepLaws, TimeLaw
-from ir_planner.timing import MotionLimits, fastest_law, torque_use
+from ir_planner.request.goals import Goal
+from ir_planner.request.work import Budget
+from ir_planner.scene.motion_limits import MotionLimits, torque_use
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.timing.asynchronous import own_laws
+from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing, stretched
+from ir_planner.timing.level_timing import fastest
+from ir_planner.timing.movement import timed_movement
+from ir_planner.timing.objective import best_stretch
+from ir_planner.timing.ptp import fastest_law
+from ir_planner.timing.spline_timing import time_spline
+from ir_planner.timing.time_law import StepLaws, TimeLaw
 
 _spec = importlib.util.spec_from_file_location("planner_oracles", Path(__file__).parent / "oracles.py")
 assert _spec is not None

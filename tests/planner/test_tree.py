@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from ir_kernels.collision import FREE
-from ir_planner.budget import Budget
+from ir_planner.checks.free_space import FreeSpace
 from ir_planner.errors import CancelledError
-from ir_planner.free_space import FreeSpace
-from ir_planner.scene import PlanningScene
-from ir_planner.tree import connect, joint_scale
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.search.tree import connect, joint_scale
 
 SceneOf = Callable[[str], PlanningScene]
 TASK = "tun->bin"  # of deep_box: some hundred edges at the least

@@ -11,12 +11,12 @@ import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.budget import Budget
-from ir_planner.movement import timed_movement
-from ir_planner.reporting import evaluate_trajectory
-from ir_planner.scene import PlanningScene, load_text, scene_with
-from ir_planner.verification import verify
-from ir_planner.zones import polynomials_between
+from ir_planner.checks.evaluation import evaluate_trajectory
+from ir_planner.checks.verification import verify
+from ir_planner.request.work import Budget
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
+from ir_planner.scene.zones import polynomials_between
+from ir_planner.timing.movement import timed_movement
 
 from ir_description import load_cell, load_power_data
 

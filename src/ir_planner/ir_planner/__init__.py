@@ -1,3 +1,44 @@
 """Planning core: movements and programs of an industrial robot among machines, with joules, seconds and
 clearance.
+
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "demo")
+    plan = planner.plan_regional(start, parse_goal("lathe_work", planner.cell), PlanOptions())
+
+Everything a user needs is exported here; the rooms below are the planner's own.
 """
+
+from ir_msgs_py.options import PlanOptions
+
+from ir_planner.checks import Evaluation
+from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError
+from ir_planner.planner import IkAnswer, Planner, StateCheck, StoredProgram
+from ir_planner.program import ProgramPlan, Standby
+from ir_planner.regional import MovementPlan
+from ir_planner.request import Goal, parse_goal
+from ir_planner.service import ServicePlan
+from ir_planner.settings import PlannerSettings
+from ir_planner.trajectories import OptimizationPlan, Reference
+
+__all__ = [
+    "CancelledError",
+    "Evaluation",
+    "Goal",
+    "IkAnswer",
+    "MovementPlan",
+    "OptimizationPlan",
+    "PlanOptions",
+    "Planner",
+    "PlannerError",
+    "PlannerSettings",
+    "ProgramPlan",
+    "Reference",
+    "RequestError",
+    "ServicePlan",
+    "Standby",
+    "StateCheck",
+    "StoredProgram",
+    "TimingError",
+    "UnknownNameError",
+    "parse_goal",
+]

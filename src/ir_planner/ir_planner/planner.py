@@ -16,27 +16,42 @@ from ir_msgs_py.transitions import TransitionTimes
 from numpy.typing import NDArray
 
 from ir_description import Cell, PowerData, cell_from_yaml, load_cell, load_power_data
-from ir_planner.bounds import bounded, checked_options, chosen, safety_distance
-from ir_planner.budget import Budget, Clock
-from ir_planner.clearance import nearest_pairs
+from ir_planner.checks import Evaluation, evaluate_trajectory, nearest_pairs, too_near_sentence
+from ir_planner.configurations import (
+    STARTS_MAX,
+    InteractionSettings,
+    free_configurations,
+    no_configuration,
+    ranked_solutions,
+    searched_configurations,
+)
 from ir_planner.errors import RequestError, UnknownNameError
-from ir_planner.following import Reference, plan_through
-from ir_planner.goals import Goal, within_limits
-from ir_planner.interaction_point import STARTS_MAX, searched_configurations
-from ir_planner.inverse_kinematics import free_configurations, no_configuration, ranked_solutions
-from ir_planner.journal import Journal
-from ir_planner.optimization import OptimizationPlan, optimize_trajectory
-from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
-from ir_planner.regional import MovementPlan, plan_regional, too_near_sentence
-from ir_planner.regional_settings import GeneticSettings
-from ir_planner.reporting import Evaluation, evaluate_trajectory
+from ir_planner.program import ProgramPlan, ProgramRequest, Standby, plan_program, plan_standby
+from ir_planner.regional import MovementPlan, plan_regional
+from ir_planner.request import (
+    Budget,
+    Clock,
+    Goal,
+    Journal,
+    bounded,
+    checked_options,
+    chosen,
+    safety_distance,
+    within_limits,
+)
 from ir_planner.scene import PlanningScene, load_text, scene_with
-from ir_planner.service_movement import ServicePlan, ServiceRequest, checked_request, plan_service
-from ir_planner.service_settings import InteractionSettings, WithdrawalSettings
+from ir_planner.search import GeneticSettings
+from ir_planner.service import (
+    ServicePlan,
+    ServiceRequest,
+    WithdrawalSettings,
+    checked_request,
+    known_method,
+    plan_service,
+)
 from ir_planner.settings import PlannerSettings
-from ir_planner.standby import Standby, plan_standby
 from ir_planner.store import Store
-from ir_planner.ways_out import known_method
+from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 
 FloatArray = NDArray[np.float64]
 IK_METHODS = ("analytic", "ccd")

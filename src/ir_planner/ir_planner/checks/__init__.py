@@ -1,0 +1,36 @@
+"""What is known about a configuration or a trajectory: free, limits, torque, clearance, energy, proof."""
+
+from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
+from ir_planner.checks.clearance_checks import clearance_violation
+from ir_planner.checks.energy import holding_watts, movement_energy
+from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, total_report
+from ir_planner.checks.free_space import FreeSpace
+from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
+from ir_planner.checks.shapes import CLOSEST, WAY, ZONES, Colour, Shape, cell_shapes, movement_shapes
+from ir_planner.checks.states import end_in_collision, too_near, too_near_sentence
+
+__all__ = [
+    "AT_REST",
+    "CLOSEST",
+    "SLACK",
+    "WAY",
+    "ZONES",
+    "Colour",
+    "Evaluation",
+    "FreeSpace",
+    "Shape",
+    "Violation",
+    "cell_shapes",
+    "clearance_violation",
+    "end_in_collision",
+    "evaluate_trajectory",
+    "holding_watts",
+    "movement_energy",
+    "movement_shapes",
+    "nearest_pair",
+    "nearest_pairs",
+    "pair_value",
+    "too_near",
+    "too_near_sentence",
+    "total_report",
+]

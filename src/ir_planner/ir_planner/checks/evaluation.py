@@ -1,0 +1,88 @@
+"""The report of a trajectory: what it costs, how near it comes to its limits, and whether all that is
+proved.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
+from ir_planner.checks.energy import MovementEnergy, movement_energy
+from ir_planner.checks.verification import Verification, verify
+from ir_planner.scene import PlanningScene
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Everything that is known about a trajectory."""
+
+    report: TrajectoryReport
+    verification: Verification
+    clearance: ClearanceProfile
+    energy: MovementEnergy
+
+
+def evaluate_trajectory(
+    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
+) -> Evaluation:
+    """Verify and measure a trajectory with the loads of the scene."""
+    verification = verify(trajectory, scene, safety_distance, station)
+    energy = movement_energy(trajectory, scene)
+    clearance = clearance_profile(trajectory, scene, station)
+    report = TrajectoryReport(
+        duration=trajectory.duration,
+        movement_cost=float(verification.travel @ scene.weights),
+        energy=energy.total,
+        joint_energy=energy.joints,
+        base_energy=energy.base,
+        burnt_energy=energy.burnt,
+        peak_power=energy.peak,
+        min_clearance=np.inf if clearance.smallest is None else clearance.smallest.distance,
+        closest=clearance.smallest,
+        closest_time=clearance.smallest_time,
+        velocity_ratio=verification.velocity,
+        acceleration_ratio=verification.acceleration,
+        jerk_ratio=verification.jerk,
+        torque_ratio=verification.torque,
+        path_length=clearance.path_length,
+        certified=verification.certified,
+        contacts=clearance.contacts,
+    )
+    return Evaluation(report, verification, clearance, energy)
+
+
+def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ...]) -> TrajectoryReport:
+    """Report of steps one after the other; `elapsed` (N,) s: when each starts. Pauses have a report as
+    well.
+    """
+    moving = [report for report in reports if len(report.velocity_ratio)]
+    if not reports or not moving:
+        return TrajectoryReport(duration=sum(report.duration for report in reports))
+    tightest = min(range(len(reports)), key=lambda k: reports[k].min_clearance)
+    ratios = {
+        name: np.max([getattr(report, name) for report in moving], axis=0)
+        for name in ("velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio")
+    }
+    n = len(moving[0].velocity_ratio)
+    return replace(
+        reports[tightest],
+        duration=sum(report.duration for report in reports),
+        movement_cost=sum(report.movement_cost for report in reports),
+        energy=sum(report.energy for report in reports),
+        joint_energy=np.sum(
+            [r.joint_energy if len(r.joint_energy) else np.zeros(n) for r in reports], axis=0
+        ),
+        base_energy=sum(report.base_energy for report in reports),
+        burnt_energy=sum(report.burnt_energy for report in reports),
+        peak_power=max(report.peak_power for report in reports),
+        closest_time=elapsed[tightest] + reports[tightest].closest_time,
+        path_length=sum(report.path_length for report in reports),
+        certified=all(report.certified for report in moving),
+        contacts=tuple(pair for report in reports for pair in report.contacts),
+        velocity_ratio=ratios["velocity_ratio"],
+        acceleration_ratio=ratios["acceleration_ratio"],
+        jerk_ratio=ratios["jerk_ratio"],
+        torque_ratio=ratios["torque_ratio"],
+    )

@@ -1,0 +1,43 @@
+"""Whether a configuration is free, and the sentence that names the pair which is too near."""
+
+import numpy as np
+from ir_msgs_py.report import DistancePair
+from ir_msgs_py.status import Status, StatusCode
+from numpy.typing import NDArray
+
+from ir_planner.checks.clearance import pair_value
+from ir_planner.checks.free_space import FreeSpace
+from ir_planner.scene import PROOF_TOLERANCE
+
+FloatArray = NDArray[np.float64]
+
+
+def end_in_collision(
+    start: FloatArray, goal: FloatArray, space: FreeSpace, safety_distance: float
+) -> Status | None:
+    """The status for a start or goal that is not free; None where both are."""
+    for q, what, code in (
+        (start, "start", StatusCode.START_STATE_IN_COLLISION),
+        (goal, "goal", StatusCode.GOAL_IN_COLLISION),
+    ):
+        if not space.states_free(q[None])[0]:
+            return Status(code, too_near(q, space, what, safety_distance))
+    return None
+
+
+def too_near(q: FloatArray, space: FreeSpace, what: str, safety_distance: float) -> str:
+    """The sentence for a configuration (n,) in which a pair is nearer than it may be."""
+    z = int(space.scene.collision.min_distance(q[None], space.threshold).pair[0])
+    if z < 0:
+        return f"{what} is not free"
+    kept = min(safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2)  # a contact has its own
+    return f"{what}: {too_near_sentence(pair_value(space.scene, q, z), kept)}"
+
+
+def too_near_sentence(pair: DistancePair, kept: float) -> str:
+    """Which pair is how near, and the distance [m] it must keep."""
+    where = "in penetration" if pair.distance < 0.0 else "too near"
+    return (
+        f"{pair.body_a} and {pair.body_b} ({pair.kind}) are {where}: "
+        f"distance {pair.distance * 1e3:.1f} mm, it must be more than {kept * 1e3:.1f} mm"
+    )

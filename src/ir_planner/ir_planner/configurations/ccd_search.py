@@ -1,0 +1,179 @@
+"""Cyclic coordinate descent among machines: eqs. (2) and (3) with the metric distances of every step.
+
+From the tool to the base each joint takes the value within its limits that minimises Psi; where that step
+brings a pair nearer than its safety distance, the joint is set back (eq. 5) until it is far enough, or stays
+where it was. A start that begins in collision moves on until it is out of it. Where the descent gets slow,
+Newton's steps finish it. All starts at once, in arrays.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from ir_kernels.reference.ccd import best_value
+from numpy.typing import NDArray
+
+from ir_kernels import CcdSettings, ccd
+from ir_planner.configurations.set_back import shares_back
+from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.request import Budget
+from ir_planner.scene import PlanningScene
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+ROTATION_LENGTH = 0.5  # m/rad: lambda of eq. (2)
+_STALLED = 0.02  # of Psi that a sweep must gain where it was set back
+_PATIENCE = 3  # sweeps without that gain
+
+
+@dataclass(eq=False)
+class Descent:
+    """q (K, n) of the accepted starts (eq. 6), the rejected by reason, and the sweeps done."""
+
+    q: FloatArray
+    sweeps: int
+    rejected: Counter[str] = field(default_factory=Counter)
+
+
+def descend(
+    pose: FloatArray,
+    starts: FloatArray,
+    scene: PlanningScene,
+    threshold: FloatArray,
+    settings: InteractionSettings,
+    budget: Budget,
+) -> Descent:
+    """Bring the tcp to `pose` (4, 4) from `starts` (P, n), every pair above its threshold (Z,) m.
+
+    Work: one for each sweep of each start over its joints.
+    """
+    return _Descent(pose, scene, threshold, settings).run(starts, budget)
+
+
+class _Descent:
+    def __init__(
+        self, pose: FloatArray, scene: PlanningScene, threshold: FloatArray, settings: InteractionSettings
+    ) -> None:
+        self.pose, self.scene, self.threshold, self.settings = np.array(pose), scene, threshold, settings
+        robot = scene.cell.robot
+        self.low, self.high, self.axis = robot.position_min, robot.position_max, robot.joint_axis
+        self.rejected: Counter[str] = Counter()
+
+    def run(self, starts: FloatArray, budget: Budget) -> Descent:
+        q, found = starts.copy(), [starts[:0]]
+        distance = self.scene.collision.distances(q)
+        psi, stalled = self._psi(q), np.zeros(len(q), dtype=int)
+        blocked = np.full(len(q), -1)  # the pair that last set a start back
+        sweeps = 0
+        while len(q) and sweeps < self.settings.sweeps and not budget.exhausted:
+            budget.spend(len(q))
+            q, distance, blocked = self._sweep(q, distance, blocked)
+            sweeps += 1
+            now = self._psi(q)
+            stalled = np.where((now > (1.0 - _STALLED) * psi) & (blocked >= 0), stalled + 1, 0)
+            psi = now
+            keep = np.ones(len(q), dtype=bool)
+            if sweeps % self.settings.finish_every == 0 or sweeps == self.settings.sweeps:
+                arrived, free = self._finish(q)
+                found.append(free)
+                keep &= ~arrived
+            given_up = keep & (stalled >= _PATIENCE)
+            self._count(blocked[given_up], "set back for good")
+            keep &= ~given_up
+            q, distance, psi = q[keep], distance[keep], psi[keep]
+            stalled, blocked = stalled[keep], blocked[keep]
+        self._count(blocked[blocked >= 0], "not converged, set back")
+        left = int((blocked < 0).sum())
+        if left:
+            self.rejected["not converged"] += left
+        return Descent(np.concatenate(found), sweeps, self.rejected)
+
+    def _sweep(
+        self, q: FloatArray, distance: FloatArray, blocked: NDArray[np.int64]
+    ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+        """One pass over the joints, tool to base: a joint does not move the links before it."""
+        q, blocked = q.copy(), blocked.copy()
+        links = self.scene.chain.link_poses(q)
+        tcp = np.array(self.scene.chain.tcp_poses(q))
+        for i in reversed(range(q.shape[1])):
+            z = links[:, i + 1, :3, :3] @ self.axis[i]
+            o = links[:, i + 1, :3, 3]
+            value = best_value(q[:, i], *self._k(z, o, tcp), float(self.low[i]), float(self.high[i]))
+            before = q[:, i].copy()
+            q, distance, pair = self._stepped(q, i, value, distance)
+            blocked = np.where(pair >= 0, pair, blocked)
+            turn = _rotations(z, q[:, i] - before)
+            tcp[:, :3, 3] = o + (turn @ (tcp[:, :3, 3] - o)[:, :, None])[:, :, 0]
+            tcp[:, :3, :3] = turn @ tcp[:, :3, :3]
+        return q, distance, blocked
+
+    def _k(self, z: FloatArray, o: FloatArray, tcp: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """k1, k2, k3 (P,) of eq. (3), from the moment M = w_p Pt Pc^T + w_o sum ut_j uc_j^T."""
+        current, target = tcp[:, :3, 3] - o, self.pose[:3, 3] - o
+        wo = ROTATION_LENGTH**2 / 2.0
+        M = target[:, :, None] * current[:, None, :] + wo * (
+            self.pose[:3, :3] @ tcp[:, :3, :3].transpose(0, 2, 1)
+        )
+        k1 = ((M @ z[:, :, None])[:, :, 0] * z).sum(axis=1)
+        k2 = np.trace(M, axis1=1, axis2=2)
+        curl = np.stack([M[:, 2, 1] - M[:, 1, 2], M[:, 0, 2] - M[:, 2, 0], M[:, 1, 0] - M[:, 0, 1]], axis=1)
+        return k1, k2, (z * curl).sum(axis=1)
+
+    def _stepped(
+        self, q: FloatArray, i: int, value: FloatArray, before: FloatArray
+    ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+        """Joint i at `value` (P,), or as far as it may; distances (P, Z) there; the pair that set it back, or
+        -1.
+        """
+        old = q[:, i].copy()
+        q[:, i] = value
+        after = self.scene.collision.distances(q)
+        blocked = np.full(len(q), -1)
+        rows = np.flatnonzero(((after <= self.threshold) & (before > self.threshold)).any(axis=1))
+        for attempt in range(self.settings.repairs + 1):
+            start, end = before[rows], after[rows]
+            share = shares_back(start, end, self.threshold, self.settings.set_back, self.settings.overshoot)
+            back = share > 0.0
+            rows, share = rows[back], share[back]
+            if len(rows) == 0:
+                break
+            blocked[rows] = np.argmin(end[back] - self.threshold, axis=1)
+            step = q[rows, i] - old[rows]
+            last = attempt == self.settings.repairs
+            q[rows, i] = old[rows] if last else q[rows, i] - share * step
+            after[rows] = start[back] if last else self.scene.collision.distances(q[rows])
+        return q, after, blocked
+
+    def _finish(self, q: FloatArray) -> tuple[BoolArray, FloatArray]:
+        """Which starts arrive by Newton's steps, and the configurations among them that are free (eq. 6)."""
+        settings = CcdSettings(ROTATION_LENGTH, self.settings.xi, 0, self.settings.newton_steps)
+        end = ccd(self.scene.chain, self.pose, q, self.low, self.high, settings)
+        arrived = np.asarray(end.psi < self.settings.xi)
+        reached = end.q[arrived]
+        if len(reached) == 0:
+            return arrived, reached
+        near = self.scene.collision.min_distance(reached, self.threshold)
+        free = (near.pair < 0) | (near.distance > self.threshold[near.pair])
+        self._count(near.pair[~free], "at the pose")
+        return arrived, reached[free]
+
+    def _psi(self, q: FloatArray) -> FloatArray:
+        """Eq. (2), m^2."""
+        tcp = self.scene.chain.tcp_poses(q)
+        step, turn = tcp[:, :3, 3] - self.pose[:3, 3], tcp[:, :3, :3] - self.pose[:3, :3]
+        wo = ROTATION_LENGTH**2 / 2.0
+        return np.asarray((step**2).sum(axis=1) + wo * (turn**2).sum(axis=(1, 2)))
+
+    def _count(self, pairs: NDArray[np.int64], what: str) -> None:
+        for z, count in zip(*np.unique(pairs, return_counts=True), strict=True):
+            pair = self.scene.collision.pairs[int(z)]
+            self.rejected[f"{what}: {pair.body_a} too near {pair.body_b}"] += int(count)
+
+
+def _rotations(axis: FloatArray, angle: FloatArray) -> FloatArray:
+    """Rotation matrices (P, 3, 3) about unit axes (P, 3)."""
+    K = np.zeros((len(axis), 3, 3))
+    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
+    K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = axis[:, 2], -axis[:, 1], axis[:, 0]
+    sine, versine = np.sin(angle)[:, None, None], (1.0 - np.cos(angle))[:, None, None]
+    return np.asarray(np.eye(3) + sine * K + versine * (K @ K))

@@ -1,0 +1,83 @@
+"""Service movement, stage one: the goal configurations at the interaction point by the paper's search.
+
+p random starts (eq. 1), cyclic coordinate descent with metric distances (eqs. 2 to 5), acceptance and
+rejection (eq. 6). It needs no closed form, so it works for any chain; what it finds is a sample of the
+complete set, made distinct and ranked as that is.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_planner.configurations.ccd_search import descend
+from ir_planner.configurations.inverse_kinematics import Configurations
+from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.request import Budget
+from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
+
+FloatArray = NDArray[np.float64]
+STARTS_MAX = 10_000
+_SIGMAS = 3.0  # mid-range to limit, in standard deviations: sigma is a sixth of the range
+_SAME = 1e-3  # rad: configurations nearer to each other are one
+
+
+def random_starts(
+    low: FloatArray, high: FloatArray, count: int, distribution: str, rng: np.random.Generator
+) -> FloatArray:
+    """Eq. (1): starts (p, n) within [low, high] (n,): truncated normal about mid-range, or uniform."""
+    if distribution == "uniform":
+        return rng.uniform(low, high, (count, len(low)))
+    z = rng.standard_normal((count, len(low)))
+    beyond = np.abs(z) > _SIGMAS
+    while beyond.any():
+        z[beyond] = rng.standard_normal(int(beyond.sum()))
+        beyond = np.abs(z) > _SIGMAS
+    return np.asarray(0.5 * (low + high) + z * (high - low) / (2.0 * _SIGMAS))
+
+
+def searched_configurations(
+    pose: FloatArray,
+    scene: PlanningScene,
+    threshold: FloatArray,
+    near: FloatArray,
+    starts: int,
+    seed: int,
+    settings: InteractionSettings,
+    budget: Budget,
+) -> Configurations:
+    """Free configurations that bring the tcp to `pose` (4, 4), found from `starts` random starts.
+
+    Ranked by W from `near` (n,), then by clearance; `reached` counts the starts that arrived.
+    """
+    robot = scene.cell.robot
+    rng = np.random.default_rng(seed)
+    first = random_starts(robot.position_min, robot.position_max, starts, settings.distribution, rng)
+    limit = threshold - PROOF_TOLERANCE / 2
+    found = descend(pose, first, scene, limit, settings, budget)
+    q = distinct_configurations(found.q)
+    margin = scene.collision.min_distance(q, limit).distance if len(q) else np.zeros(0)
+    order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
+    q = np.ascontiguousarray(q[order])
+    collided = sum(n for reason, n in found.rejected.items() if reason.startswith("at the pose"))
+    return Configurations(q, branches(q, scene), len(found.q) + collided, found.rejected)
+
+
+def distinct_configurations(q: FloatArray) -> FloatArray:
+    """The configurations (K, n) without those that are another one again."""
+    chosen: list[int] = []
+    for k in range(len(q)):
+        if not chosen or np.abs(q[chosen] - q[k]).max(axis=1).min() > _SAME:
+            chosen.append(k)
+    return np.ascontiguousarray(q[chosen])
+
+
+def branches(q: FloatArray, scene: PlanningScene) -> NDArray[np.int64]:
+    """Branch (K,) of configurations (K, n): that of the closed-form solution which is the same."""
+    result = np.zeros(len(q), dtype=np.int64)
+    if len(q) == 0:
+        return result
+    closed = scene.inverse_kinematics.solve(scene.chain.tcp_poses(q))
+    for k in range(len(q)):
+        rows = np.flatnonzero(closed.pose_index == k)
+        if len(rows):
+            result[k] = closed.branch[rows[np.argmin(np.abs(closed.q[rows] - q[k]).max(axis=1))]]
+    return result

@@ -1,0 +1,113 @@
+"""Configurations that reach a pose: the complete closed-form set, filtered by clearance, ranked by cost.
+
+Rank: W of eq. (9) from a given configuration, then clearance. What is dropped is counted by the pair in the
+way.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from ir_kernels.collision import MinDistance
+from ir_msgs_py.stations import IkSolution
+from ir_msgs_py.status import Status, StatusCode
+from numpy.typing import NDArray
+
+from ir_planner.checks import nearest_pair
+from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Configurations:
+    """Free configurations q (K, n), ranked; branch (K,); and why the others were dropped.
+
+    nearest: where none is free, the pair in the way of the one that lacks least ("" where it is not known).
+    """
+
+    q: FloatArray
+    branch: NDArray[np.int64]
+    reached: int
+    rejected: Counter[str]
+    nearest: str = ""
+
+
+def free_configurations(
+    pose: FloatArray, scene: PlanningScene, threshold: FloatArray, near: FloatArray
+) -> Configurations:
+    """All configurations that bring the tcp to `pose` (4, 4) with every pair above its threshold (Z,)."""
+    found = scene.inverse_kinematics.solve(np.asarray(pose)[None])
+    rejected: Counter[str] = Counter()
+    if len(found.q) == 0:
+        return Configurations(found.q, found.branch, 0, rejected)
+    limit = threshold - PROOF_TOLERANCE / 2
+    closest = scene.collision.min_distance(found.q, limit)
+    for k in range(len(found.q)):
+        z = int(closest.pair[k])
+        if z >= 0 and closest.distance[k] <= limit[z]:
+            pair = scene.collision.pairs[z]
+            rejected[f"{pair.body_a} too near {pair.body_b}"] += 1
+    free = np.array([z < 0 or d > limit[z] for z, d in zip(closest.pair, closest.distance, strict=True)])
+    q, branch, margin = found.q[free], found.branch[free], closest.distance[free]
+    order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
+    nearest = "" if len(q) else _least_lacking(scene, closest, threshold)
+    return Configurations(q[order], branch[order], len(found.q), rejected, nearest)
+
+
+def _least_lacking(scene: PlanningScene, closest: MinDistance, threshold: FloatArray) -> str:
+    lacking = threshold[closest.pair] - closest.distance
+    k = int(np.argmin(lacking))
+    pair, kept = scene.collision.pairs[int(closest.pair[k])], float(threshold[closest.pair[k]])
+    return (
+        f"in the best of them {pair.body_a} and {pair.body_b} come to {closest.distance[k] * 1e3:.1f} mm, "
+        f"they must keep more than {kept * 1e3:.1f} mm"
+    )
+
+
+def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configurations, what: str) -> Status:
+    """The status for a pose that no configuration reaches, or none that is free."""
+    x, y, z = (float(v) for v in np.asarray(pose)[:3, 3])
+    place = f"{what} at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+    if found.reached == 0:
+        wrist = scene.chain.base_pose[:3, 3]
+        away = float(np.linalg.norm(np.array([x, y, z]) - wrist))
+        return Status(
+            StatusCode.NO_IK_SOLUTION,
+            f"{place} can't be reached in this orientation within the joint limits "
+            f"(the tcp would be {away:.2f} m from "
+            "the robot's base)",
+        )
+    reasons = ", ".join(f"{reason} ({count})" for reason, count in found.rejected.most_common(4))
+    return Status(
+        StatusCode.GOAL_IN_COLLISION,
+        f"{place}: {found.reached} configurations reach it, none is free: {reasons}"
+        + (f"; {found.nearest}" if found.nearest else ""),
+    )
+
+
+def ranked_solutions(
+    found: Configurations, pose: FloatArray, scene: PlanningScene, threshold: FloatArray, near: FloatArray
+) -> tuple[IkSolution, ...]:
+    """The configurations with errors, branch, turns, clearance and cost from `near` (n,)."""
+    names = scene.cell.robot.joint_names
+    solutions = []
+    for q, branch in zip(found.q, found.branch, strict=True):
+        T = scene.chain.tcp_poses(q[None])[0]
+        R = T[:3, :3].T @ np.asarray(pose)[:3, :3]
+        twist = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+        closest = nearest_pair(scene, q, threshold)
+        solutions.append(
+            IkSolution(
+                joint_names=names,
+                q=q,
+                position_error=float(np.linalg.norm(T[:3, 3] - np.asarray(pose)[:3, 3])),
+                rotation_error=float(np.arctan2(np.linalg.norm(twist), 0.5 * (np.trace(R) - 1.0))),
+                branch=int(branch),
+                turns=tuple(int(turn) for turn in np.ceil((q - np.pi) / (2.0 * np.pi) - 1e-12)),
+                clearance=np.inf if closest is None else closest.distance,
+                movement_cost=float(movement_cost(scene.weights, near, q)),
+                closest=closest,
+            )
+        )
+    return tuple(solutions)

@@ -1,0 +1,18 @@
+"""Curves over time and path: polynomials, cubic splines through points, uniform cubic B-splines."""
+
+from ir_planner.curves.polynomials import Extremes, extremes
+from ir_planner.curves.splines import natural_durations, spline_through, to_ppoly, virtual_knots
+from ir_planner.curves.uniform_spline import UniformSpline, along_motion, along_path, fewest_seconds
+
+__all__ = [
+    "Extremes",
+    "UniformSpline",
+    "along_motion",
+    "along_path",
+    "extremes",
+    "fewest_seconds",
+    "natural_durations",
+    "spline_through",
+    "to_ppoly",
+    "virtual_knots",
+]

@@ -1,0 +1,129 @@
+"""Answers of the core as responses: every field of the message from the value that holds it."""
+
+from typing import Any
+
+import numpy as np
+from ir_msgs_py.ros.conversions import (
+    distance_pair_to_msg,
+    float_array,
+    ik_solution_to_msg,
+    planned_movement_to_msg,
+    planning_info_to_msg,
+    power_mode_to_msg,
+    report_to_msg,
+    service_candidate_to_msg,
+    station_to_msg,
+    status_to_msg,
+    trajectory_to_msg,
+)
+from ir_msgs_py.stations import AllowedContact as ContactValue
+from ir_msgs_py.stations import Station as StationValue
+from ir_msgs_py.status import Status
+
+from ir_description import Cell, Station
+from ir_planner.checks import Evaluation
+from ir_planner.planner import IkAnswer, StateCheck, StoredProgram
+from ir_planner.program import ProgramPlan, Standby
+from ir_planner.regional import MovementPlan
+from ir_planner.service import ServicePlan
+from ir_planner.trajectories import OptimizationPlan
+
+
+def station_value(station: Station) -> StationValue:
+    """A station of the cell in the shared vocabulary."""
+    contacts = tuple(
+        ContactValue(contact.body_a, contact.body_b, contact.safety_distance)
+        for contact in station.allowed_contacts
+    )
+    return StationValue(station.name, station.equipment, station.pose, station.zone.lower(), contacts)
+
+
+def stations_to_msg(cell: Cell) -> list[Any]:
+    """All stations of the cell."""
+    return [station_to_msg(station_value(station)) for station in cell.stations]
+
+
+def fill_status(response: Any, status: Status, source: str) -> Any:
+    """Put the status into a response, with the node's name."""
+    response.status = status_to_msg(Status(status.code, status.message, source))
+    return response
+
+
+def fill_state_check(response: Any, check: StateCheck) -> None:
+    """check_state."""
+    response.valid = check.valid
+    response.min_distance = check.min_distance
+    response.pairs = [distance_pair_to_msg(pair) for pair in check.pairs]
+
+
+def fill_ik(response: Any, answer: IkAnswer) -> None:
+    """compute_ik."""
+    response.solutions = [ik_solution_to_msg(solution) for solution in answer.solutions]
+    response.info = planning_info_to_msg(answer.info)
+
+
+def fill_movement(response: Any, plan: MovementPlan, include_points: bool) -> None:
+    """plan_regional_movement and plan_trajectory; points only where they were asked for."""
+    response.report = report_to_msg(plan.report)
+    response.info = planning_info_to_msg(plan.info)
+    if plan.trajectory is not None:
+        response.trajectory_id = plan.trajectory.trajectory_id
+        if include_points:
+            response.trajectory = trajectory_to_msg(plan.trajectory)
+
+
+def fill_optimization(response: Any, plan: OptimizationPlan, include_points: bool) -> None:
+    """optimize_trajectory: the front's movements are stored, their ids stand in a stage's note."""
+    response.before = report_to_msg(plan.before)
+    response.after = report_to_msg(plan.after)
+    response.pareto_durations = [float(point.report.duration) for point in plan.front]
+    response.pareto_energies = [float(point.report.energy) for point in plan.front]
+    response.info = planning_info_to_msg(plan.info)
+    if plan.trajectory is not None:
+        response.trajectory_id = plan.trajectory.trajectory_id
+        if include_points:
+            response.trajectory = trajectory_to_msg(plan.trajectory)
+
+
+def fill_service(response: Any, plan: ServicePlan, include_points: bool) -> None:
+    """plan_service_movement."""
+    response.candidates = [
+        service_candidate_to_msg(candidate, include_points) for candidate in plan.candidates
+    ]
+    response.info = planning_info_to_msg(plan.info)
+
+
+def fill_program(response: Any, plan: ProgramPlan, include_points: bool) -> None:
+    """plan_program and the result of the plan action."""
+    response.program_id = plan.program_id
+    response.movements = [planned_movement_to_msg(movement, include_points) for movement in plan.movements]
+    response.report = report_to_msg(plan.report)
+    response.info = planning_info_to_msg(plan.info)
+
+
+def fill_stored_program(response: Any, program: StoredProgram, include_points: bool) -> None:
+    """get_program."""
+    response.movements = [planned_movement_to_msg(movement, include_points) for movement in program.movements]
+    response.report = report_to_msg(program.report)
+
+
+def fill_evaluation(response: Any, evaluation: Evaluation) -> None:
+    """evaluate_trajectory: report and both profiles on the times of the clearance profile."""
+    response.report = report_to_msg(evaluation.report)
+    clearance, energy = evaluation.clearance, evaluation.energy
+    response.times = float_array(clearance.times)
+    response.distances = float_array(clearance.distances)
+    watts = np.zeros(len(clearance.times))
+    if len(energy.times):
+        watts = np.interp(clearance.times, energy.times, energy.watts)
+    response.watts = float_array(watts)
+
+
+def fill_standby(response: Any, standby: Standby) -> None:
+    """plan_standby."""
+    response.chosen = power_mode_to_msg(standby.chosen)
+    response.wake_at = standby.wake_at
+    response.energy = standby.energy
+    response.saving = standby.saving
+    response.alternatives = [power_mode_to_msg(mode) for mode in standby.alternatives]
+    response.alternative_energies = [float(energy) for energy in standby.energies]

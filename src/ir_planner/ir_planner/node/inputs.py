@@ -1,0 +1,185 @@
+"""What requests say, as values: states, goals, poses, options, trajectories. Nothing here is planned."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.names import BASE_FRAME
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.ros.conversions import (
+    configuration_from_msg,
+    configuration_given,
+    plan_options_from_msg,
+    stamped_pose_from_msg,
+    stamped_pose_given,
+    trajectory_from_msg,
+    trajectory_given,
+    velocity_from_msg,
+)
+from ir_msgs_py.status import StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_description import Cell
+from ir_planner.errors import RequestError
+from ir_planner.planner import Planner
+from ir_planner.request import Goal, one_goal
+from ir_planner.trajectories import POINTS_MAX, Reference
+
+FloatArray = NDArray[np.float64]
+AT_REST = 0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
+MEASURED = 9  # decimals of rad: finer than any encoder, and less than what counts as movement
+
+
+@dataclass
+class LastState:
+    """The last joint_states, and when it came [s on the node's clock]; written and read by different
+    threads. look: takes what has come since the last look.
+    """
+
+    look: Callable[[], None] = lambda: None
+    q: FloatArray | None = None
+    velocity: FloatArray | None = None
+    came: float = 0.0
+    problem: str = ""
+    _lock: Lock = field(default_factory=Lock)
+
+    def take(self, q: FloatArray, now: float, velocity: FloatArray | None = None) -> None:
+        """A state came; velocity None: it doesn't tell. It is kept to MEASURED decimals: a robot that stands
+        is one start, not a new one with every measurement, so the same request gives the same trajectory.
+        """
+        with self._lock:
+            self.q, self.came = np.round(q, MEASURED) + 0.0, now  # + 0.0: no negative zeros
+            self.velocity = velocity
+
+    def known(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray | None:
+        """The last state (n,) however old, None while there is none.
+
+        Raises RequestError where the joints of these names must stand and one that isn't older than max_age
+        [s] moves.
+        """
+        self.look()
+        with self._lock:
+            q, velocity, age = self.q, self.velocity, now - self.came
+        if joints_at_rest and velocity is not None and age <= max_age:
+            check_at_rest(velocity, joints_at_rest, "the robot is moving", StatusCode.START_STATE_INVALID)
+        return q
+
+    def fresh(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray:
+        """The same where it must not be older: raises RequestError when there is none, or an old one."""
+        q = self.known(now, max_age, joints_at_rest)
+        if q is None:
+            raise RequestError(
+                StatusCode.ROBOT_STATE_STALE, "no joint_states have come yet: give the state in the request"
+            )
+        age = now - self.came
+        if age > max_age:
+            raise RequestError(
+                StatusCode.ROBOT_STATE_STALE,
+                f"the last joint_states came {age:.1f} s ago: it must be at most {max_age:g} s; "
+                "give the state in "
+                "the request",
+            )
+        return q
+
+
+def measured_velocity(msg: Any, joint_names: tuple[str, ...]) -> FloatArray | None:
+    """Velocities (n,) rad/s of joint_states, None where they aren't told: drivers that measure none leave
+    them out or say NaN.
+    """
+    try:
+        return velocity_from_msg(msg, joint_names)
+    except InvalidValueError:
+        return None
+
+
+def check_at_rest(velocity: FloatArray, joint_names: tuple[str, ...], what: str, code: StatusCode) -> None:
+    """Raise RequestError where a joint is faster than AT_REST: velocity (n,) rad/s."""
+    j = int(np.argmax(np.abs(velocity)))
+    if abs(velocity[j]) > AT_REST:
+        raise RequestError(
+            code,
+            f"{what}: {joint_names[j]} has a velocity of {velocity[j]:.4g} rad/s, it must be 0 rad/s within "
+            f"{AT_REST:g}; movements start and end at rest",
+        )
+
+
+def state_of(msg: Any, cell: Cell, code: StatusCode, at_rest: str = "") -> FloatArray | None:
+    """Joint values (n,) rad of a JointState, None where it is empty. Velocities must be finite where there
+    are any, and those of a state that `at_rest` names ("start") about 0; efforts are not looked at.
+    """
+    if not configuration_given(msg) and not msg.velocity:
+        return None
+    names = cell.robot.joint_names
+    try:
+        q, velocity = configuration_from_msg(msg, names), velocity_from_msg(msg, names)
+    except InvalidValueError as error:
+        raise RequestError(code, str(error)) from error
+    if at_rest and velocity is not None:
+        check_at_rest(velocity, names, at_rest, code)
+    return q
+
+
+def pose_of(msg: Any, cell: Cell) -> FloatArray | None:
+    """Pose (4, 4) in the cell of a PoseStamped in the frame "cell" or "base_link", None where it is not
+    given.
+    """
+    if not stamped_pose_given(msg):
+        return None
+    return stamped_pose_from_msg(msg, {BASE_FRAME: cell.base_pose})
+
+
+def goal_of(request: Any, cell: Cell) -> Goal:
+    """Goal of a request in exactly one of its forms: not every request has a goal_state."""
+    forms = tuple(name for name in ("goal", "goal_state", "goal_pose") if hasattr(request, name))
+    configuration = None
+    if "goal_state" in forms:
+        configuration = state_of(request.goal_state, cell, StatusCode.GOAL_STATE_INVALID, "goal_state")
+    return one_goal(request.goal, configuration, pose_of(request.goal_pose, cell), cell, forms)
+
+
+def options_of(msg: Any, draw_seed: Any) -> PlanOptions:
+    """Options of a request; a random seed is drawn here, once, and echoed in the answer."""
+    options = plan_options_from_msg(msg)
+    if options.random_seed:
+        values = {name: getattr(options, name) for name in options.__dataclass_fields__}
+        return PlanOptions(**{**values, "seed": int(draw_seed()), "random_seed": False})
+    return options
+
+
+def trajectory_of(request: Any, planner: Planner) -> JointTrajectory:
+    """Trajectory of a request: by id or by its points."""
+    given = trajectory_given(request.trajectory)
+    if bool(request.trajectory_id) == given:
+        which = "both are" if given else "neither is"
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"exactly one of trajectory_id and trajectory must be given, {which}",
+        )
+    if not given:
+        return planner.trajectories.get(request.trajectory_id)
+    try:
+        return trajectory_from_msg(request.trajectory, planner.cell.robot.joint_names)
+    except InvalidValueError as error:
+        raise RequestError(StatusCode.INVALID_MOTION_PLAN, str(error)) from error
+
+
+def reference_of(msg: Any, cell: Cell) -> Reference:
+    """Points to pass; where all times are zero they are missing."""
+    if len(msg.points) > POINTS_MAX:
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN,
+            f"the reference has {len(msg.points)} points: at most {POINTS_MAX} are taken",
+        )
+    timed = any(p.time_from_start.sec or p.time_from_start.nanosec for p in msg.points)
+    if not timed:
+        for k, point in enumerate(msg.points):
+            point.time_from_start.sec = k
+    try:
+        trajectory = trajectory_from_msg(msg, cell.robot.joint_names)
+    except InvalidValueError as error:
+        raise RequestError(StatusCode.INVALID_MOTION_PLAN, str(error)) from error
+    return Reference(trajectory.positions, trajectory.times if timed else None)

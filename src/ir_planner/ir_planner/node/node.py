@@ -1,0 +1,279 @@
+"""The planner's node: services, the plan action, the cell as markers. It parses, calls the core and replies.
+
+Quick questions, planning and the action have callback groups of their own: a long plan holds up neither
+other services nor its own cancel.
+"""
+
+import random
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point
+from ir_msgs.action import Plan
+from ir_msgs.srv import (
+    CheckState,
+    ComputeIk,
+    EvaluateTrajectory,
+    GetCell,
+    GetProgram,
+    GetTrajectory,
+    OptimizeTrajectory,
+    PlanProgram,
+    PlanRegionalMovement,
+    PlanServiceMovement,
+    PlanStandby,
+    PlanTrajectory,
+    SetCell,
+    SetEquipment,
+)
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.ros.conversions import configuration_from_msg, pose_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.polled import LatestMessage
+from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.status import StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.transitions import TransitionTimes
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+from visualization_msgs.msg import Marker, MarkerArray
+
+from ir_description import DescriptionError
+from ir_kernels import compiled
+from ir_msgs_py import names
+from ir_planner.checks import Shape, cell_shapes, movement_shapes
+from ir_planner.configurations import InteractionSettings
+from ir_planner.node.inputs import LastState, measured_velocity
+from ir_planner.node.parameters import PlannerParameters
+from ir_planner.node.requests import Requests
+from ir_planner.planner import Planner
+from ir_planner.search import GeneticSettings
+from ir_planner.service import ServicePlan, WithdrawalSettings, service_shapes
+from ir_planner.settings import PlannerSettings
+
+_MARKER = {
+    "box": Marker.CUBE,
+    "cylinder": Marker.CYLINDER,
+    "sphere": Marker.SPHERE,
+    "line": Marker.LINE_STRIP,
+    "triangles": Marker.TRIANGLE_LIST,
+    "text": Marker.TEXT_VIEW_FACING,
+}
+_SHOWN = 100  # planned trajectories that late listeners still get
+_THREADS = 4
+
+
+class PlannerNode(Node):
+    """Answers requests about one cell; `make_planner`: another core than the usual one, for tests."""
+
+    def __init__(
+        self,
+        make_planner: Callable[[PlannerSettings, TransitionTimes], Planner] | None = None,
+        context: Context | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(names.PLANNER, context=context, **options)
+        parameters = PlannerParameters(
+            self,
+            self._change_settings,
+            self._change_pauses,
+            self._change_interaction,
+            self._change_withdrawal,
+            self._change_genetic,
+        )
+        make = make_planner or (lambda settings, pauses: Planner(time.monotonic, settings, pauses))
+        self.planner = make(parameters.planner, parameters.pauses)
+        self._change_interaction(parameters.interaction)
+        self._change_withdrawal(parameters.withdrawal)
+        self._change_genetic(parameters.genetic)
+        self._last_state = LastState(look=self._look)
+        self._requests = Requests(
+            self.planner,
+            self._last_state,
+            time.monotonic,
+            self._show_cell,
+            self._show_movement,
+            lambda: random.SystemRandom().getrandbits(64),
+            self.get_logger().error,
+            self._show_service,
+        )
+        latched = QoSProfile(depth=_SHOWN, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._trajectories = self.create_publisher(JointTrajectoryMsg, names.PLANNED_TRAJECTORY, latched)
+        once = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, once)
+        self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+        self._cell_markers: list[Marker] = []
+        self._quick = MutuallyExclusiveCallbackGroup()
+        self._long = MutuallyExclusiveCallbackGroup()
+        self._offer()
+        self._states = LatestMessage(self, JointState, names.JOINT_STATES)
+        self.create_timer(1.0, self._diagnose, callback_group=self._quick)
+        self._load_first_cell(parameters.planner.cell)
+
+    def _offer(self) -> None:
+        """Advertise what works."""
+        ask, quick, long = self._requests, self._quick, self._long
+        for kind, name, handler, group in (
+            (SetCell, names.SET_CELL, ask.set_cell, quick),
+            (GetCell, names.GET_CELL, ask.get_cell, quick),
+            (SetEquipment, names.SET_EQUIPMENT, ask.set_equipment, quick),
+            (CheckState, names.CHECK_STATE, ask.check_state, quick),
+            (ComputeIk, names.COMPUTE_IK, ask.compute_ik, quick),
+            (GetTrajectory, names.GET_TRAJECTORY, ask.get_trajectory, quick),
+            (GetProgram, names.GET_PROGRAM, ask.get_program, quick),
+            (PlanStandby, names.PLAN_STANDBY, ask.plan_standby, quick),
+            (EvaluateTrajectory, names.EVALUATE_TRAJECTORY, ask.evaluate_trajectory, long),
+            (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service, long),
+            (PlanRegionalMovement, names.PLAN_REGIONAL_MOVEMENT, ask.plan_regional, long),
+            (PlanTrajectory, names.PLAN_TRAJECTORY, ask.plan_trajectory, long),
+            (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
+            (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
+        ):
+            self.create_service(kind, name, ask.guarded(handler), callback_group=group)
+        self._action = ActionServer(
+            self,
+            Plan,
+            names.PLAN,
+            self._execute_plan,
+            cancel_callback=lambda goal: CancelResponse.ACCEPT,
+            callback_group=ReentrantCallbackGroup(),
+        )
+
+    def _execute_plan(self, goal: ServerGoalHandle) -> Plan.Result:
+        """plan_program with feedback; a cancel ends it at the next step."""
+
+        def progress(phase: str, done: int, total: int, best_cost: float) -> None:
+            cost = float(best_cost) if np.isfinite(best_cost) else 0.0
+            goal.publish_feedback(Plan.Feedback(phase=phase, done=done, total=total, best_cost=cost))
+
+        ask = self._requests
+        plan = ask.guarded(
+            lambda request, result: ask.plan_program(
+                request, result, progress, lambda: bool(goal.is_cancel_requested)
+            )
+        )
+        result = plan(goal.request, Plan.Result())
+        if result.status.code == StatusCode.SUCCESS:
+            goal.succeed()
+        elif goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.abort()
+        return result
+
+    def _look(self) -> None:
+        """Remember where the robot is; a message about another robot's joints is none."""
+        received = self._states.take() if self.planner.has_cell else None
+        if received is None:
+            return
+        joints = self.planner.cell.robot.joint_names
+        try:
+            q = configuration_from_msg(received.message, joints)
+        except InvalidValueError as error:
+            self._last_state.problem = str(error)
+            return
+        self._last_state.take(q, time.monotonic() - received.age, measured_velocity(received.message, joints))
+
+    def _change_settings(self, settings: PlannerSettings) -> None:
+        self.planner.settings = settings
+
+    def _change_pauses(self, pauses: TransitionTimes) -> None:
+        self.planner.pauses = pauses
+
+    def _change_interaction(self, settings: InteractionSettings) -> None:
+        self.planner.interaction = settings
+
+    def _change_withdrawal(self, settings: WithdrawalSettings) -> None:
+        self.planner.withdrawal = settings
+
+    def _change_genetic(self, settings: GeneticSettings) -> None:
+        self.planner.genetic = settings
+
+    def _load_first_cell(self, cell: str) -> None:
+        if not cell:
+            return
+        try:
+            self.planner.set_cell("", cell)
+        except DescriptionError as error:
+            self.get_logger().error(f"parameter cell: {error}")
+            return
+        self._show_cell()
+
+    def _show_cell(self) -> None:
+        self._cell_markers = [_marker(shape, k) for k, shape in enumerate(cell_shapes(self.planner.cell))]
+        self._publish_markers(())
+
+    def _show_movement(self, trajectory: JointTrajectory) -> None:
+        self._trajectories.publish(trajectory_to_msg(trajectory))
+        self._publish_markers(movement_shapes(trajectory, self.planner.scene()))
+
+    def _show_service(self, station: str, plan: ServicePlan) -> None:
+        for candidate in plan.candidates:
+            if candidate.trajectory is not None:
+                self._trajectories.publish(trajectory_to_msg(candidate.trajectory))
+        self._publish_markers(service_shapes(plan.candidates, station, self.planner.scene()))
+
+    def _publish_markers(self, shapes: Sequence[Shape]) -> None:
+        """Everything in one message: a late listener gets the last one only."""
+        moving = [_marker(shape, k) for k, shape in enumerate(shapes)]
+        self._markers.publish(
+            MarkerArray(markers=[Marker(action=Marker.DELETEALL), *self._cell_markers, *moving])
+        )
+
+    def _diagnose(self) -> None:
+        self._look()
+        cell = self.planner.cell.name if self.planner.has_cell else ""
+        slow = compiled.NAME == "reference"
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.OK if cell and not slow else DiagnosticStatus.WARN,
+            name=names.PLANNER,
+            message="ready" if cell else "no cell is loaded: call set_cell",
+            hardware_id=cell,
+        )
+        if cell and slow:
+            status.message = "ready, but without the compiled core: planning is slow"
+        values = {
+            "cell": cell,
+            "kernels": compiled.NAME,
+            "trajectories": str(len(self.planner.trajectories)),
+            "programs": str(len(self.planner.programs)),
+            "joint_states": self._last_state.problem
+            or ("none" if self._last_state.q is None else "received"),
+        }
+        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def _marker(shape: Shape, number: int) -> Marker:
+    marker = Marker(
+        ns=shape.namespace, id=number, type=_MARKER[shape.kind], action=Marker.ADD, text=shape.text
+    )
+    marker.header.frame_id = names.WORLD_FRAME
+    marker.pose = pose_to_msg(shape.pose)
+    marker.scale.x, marker.scale.y, marker.scale.z = (float(value) for value in shape.size)
+    marker.color.r, marker.color.g, marker.color.b, marker.color.a = shape.colour
+    marker.points = [Point(x=float(x), y=float(y), z=float(z)) for x, y, z in shape.points]
+    return marker
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node until it is stopped."""
+    return run_node(
+        names.PLANNER, PlannerNode, arguments, executor=lambda: MultiThreadedExecutor(num_threads=_THREADS)
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

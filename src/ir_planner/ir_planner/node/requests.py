@@ -1,0 +1,256 @@
+"""One method per service: the request's values go to the planner, its answer into the response.
+
+Whatever makes no sense is answered by its status: the node lives on and its state is unchanged.
+"""
+
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from ir_msgs_py.errors import MsgsError, PoseError
+from ir_msgs_py.names import PLANNER
+from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, robot_urdf
+from ir_kernels import KernelError
+from ir_planner.errors import CancelledError, PlannerError, RequestError
+from ir_planner.node.answers import (
+    fill_evaluation,
+    fill_ik,
+    fill_movement,
+    fill_optimization,
+    fill_program,
+    fill_service,
+    fill_standby,
+    fill_state_check,
+    fill_status,
+    fill_stored_program,
+    stations_to_msg,
+)
+from ir_planner.node.inputs import (
+    LastState,
+    goal_of,
+    options_of,
+    pose_of,
+    reference_of,
+    state_of,
+    trajectory_of,
+)
+from ir_planner.planner import Planner
+from ir_planner.program import ProgramPlan
+from ir_planner.service import ServicePlan
+
+FloatArray = NDArray[np.float64]
+
+
+def refused(error: Exception) -> Status:
+    """The status of a request that an error ended."""
+    if isinstance(error, RequestError):
+        return error.status
+    if isinstance(error, CancelledError):
+        return Status(StatusCode.PREEMPTED, str(error))
+    if isinstance(error, PoseError):
+        return Status(error.code, str(error))
+    if isinstance(error, UnknownNameError):
+        return Status(StatusCode.INVALID_OBJECT_NAME, str(error))
+    if isinstance(error, (DescriptionError, MsgsError)):
+        return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error))
+    if isinstance(error, (PlannerError, KernelError)):
+        return Status(StatusCode.FAILURE, str(error))
+    return Status(StatusCode.FAILURE, f"unexpected {type(error).__name__}: {error}")
+
+
+class Requests:
+    """Handlers of the planner's services.
+
+    now: the node's clock [s]. cell_changed and planned: told after the cell changed or a trajectory was
+    planned; service_planned: the same for the candidates at a station. draw_seed: for random_seed. log:
+    takes what nobody expected.
+    """
+
+    def __init__(
+        self,
+        planner: Planner,
+        last_state: LastState,
+        now: Callable[[], float],
+        cell_changed: Callable[[], None],
+        planned: Callable[[JointTrajectory], None],
+        draw_seed: Callable[[], int],
+        log: Callable[[str], None],
+        service_planned: Callable[[str, ServicePlan], None] = lambda station, plan: None,
+    ) -> None:
+        self.planner, self.last_state, self.now = planner, last_state, now
+        self.cell_changed, self.planned, self.log = cell_changed, planned, log
+        self.draw_seed = draw_seed
+        self.service_planned = service_planned
+
+    def guarded(self, handler: Callable[[Any, Any], Status]) -> Callable[[Any, Any], Any]:
+        """The handler as a service callback: its status goes into the response, whatever happens."""
+
+        def callback(request: Any, response: Any) -> Any:
+            try:
+                status = handler(request, response)
+            except Exception as error:  # one request must not end the node for all others
+                status = refused(error)
+                if status.code == StatusCode.FAILURE:
+                    self.log(traceback.format_exc())
+            return fill_status(response, status, PLANNER)
+
+        return callback
+
+    def set_cell(self, request: Any, response: Any) -> Status:
+        """Another cell."""
+        cell = self.planner.set_cell(request.cell_yaml, request.cell_file)
+        response.cell_name, response.stations = cell.name, stations_to_msg(cell)
+        self.cell_changed()
+        return Status.success()
+
+    def get_cell(self, request: Any, response: Any) -> Status:
+        """The cell as it stands."""
+        cell = self.planner.cell
+        response.cell_yaml, response.stations = cell_to_yaml(cell), stations_to_msg(cell)
+        response.robot_description = robot_urdf(cell.robot, cell.tool, cell.tcp)
+        return Status.success()
+
+    def set_equipment(self, request: Any, response: Any) -> Status:
+        """A machine moved, switched or in another state."""
+        pose = pose_of(request.pose, self.planner.cell)
+        self.planner.set_equipment(request.name, pose, request.enabled, request.state)
+        self.cell_changed()
+        return Status.success()
+
+    def check_state(self, request: Any, response: Any) -> Status:
+        """Is this state free."""
+        q = self._state(request.state, StatusCode.INVALID_ROBOT_STATE)
+        check = self.planner.check_state(
+            q, request.safety_distance, request.max_pairs, request.load, request.station
+        )
+        fill_state_check(response, check)
+        return check.status
+
+    def compute_ik(self, request: Any, response: Any) -> Status:
+        """Configurations that reach a pose."""
+        cell = self.planner.cell
+        near = state_of(request.near, cell, StatusCode.INVALID_ROBOT_STATE)
+        if near is None:
+            near = self._known_or_home()
+        goal = goal_of(request, cell)
+        answer = self.planner.compute_ik(
+            goal, request.method, request.safety_distance, near, request.load, request.starts, request.seed
+        )
+        fill_ik(response, answer)
+        return answer.status
+
+    def plan_regional(self, request: Any, response: Any) -> Status:
+        """From machine to machine."""
+        cell = self.planner.cell
+        options = options_of(request.options, self.draw_seed)
+        goal = goal_of(request, cell)
+        start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
+        plan = self.planner.plan_regional(start, goal, options)
+        return self._movement(plan, response, options.include_points)
+
+    def plan_service(self, request: Any, response: Any) -> Status:
+        """Out of a machine's work area, or into it."""
+        options = options_of(request.options, self.draw_seed)
+        cell = self.planner.cell
+        configuration = state_of(request.configuration, cell, StatusCode.INVALID_ROBOT_STATE)
+        plan = self.planner.plan_service(
+            request.station,
+            request.direction,
+            configuration,
+            self._known_or_home(),
+            request.max_candidates,
+            options,
+        )
+        fill_service(response, plan, options.include_points)
+        if plan.candidates:
+            self.service_planned(request.station, plan)
+        return plan.status
+
+    def plan_trajectory(self, request: Any, response: Any) -> Status:
+        """Through given points."""
+        options = options_of(request.options, self.draw_seed)
+        reference = reference_of(request.reference, self.planner.cell)
+        return self._movement(
+            self.planner.plan_trajectory(reference, options), response, options.include_points
+        )
+
+    def optimize_trajectory(self, request: Any, response: Any) -> Status:
+        """The same end points for less."""
+        options = options_of(request.options, self.draw_seed)
+        plan = self.planner.optimize_trajectory(trajectory_of(request, self.planner), options)
+        fill_optimization(response, plan, options.include_points)
+        if plan.trajectory is not None:
+            self.planned(plan.trajectory)
+        return plan.status
+
+    def _movement(self, plan: Any, response: Any, include_points: bool) -> Status:
+        fill_movement(response, plan, include_points)
+        if plan.trajectory is not None:
+            self.planned(plan.trajectory)
+        status: Status = plan.status
+        return status
+
+    def plan_program(
+        self,
+        request: Any,
+        response: Any,
+        progress: Callable[[str, int, int, float], None] = lambda phase, done, total, cost: None,
+        cancelled: Callable[[], bool] = lambda: False,
+    ) -> Status:
+        """A whole program; also what the action does."""
+        options = options_of(request.options, self.draw_seed)
+        start = self._known_or_home(at_rest=True)
+        plan: ProgramPlan = self.planner.plan_program(
+            tuple(request.stations), request.cycle_time, options, start, progress, cancelled
+        )
+        fill_program(response, plan, options.include_points)
+        for movement in plan.movements:
+            if movement.trajectory is not None:
+                self.planned(movement.trajectory)
+        return plan.status
+
+    def get_program(self, request: Any, response: Any) -> Status:
+        """A program planned before."""
+        fill_stored_program(response, self.planner.programs.get(request.program_id), request.include_points)
+        return Status.success()
+
+    def evaluate_trajectory(self, request: Any, response: Any) -> Status:
+        """What a trajectory costs and where it first breaks a bound."""
+        trajectory = trajectory_of(request, self.planner)
+        evaluation = self.planner.evaluate(trajectory, request.safety_distance, request.load, request.station)
+        fill_evaluation(response, evaluation)
+        return evaluation.verification.status
+
+    def get_trajectory(self, request: Any, response: Any) -> Status:
+        """The points of a trajectory planned before."""
+        response.trajectory = trajectory_to_msg(self.planner.trajectories.get(request.trajectory_id))
+        return Status.success()
+
+    def plan_standby(self, request: Any, response: Any) -> Status:
+        """Where to rest during a pause."""
+        q = state_of(request.state, self.planner.cell, StatusCode.INVALID_ROBOT_STATE)
+        fill_standby(response, self.planner.standby(request.pause, q, request.load))
+        return Status.success()
+
+    def _state(self, msg: Any, code: StatusCode, at_rest: str = "") -> FloatArray:
+        cell = self.planner.cell
+        given = state_of(msg, cell, code, at_rest)
+        if given is not None:
+            return given
+        standing = cell.robot.joint_names if at_rest else ()
+        return self.last_state.fresh(self.now(), self.planner.settings.state_max_age, standing)
+
+    def _known_or_home(self, at_rest: bool = False) -> FloatArray:
+        """The last known state, however old; machine home where no robot has told. at_rest: a robot that
+        moves now is refused.
+        """
+        cell = self.planner.cell
+        standing = cell.robot.joint_names if at_rest else ()
+        q = self.last_state.known(self.now(), self.planner.settings.state_max_age, standing)
+        return np.array(cell.machine_home) if q is None else q

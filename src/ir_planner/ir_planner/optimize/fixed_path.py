@@ -1,0 +1,95 @@
+"""A path p(s) that stays as it is: the places that a trajectory passes, whatever its pace."""
+
+import numpy as np
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from ir_planner.curves import UniformSpline
+
+FloatArray = NDArray[np.float64]
+_PLACES = 2000  # of the path, between which it is interpolated
+_STANDING = 0.001  # share of the mean speed by which places part where the given motion stands
+_APART = 0.3  # of the distance between places: what is nearer to a point of the trajectory is left out
+_SAME = 1e-9  # rad
+_NEAREST = 8  # samples per interval for the deviation
+
+
+class FixedPath:
+    """p(s), s in [0, 1], from the places that a trajectory passes."""
+
+    def __init__(self, given: JointTrajectory, points: FloatArray) -> None:
+        begin, span = float(given.times[0]), given.duration - float(given.times[0])
+        self.duration = span
+        knots = (given.times - begin) / span
+        places = np.linspace(0.0, 1.0, _PLACES)
+        near = np.abs(knots[np.clip(np.searchsorted(knots, places), 1, len(knots) - 1)] - places)
+        near = np.minimum(near, np.abs(knots[np.clip(np.searchsorted(knots, places) - 1, 0, None)] - places))
+        self._share = np.sort(np.concatenate([knots, places[near > _APART / _PLACES]]))
+        motion = given.sample(begin + self._share * span)
+        q = motion.q
+        q[0], q[-1] = given.positions[0], given.positions[-1]
+        speed = np.linalg.norm(motion.qd, axis=1)
+        density = speed + _STANDING * speed.mean()
+        middle = 0.5 * (density[1:] + density[:-1])
+        s = np.concatenate([[0.0], np.cumsum(middle * np.diff(self._share))])
+        self._s = s / s[-1]
+        self.q = q
+        self.at = make_interp_spline(self._s, q, k=3)
+        self.slope = self.at.derivative()
+        self._passed = np.interp(knots[_in_order(given.positions, points)], self._share, self._s)
+
+    def places(self, count: int) -> FloatArray:
+        """s at the inner knots (count - 3,) at the pace that was given."""
+        return np.asarray(np.interp(np.linspace(0.0, 1.0, count + 1)[2:-2], self._share, self._s))
+
+    def finer(self, way: FloatArray) -> FloatArray:
+        """The same pace with a knot more in every interval."""
+        knots = np.concatenate([[0.0], np.arange(2.0, len(way) + 2.0), [len(way) + 3.0]])
+        pace = make_interp_spline(knots, np.concatenate([[0.0], way, [1.0]]), k=3)
+        return np.clip(pace(np.arange(2.0, 2.0 * len(way) + 5.0) / 2.0), 0.0, 1.0)
+
+    def knots_at_points(self, way: FloatArray) -> FloatArray:
+        """Where inner points are passed, in knots from the beginning (M - 2,); places (C,) of the knots."""
+        rising = np.concatenate([[0.0], np.maximum.accumulate(way), [1.0]])
+        knots = np.concatenate([[0.0], np.arange(2.0, len(way) + 2.0), [len(way) + 3.0]])
+        return np.asarray(np.interp(self._passed[1:-1], rising, knots))
+
+    def spline(self, way: FloatArray, duration: float) -> UniformSpline:
+        """The spline that passes p(way) at its inner knots, at rest at both ends."""
+        right = 6.0 * self.at(way)
+        right[0] -= self.q[0]
+        right[-1] -= self.q[-1]
+        inner = cho_solve_banded((knot_factor(len(way)), False), right)
+        ends = (np.repeat(self.q[k][None], 3, axis=0) for k in (0, -1))
+        first, last = ends
+        return UniformSpline(np.concatenate([first, inner, last]), duration / (len(way) + 3))
+
+    def deviation(self, spline: UniformSpline, way: FloatArray) -> float:
+        """Largest distance of the spline from the path [rad]: to the nearest place of two knots around."""
+        q = spline.samples(_NEAREST)[0]
+        s = np.concatenate([[0.0, 0.0], np.maximum.accumulate(np.clip(way, 0.0, 1.0)), [1.0, 1.0]])
+        worst = 0.0
+        for k in range(len(s) - 1):
+            near = self.at(np.linspace(s[max(k - 1, 0)], s[min(k + 2, len(s) - 1)], 16 * _NEAREST))
+            mine = q[k * _NEAREST : (k + 1) * _NEAREST]
+            worst = max(worst, float(np.abs(mine[:, None] - near[None]).max(axis=2).min(axis=1).max()))
+        return worst
+
+
+def knot_factor(count: int) -> FloatArray:
+    """Factor of the matrix that leads from control points to knots, times 6."""
+    bands = np.ones((2, count))
+    bands[1] = 4.0
+    return np.asarray(cholesky_banded(bands))
+
+
+def _in_order(positions: FloatArray, points: FloatArray) -> NDArray[np.int64]:
+    """Indices (M,) at which `points` (M, n) are among `positions` (N, n), each after the one before."""
+    found = [0]
+    for point in points[1:-1]:
+        away = np.abs(positions[found[-1] + 1 :] - point).max(axis=1)
+        here = np.flatnonzero(away < _SAME)
+        found.append(found[-1] + 1 + int(here[0] if len(here) else np.argmin(away)))
+    return np.array([*found, len(positions) - 1])

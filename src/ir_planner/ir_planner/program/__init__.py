@@ -1,0 +1,6 @@
+"""Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
+
+from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.standby import Standby, plan_standby
+
+__all__ = ["ProgramPlan", "ProgramRequest", "Standby", "plan_program", "plan_standby"]

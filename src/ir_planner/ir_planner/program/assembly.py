@@ -1,0 +1,136 @@
+"""The steps of a program as they are sent: movements with what is held, pauses with their power mode."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
+from ir_msgs_py.transitions import TransitionTimes
+from numpy.typing import NDArray
+
+from ir_planner.checks import evaluate_trajectory
+from ir_planner.program.standby import pause_energy, plan_standby
+from ir_planner.program.steps import PlacedStep, Scenes, signal_text
+from ir_planner.scene import PlanningScene
+from ir_planner.timing import TimedMovement, stretched
+
+FloatArray = NDArray[np.float64]
+AUTO = "AUTO"
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """How a stop is reached: its movements with their kind, and the scene in which they run."""
+
+    from_name: str
+    to_name: str
+    scene: PlanningScene
+    movements: tuple[tuple[MovementKind, TimedMovement], ...]
+
+    def slower(self, factor: float, safety_distance: float) -> "Leg":
+        """The same leg with every movement stretched by `factor`, verified again."""
+        return Leg(
+            self.from_name,
+            self.to_name,
+            self.scene,
+            tuple(
+                (kind, self._slower(kind, movement, factor, safety_distance))
+                for kind, movement in self.movements
+            ),
+        )
+
+    def station_of(self, kind: MovementKind) -> str:
+        """The station whose allowed contacts hold in a movement of this kind."""
+        return {MovementKind.SERVICE_EXIT: self.from_name, MovementKind.SERVICE_ENTRY: self.to_name}.get(
+            kind, ""
+        )
+
+    def _slower(
+        self, kind: MovementKind, movement: TimedMovement, factor: float, safety_distance: float
+    ) -> TimedMovement:
+        trajectory = stretched(movement.trajectory, factor)
+        evaluation = evaluate_trajectory(trajectory, self.scene, safety_distance, self.station_of(kind))
+        return TimedMovement(movement.waypoints, trajectory, evaluation, movement.note)
+
+
+def assembled(
+    steps: tuple[PlacedStep, ...],
+    legs: dict[int, Leg],
+    scenes: Scenes,
+    times: TransitionTimes,
+    start: FloatArray,
+) -> tuple[PlannedMovement, ...]:
+    """Movements and pauses in order. `legs`: by the step they belong to. `times`: of the power modes.
+
+    A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
+    """
+    result: list[PlannedMovement] = []
+    here, q = "", start
+    for k, placed in enumerate(steps):
+        step = placed.step
+        waiting = tuple(signal_text(signal) for signal in step.wait_for)
+        setting = tuple(signal_text(signal) for signal in step.set_signals)
+        leg = legs.get(k)
+        moves = [] if leg is None else _moves(leg)
+        if leg is not None:
+            here = leg.to_name
+            q = leg.movements[-1][1].trajectory.positions[-1] if leg.movements else q
+        handling = bool(step.attach or step.detach or setting)
+        if moves:
+            moves[0] = replace(moves[0], wait_for=waiting)
+            moves[-1] = replace(moves[-1], attach=step.attach, detach=step.detach, set_signals=setting)
+        result.extend(moves)
+        if step.dwell > 0.0 or (not moves and (handling or waiting)):
+            late = not moves
+            scene = scenes.of(placed.after if moves else placed.before)
+            pause = _pause(here, step.dwell, step.power_mode, q, scene, times)
+            result.append(
+                replace(
+                    pause,
+                    wait_for=waiting if late else (),
+                    attach=step.attach if late else "",
+                    detach=step.detach if late else "",
+                    set_signals=setting if late else (),
+                )
+            )
+    return tuple(result)
+
+
+def _moves(leg: Leg) -> list[PlannedMovement]:
+    moves = []
+    for kind, movement in leg.movements:
+        station = leg.station_of(kind)
+        moves.append(
+            PlannedMovement(
+                kind=kind,
+                from_station=station or leg.from_name,
+                to_station=station or leg.to_name,
+                trajectory_id=movement.trajectory.trajectory_id,
+                trajectory=movement.trajectory,
+                report=movement.evaluation.report,
+                duration=movement.trajectory.duration,
+                load=leg.scene.load_text,
+            )
+        )
+    return moves
+
+
+def _pause(
+    here: str, duration: float, wish: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+) -> PlannedMovement:
+    mode = wish
+    if duration > 0.0 and wish == AUTO:
+        mode = plan_standby(duration, q, scene, times).chosen.name
+    elif wish == AUTO:
+        mode = ""
+    energy = pause_energy(mode or "STAND_ON_MOTORS", duration, q, scene, times) if duration > 0.0 else 0.0
+    if not np.isfinite(energy):  # asked for by name though it is too short: it is spent coming and going
+        energy = pause_energy("STAND_ON_MOTORS", duration, q, scene, times)
+    return PlannedMovement(
+        kind=MovementKind.PAUSE,
+        from_station=here,
+        to_station=here,
+        duration=duration,
+        power_mode=mode,
+        load=scene.load_text,
+        report=TrajectoryReport(duration=duration, energy=energy, base_energy=energy, certified=True),
+    )

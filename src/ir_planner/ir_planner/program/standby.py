@@ -1,0 +1,108 @@
+"""Which power mode a pause should be spent in, and when to wake: the mode whose energy over it is least.
+
+A mode may be entered when the pause covers going in, the shortest stay and coming out. While going in the
+power is that of the mode that is left (standing on motors), while coming out that of standing on motors as
+well: an assumption of the power data that decides every break-even.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.power import REST_MODES, Mode, PowerMode
+from ir_msgs_py.status import StatusCode
+from ir_msgs_py.transitions import TransitionTimes
+from numpy.typing import NDArray
+
+from ir_planner.checks import holding_watts
+from ir_planner.errors import RequestError
+from ir_planner.scene import PlanningScene
+
+FloatArray = NDArray[np.float64]
+MOTORS = "STAND_ON_MOTORS"
+PAUSE_MAX = 604_800.0  # s: a week
+
+
+@dataclass(frozen=True)
+class Standby:
+    """chosen mode, wake_at [s from the start of the pause], energy over the pause [J], saving against motors.
+
+    alternatives: all modes, shallow to deep, and their energies [J] (inf: the pause is too short).
+    """
+
+    chosen: PowerMode
+    wake_at: float
+    energy: float
+    saving: float
+    alternatives: tuple[PowerMode, ...]
+    energies: tuple[float, ...]
+
+
+def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
+    """Mains power [W] in a mode: controller, tool (its bus share while the drive bus is up), holding
+    torque.
+    """
+    if name == MOTORS:
+        return holding_watts(q, scene)
+    always = sum(load.watts_always for load in scene.loads)
+    bus = sum(load.watts_drive_bus for load in scene.loads) if name == "STAND_ON_BRAKES" else 0.0
+    return scene.power.mode(name).controller_watts + always + bus
+
+
+def pause_energy(
+    name: str, pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+) -> float:
+    """Energy [J] of a pause [s] in a mode, inf when it is too short for it."""
+    change = times.enter(name) + times.leave(name)
+    if pause < change + times.minimum_stay(name):
+        return float("inf")
+    return mode_watts(MOTORS, q, scene) * change + mode_watts(name, q, scene) * (pause - change)
+
+
+def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Standby:
+    """The mode of least energy for a pause [s] at q (n,). Raises RequestError for a pause that is none."""
+    if not (np.isfinite(pause) and 0.0 < pause <= PAUSE_MAX):
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS, f"pause is {pause:g} s: it must be in (0, {PAUSE_MAX:g}] s"
+        )
+    modes = tuple(_mode(name, q, scene, times) for name in REST_MODES)
+    energies = tuple(pause_energy(name, pause, q, scene, times) for name in REST_MODES)
+    k = int(np.argmin(energies))
+    wake_at = pause - times.leave(REST_MODES[k])
+    return Standby(modes[k], wake_at, energies[k], energies[0] - energies[k], modes, energies)
+
+
+def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> PowerMode:
+    data = scene.power.mode(name)
+    motors = mode_watts(MOTORS, q, scene)
+    enter, leave, stay = times.enter(name), times.leave(name), times.minimum_stay(name)
+    return PowerMode(
+        mode=Mode[name],
+        name=name,
+        pe_mode_id=data.pe_mode_id,
+        power=mode_watts(name, q, scene),
+        time_min_pause=enter + leave + stay,
+        time_to_pause=enter,
+        regular_time_to_operate=leave,
+        time_min_length_of_stay=stay,
+        energy_to_pause=motors * enter,
+        energy_to_operate=motors * leave,
+        break_even=break_even(name, q, scene, times),
+    )
+
+
+def break_even(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
+    """Pause [s] from which a mode saves against the next shallower one, both entered from motors; inf:
+    never.
+    """
+    k = REST_MODES.index(name)
+    if k == 0:
+        return 0.0
+    motors = mode_watts(MOTORS, q, scene)
+    shallower, deeper = REST_MODES[k - 1], name
+    watts = [mode_watts(mode, q, scene) for mode in (shallower, deeper)]
+    extra = [
+        (motors - power) * (times.enter(mode) + times.leave(mode))
+        for mode, power in zip((shallower, deeper), watts, strict=True)
+    ]
+    gain = watts[0] - watts[1]
+    return float("inf") if gain <= 0.0 else max((extra[1] - extra[0]) / gain, 0.0)

@@ -1,0 +1,97 @@
+"""A program as its planner sees it: every step with what is held and where the parts lie before and after
+it.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from ir_kernels.power import Regeneration
+from ir_msgs_py.status import StatusCode
+from numpy.typing import NDArray
+
+from ir_description import Cell, InvalidValueError, PartPlaces, PowerData, ProgramStep, Signal
+from ir_description import UnknownNameError as DescriptionNameError
+from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.request import POSTURES
+from ir_planner.scene import PlanningScene, with_parts
+
+FloatArray = NDArray[np.float64]
+STEPS_MAX = 500
+
+
+@dataclass(frozen=True)
+class PlacedStep:
+    """A step with the parts before and after it."""
+
+    step: ProgramStep
+    before: PartPlaces
+    after: PartPlaces
+
+
+@dataclass
+class Scenes:
+    """Scenes of one program by where its parts are; each is built once."""
+
+    cell: Cell
+    power: PowerData
+    regeneration: Regeneration
+    bare: bool = False
+    _built: dict[tuple[str, tuple[tuple[str, str], ...]], PlanningScene] = field(default_factory=dict)
+
+    def of(self, places: PartPlaces) -> PlanningScene:
+        """The scene while the parts are at `places`."""
+        key = (places.held, tuple(sorted(places.lying.items())))
+        if key not in self._built:
+            cell = with_parts(self.cell, places)
+            loads = () if self.bare else cell.loads(places.held)
+            self._built[key] = PlanningScene(cell, loads, self.power, self.regeneration)
+        return self._built[key]
+
+
+def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
+    """The cell's program, or a visit of each of `stations` (stations and postures) in turn.
+
+    Raises UnknownNameError for a station nobody has, RequestError where there is nothing to plan.
+    """
+    if not stations:
+        if not cell.program:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"cell {cell.name} has no program: name the stations to visit",
+            )
+        return cell.program
+    if len(stations) > STEPS_MAX:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"{len(stations)} stations are given: at most {STEPS_MAX} are planned",
+        )
+    known = [station.name for station in cell.stations]
+    for name in stations:
+        if name not in known and name not in POSTURES:
+            raise UnknownNameError("station", name, [*known, *POSTURES])
+    return tuple(ProgramStep("STATION" if name in known else "POSTURE", name) for name in stations)
+
+
+def placed_steps(cell: Cell, steps: tuple[ProgramStep, ...], places: PartPlaces) -> tuple[PlacedStep, ...]:
+    """The steps with the parts before and after each. Raises RequestError for a step that can't be done."""
+    result = []
+    for k, step in enumerate(steps):
+        try:
+            after = places.after(step)
+        except (InvalidValueError, DescriptionNameError) as error:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS, f"step {k} of the program: {error}"
+            ) from error
+        result.append(PlacedStep(step, places, after))
+        places = after
+    return tuple(result)
+
+
+def without_program(cell: Cell) -> Cell:
+    """The cell alone, for scenes in which its parts have moved on."""
+    return replace(cell, program=())
+
+
+def signal_text(signal: Signal) -> str:
+    """A signal as messages carry it: "name", or "name=0" where it is awaited or set to false."""
+    return signal.name if signal.value else f"{signal.name}=0"

@@ -1,0 +1,63 @@
+"""How an answer came about: stages with their seconds, what was rejected and why."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
+from numpy.typing import NDArray
+
+from ir_planner.request.work import Budget
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class Journal:
+    """Kept by one request; the clock is its budget's."""
+
+    budget: Budget
+    seed: int
+    begin: float = 0.0
+    planner_id: str = ""
+    stages: list[PlanningStage] = field(default_factory=list)
+    rejected: Counter[str] = field(default_factory=Counter)
+
+    def __post_init__(self) -> None:
+        self.begin = self.budget.clock()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[list[str]]:
+        """Time a stage; what is appended to the list becomes its note."""
+        notes: list[str] = []
+        begin = self.budget.clock()
+        try:
+            yield notes
+        finally:
+            self.stages.append(PlanningStage(name, self.budget.clock() - begin, "; ".join(notes)))
+
+    def note(self, name: str, text: str) -> None:
+        """A remark without duration."""
+        if text:
+            self.stages.append(PlanningStage(name, 0.0, text))
+
+    def reject(self, reason: str, count: int = 1) -> None:
+        """Count candidates dropped for one reason."""
+        if count:
+            self.rejected[reason] += count
+
+    def info(self, start: FloatArray | None, joint_names: tuple[str, ...]) -> PlanningInfo:
+        """The record as it goes into the answer."""
+        return PlanningInfo(
+            planner_id=self.planner_id,
+            seed=self.seed,
+            start=np.zeros(0) if start is None else start,
+            start_names=() if start is None else joint_names,
+            iterations=self.budget.iterations,
+            truncated=self.budget.truncated,
+            planning_time=self.budget.clock() - self.begin,
+            stages=tuple(self.stages),
+            rejected=tuple(Rejection(reason, count) for reason, count in sorted(self.rejected.items())),
+        )

@@ -1,0 +1,23 @@
+"""What a request plans in: the cell, what the robot holds, their models, bounds of motion, the cost W."""
+
+from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, torque_use
+from ir_planner.scene.movement_cost import movement_cost, path_cost
+from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with, with_parts
+from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_inside
+
+__all__ = [
+    "PROOF_TOLERANCE",
+    "STILL",
+    "Dynamics",
+    "MotionLimits",
+    "PlanningScene",
+    "load_text",
+    "movement_cost",
+    "path_cost",
+    "polynomials_between",
+    "scene_with",
+    "spans_outside",
+    "tcp_inside",
+    "torque_use",
+    "with_parts",
+]

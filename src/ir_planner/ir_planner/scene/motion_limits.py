@@ -1,0 +1,59 @@
+"""Bounds of every joint's motion, and the share of the torque envelope that a motion needs."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+STILL = 1e-9  # rad: nothing moves
+
+
+class Dynamics(Protocol):
+    """What timing needs of ir_kernels.DynamicsModel."""
+
+    def inverse_dynamics(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """Torque (N, n) Nm."""
+
+    def torque_limit(self, qd: FloatArray) -> FloatArray:
+        """Torque (N, n) Nm available."""
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """Bounds per joint (n,): rad/s, rad/s^2, rad/s^3; and the share (0, 1] of the torque envelope to use."""
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    torque_share: float = 0.98
+
+    def scaled(self, velocity: float, acceleration: float) -> "MotionLimits":
+        """Bounds times the request's scalings; acceleration scaling holds for the jerk as well."""
+        return MotionLimits(
+            self.velocity * velocity,
+            self.acceleration * acceleration,
+            self.jerk * acceleration,
+            self.torque_share,
+        )
+
+    def paced(self, pace: float) -> "MotionLimits":
+        """Bounds that leave room: a motion within them keeps the true ones at 1 / pace times its speed; pace
+        in (0, 1].
+        """
+        return MotionLimits(
+            self.velocity * pace,
+            self.acceleration * pace**2,
+            self.jerk * pace**3,
+            self.torque_share * pace**2,
+        )
+
+    def with_torque_share(self, share: float) -> "MotionLimits":
+        """The same bounds with another share of the torque."""
+        return MotionLimits(self.velocity, self.acceleration, self.jerk, share)
+
+
+def torque_use(dynamics: Dynamics, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+    """Share (N, n) of the torque envelope that a motion needs."""
+    return np.abs(dynamics.inverse_dynamics(q, qd, qdd)) / dynamics.torque_limit(qd)

@@ -1,0 +1,186 @@
+"""What one request plans in: the cell as it stands, what the robot holds, and the models of both. Never
+changed.
+
+A request takes its snapshot once; a cell that changes meanwhile does not reach it.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from ir_kernels.power import Regeneration
+from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
+from ir_msgs_py.status import StatusCode
+from numpy.typing import NDArray
+
+from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station, Zone
+from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
+from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.scene.motion_limits import MotionLimits
+from ir_planner.scene.movement_cost import movement_weights
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+PROOF_TOLERANCE = 1e-6  # m: proofs show d > S_m - 1e-6
+RUNNING = "STAND_ON_MOTORS"
+
+
+def load_text(cell: Cell, held: str = "") -> str:
+    """How the load is written: "gripper+part", "gripper", "none"."""
+    names = [load.name for load in cell.loads(held)]
+    return LOAD_SEPARATOR.join(names) or NO_LOAD
+
+
+@dataclass(frozen=True, eq=False)
+class PlanningScene:
+    """cell: its parts lie where they are for this request. loads: what is attached, in the frame of the
+    last link.
+    """
+
+    cell: Cell
+    loads: tuple[Load, ...]
+    power: PowerData
+    regeneration: Regeneration = "shared"
+
+    @property
+    def load_text(self) -> str:
+        """What is attached, as people write it."""
+        return LOAD_SEPARATOR.join(load.name for load in self.loads) or NO_LOAD
+
+    @cached_property
+    def chain(self) -> Chain:
+        """Kinematics up to the tcp."""
+        return Chain(self.cell.robot, self.cell.base_pose, self.cell.tcp)
+
+    @cached_property
+    def dynamics(self) -> DynamicsModel:
+        """Dynamics with the loads."""
+        return DynamicsModel(self.cell.robot, self.loads, self.cell.base_pose)
+
+    @cached_property
+    def collision(self) -> CollisionModel:
+        """All pairs of capsules and bodies, and of capsules among themselves."""
+        robot = self.cell.robot
+        capsules = (*robot.capsules, *(capsule for load in self.loads for capsule in load.capsules))
+        pairs = (
+            *(
+                (c.name, other)
+                for load in self.loads
+                for c in load.capsules
+                for other in robot.load_self_capsules
+            ),
+            *robot.self_pairs,
+        )
+        bodies = self.cell.bodies()
+        there = {*(capsule.name for capsule in capsules), *(body.name for body in bodies)}
+        ignored = tuple(pair for pair in self.cell.ignored_pairs if there.issuperset(pair))
+        return CollisionModel(self.chain, capsules, bodies, pairs, ignored)
+
+    @cached_property
+    def inverse_kinematics(self) -> SphericalWristIk:
+        """Closed form, all branches and turns."""
+        return SphericalWristIk(self.chain, self.cell.robot.position_min, self.cell.robot.position_max)
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Weights (n,) of eq. (9) with the loads."""
+        robot = self.cell.robot
+        return movement_weights(robot.link_mass, robot.velocity_max, sum(load.mass for load in self.loads))
+
+    @property
+    def limits(self) -> MotionLimits:
+        """Bounds of every joint's motion."""
+        robot = self.cell.robot
+        return MotionLimits(robot.velocity_max, robot.acceleration_max, robot.jerk_max)
+
+    @property
+    def base_watts(self) -> float:
+        """Mains power [W] of controller, drives and tool while the motors are on, without the axes."""
+        tool = sum(load.watts_always + load.watts_drive_bus for load in self.loads)
+        return self.power.mode(RUNNING).controller_watts + self.power.drives_and_brake_release + tool
+
+    @property
+    def dc_bus(self) -> DcBusParameters:
+        """What the drives' bus does with braking energy."""
+        return DcBusParameters(self.power.dc_link_capacity_energy, self.regeneration)
+
+    def thresholds(self, safety_distance: float, station: str = "") -> FloatArray:
+        """Distance (Z,) m that each pair must exceed: S_m, or what `station` allows the pair."""
+        result = np.full(len(self.collision.pairs), safety_distance)
+        for contact in self._contacts(station):
+            for z in self._numbers_of(contact):
+                result[z] = min(safety_distance, contact.safety_distance)
+        return result
+
+    def allowed(self, station: str) -> BoolArray:
+        """Which pairs (Z,) have a safety distance of their own at `station`; none for ""."""
+        result = np.zeros(len(self.collision.pairs), dtype=bool)
+        for contact in self._contacts(station):
+            result[self._numbers_of(contact)] = True
+        return result
+
+    @cached_property
+    def _numbers(self) -> dict[frozenset[str], list[int]]:
+        """Numbers of the pairs of two names."""
+        numbers: dict[frozenset[str], list[int]] = {}
+        for z, pair in enumerate(self.collision.pairs):
+            numbers.setdefault(frozenset((pair.body_a, pair.body_b)), []).append(z)
+        return numbers
+
+    def _numbers_of(self, contact: AllowedContact) -> list[int]:
+        return self._numbers.get(frozenset((contact.body_a, contact.body_b)), [])
+
+    def _contacts(self, station: str) -> tuple[AllowedContact, ...]:
+        return self.station(station).allowed_contacts if station else ()
+
+    def zone_of(self, station: str) -> Zone:
+        """The forbidden zone of a station's machine, in the world."""
+        return self.cell.machine(self.station(station).equipment).zone
+
+    def station(self, name: str) -> Station:
+        """The station of that name; UnknownNameError lists the known."""
+        for station in self.cell.stations:
+            if station.name == name:
+                return station
+        raise UnknownNameError("station", name, (station.name for station in self.cell.stations))
+
+
+def with_parts(cell: Cell, parts: PartPlaces) -> Cell:
+    """The cell while a program is under way: parts lie where they are between two steps."""
+    moved = tuple(replace(part, station=parts.lying[part.name]) for part in cell.parts)
+    return replace(cell, parts=moved, program=())
+
+
+def scene_with(
+    cell: Cell, load: str, power: PowerData, regeneration: Regeneration = "shared"
+) -> PlanningScene:
+    """Scene in which `load` ("gripper+part", "none") is attached; a part that is held lies nowhere.
+
+    Raises UnknownNameError (the known loads) or RequestError (two parts at once).
+    """
+    names = [] if load == NO_LOAD else load.split(LOAD_SEPARATOR)
+    tool = {cell.tool.name: cell.tool} if cell.tool is not None else {}
+    held = [name for name in names if name not in tool]
+    _check_load(cell, names, held)
+    parts = tuple(replace(part, station="") if part.name in held else part for part in cell.parts)
+    loads = (
+        *(tool[name] for name in names if name in tool),
+        *(cell.part(name).held(cell.tcp) for name in held),
+    )
+    standing = cell if not held else replace(cell, parts=parts, program=())
+    return PlanningScene(standing, loads, power, regeneration)
+
+
+def _check_load(cell: Cell, names: Iterable[str], held: list[str]) -> None:
+    known = [*((cell.tool.name,) if cell.tool is not None else ()), *(part.name for part in cell.parts)]
+    names = list(names)
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("load", name, [*known, NO_LOAD])
+    if len(held) > 1 or len(set(names)) < len(names):
+        listed = LOAD_SEPARATOR.join(names)
+        raise RequestError(
+            StatusCode.INVALID_OBJECT_NAME,
+            f"load {listed!r}: the robot holds one part at a time, each load once",
+        )

@@ -1,0 +1,73 @@
+"""Where a station's allowed contacts hold: while the tcp is in its machine's zone, or nearer to it than
+S_m.
+
+Outside, every pair keeps S_m. A trajectory is cut where its tcp leaves or enters; the parts outside are
+checked with the plain safety distance.
+"""
+
+import numpy as np
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_planner.scene.planning_scene import PlanningScene
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+_SAMPLES = 400
+_PARTS, _ROUNDS = 32, 6  # 2^30 parts of the time between two samples
+
+
+def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float) -> BoolArray:
+    """Whether the tcp at q (N, n) is in the zone of the station's machine, or within `margin` m of it."""
+    zone = scene.zone_of(station)
+    tcp = scene.chain.tcp_poses(q)[:, :3, 3]
+    local = (tcp - zone.pose[:3, 3]) @ zone.pose[:3, :3]
+    beyond = np.maximum(np.abs(local) - 0.5 * zone.size, 0.0)
+    return np.asarray(np.linalg.norm(beyond, axis=1) <= margin)
+
+
+def spans_outside(
+    trajectory: JointTrajectory, scene: PlanningScene, station: str, margin: float
+) -> list[tuple[float, float]]:
+    """Times [s] between which the tcp is outside, found by sampling and dividing; each a little longer than
+    it is.
+    """
+
+    def inside(times: FloatArray) -> BoolArray:
+        return tcp_inside(trajectory.sample(times).q, scene, station, margin)
+
+    times = np.linspace(trajectory.times[0], trajectory.times[-1], _SAMPLES)
+    flags = inside(times)
+    edges = [float(times[0])] if not flags[0] else []
+    for k in np.flatnonzero(flags[:-1] != flags[1:]):
+        low, high = float(times[k]), float(times[k + 1])
+        for _ in range(_ROUNDS):
+            parts = np.linspace(low, high, _PARTS + 1)
+            changed = int(np.argmax(np.append(inside(parts[1:-1]) != flags[k], True))) + 1
+            low, high = float(parts[changed - 1]), float(parts[changed])
+        edges.append(low if flags[k] else high)
+    if not flags[-1]:
+        edges.append(float(times[-1]))
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def polynomials_between(
+    trajectory: JointTrajectory, begin: float, end: float
+) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (S, n, 6) and durations (S,) of the part of a trajectory between two times [s]."""
+    coefficients, durations = trajectory.coefficients()
+    starts = trajectory.times[:-1]
+    first = np.clip(begin - starts, 0.0, durations)
+    last = np.clip(end - starts, 0.0, durations)
+    kept = np.flatnonzero(last > first)
+    return shifted(coefficients[kept], first[kept]), (last - first)[kept]
+
+
+def shifted(coefficients: FloatArray, by: FloatArray) -> FloatArray:
+    """Coefficients (S, n, 6) of the same polynomials with time counted from `by` (S,) s on."""
+    c = coefficients.copy()
+    top = c.shape[-1] - 1
+    for first in range(top):
+        for k in range(top - 1, first - 1, -1):
+            c[..., k] += by[:, None] * c[..., k + 1]
+    return c

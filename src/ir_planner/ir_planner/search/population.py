@@ -1,0 +1,263 @@
+"""The genetic algorithm that leads round what is in the way: vias in place of a stretch that collides.
+
+An individual is a few via configurations between the two free ends of the stretch. What runs through them is
+the cubic joint spline of eq. (10) (or straight steps), sampled: its fitness is the cost W of eq. (9) plus
+penalties for missing clearance and exceeded limits. Penetration counts with its depth, so the fitness has a
+slope in collision too. A whole generation is evaluated in one batch. The population breeds in islands, which
+keep different ways round apart. Sampling decides the race only: a way leaves as a path of certified steps.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from ir_kernels.collision import FREE, Certificates
+from numpy.typing import NDArray
+
+from ir_planner.checks import FreeSpace
+from ir_planner.curves import spline_through, to_ppoly, virtual_knots
+from ir_planner.scene import movement_cost, path_cost
+from ir_planner.search.genetic_settings import GeneticSettings
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+_SAMPLES_PER_EDGE = 40  # configurations that cost as much as one certified edge
+_BEYOND = 0.25  # crossover reaches this share beyond both parents
+_OWN = 0.5  # vias of one individual mutate together, and by this share on their own
+_LARGEST = 3.0  # rad: no deviation grows beyond
+_FINE = 400  # places on a spline between which its progress is interpolated
+
+
+@dataclass(frozen=True, eq=False)
+class Evolution:
+    """What a population found: certified ways (M_k, n) from a to b, cheapest by W first.
+
+    Where there is none: the individual that came nearest lacks `shortfall` m at `pair` in configuration `q`.
+    """
+
+    ways: list[FloatArray]
+    shortfall: float
+    pair: int
+    q: FloatArray
+    generations: int
+
+
+@dataclass(eq=False)
+class _Individuals:
+    """vias (N, V, n); spread (N,) rad of their mutations; fitness (N,); the clearance that lacks at worst,
+    shortfall (N,) m (negative: free), with sample and pair (N,); excess (N,) rad beyond joint limits.
+    """
+
+    vias: FloatArray
+    spread: FloatArray
+    fitness: FloatArray
+    shortfall: FloatArray
+    excess: FloatArray
+    sample: IntArray
+    pair: IntArray
+
+    def of(self, rows: IntArray) -> "_Individuals":
+        return _Individuals(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+    @staticmethod
+    def joined(a: "_Individuals", b: "_Individuals") -> "_Individuals":
+        return _Individuals(
+            *(np.concatenate([getattr(a, name), getattr(b, name)]) for name in a.__dataclass_fields__)
+        )
+
+
+def evolve(
+    a: FloatArray, b: FloatArray, space: FreeSpace, settings: GeneticSettings, rng: np.random.Generator
+) -> Evolution:
+    """Ways round between the free configurations a and b (n,) within the limits.
+
+    Ends at the settings' generations or with the budget. Raises CancelledError when asked to stop.
+    """
+    return _Breeder(a, b, space, settings, rng).run()
+
+
+def batch_work(configurations: int) -> int:
+    """What checking so many configurations counts in certified edges."""
+    return -(-configurations // _SAMPLES_PER_EDGE)
+
+
+def way_matrix(shape: str, vias: int, samples: int) -> FloatArray:
+    """(samples, vias + 2): configurations of a way from its start, vias and end, even in progress.
+
+    The first row is the start, the last one the end.
+    """
+    times = np.linspace(0.0, 1.0, vias + 2)
+    even = np.linspace(0.0, 1.0, samples)
+    if shape == "polyline":
+        hats = [np.interp(even, times, row) for row in np.eye(vias + 2)]
+        return np.ascontiguousarray(np.array(hats).T)
+    spline = to_ppoly(spline_through(np.eye(vias + 2), times, virtual_knots(times)))
+    u = np.linspace(0.0, 1.0, _FINE)
+    progress = np.maximum.accumulate(spline(u) @ times)  # of points that lie evenly on a line
+    return np.ascontiguousarray(spline(np.interp(even, progress, u)))
+
+
+class _Breeder:
+    def __init__(
+        self,
+        a: FloatArray,
+        b: FloatArray,
+        space: FreeSpace,
+        settings: GeneticSettings,
+        rng: np.random.Generator,
+    ) -> None:
+        self.a, self.b, self.space, self.settings, self.rng = a, b, space, settings, rng
+        self.weights = space.scene.weights
+        self.straight = max(float(movement_cost(self.weights, a, b)), 1e-9)
+        matrix = way_matrix(settings.shape, settings.vias, settings.samples)
+        self.blend = np.ascontiguousarray(matrix[:, 1:-1])  # (S, V)
+        self.fixed = matrix[:, :1] * a + matrix[:, -1:] * b  # (S, n)
+        self.along = np.arange(1, settings.vias + 1)[:, None] / (settings.vias + 1)
+        self.per_island, self.elite = settings.per_island, settings.elite
+        self.found: list[FloatArray] = []
+        self.tried: set[bytes] = set()
+
+    def run(self) -> Evolution:
+        """Breed until the free ways have settled."""
+        s = self.settings
+        people = self._first()
+        generations, since = 1, 0
+        while True:
+            self._collect(people)
+            since += bool(self.found)
+            if since > s.settle or generations >= s.generations or self.space.budget.exhausted:
+                break
+            people = self._next(people)
+            generations += 1
+        lack = np.where(people.shortfall < 0.0, np.inf, people.shortfall)  # free, but no better than others
+        best = int(np.argmin(lack))
+        ways = sorted(self.found, key=lambda way: path_cost(self.weights, way))
+        q = self.samples(people.vias[best : best + 1])[people.sample[best], 0]
+        return Evolution(ways, float(lack[best]), int(people.pair[best]), q, generations)
+
+    def samples(self, vias: FloatArray) -> FloatArray:
+        """(S, N, n): the ways of individuals."""
+        count, v, n = vias.shape
+        mixed = self.blend @ vias.transpose(1, 0, 2).reshape(v, count * n)
+        ways: FloatArray = mixed.reshape(-1, count, n) + self.fixed[:, None, :]
+        return ways
+
+    def evaluated(self, vias: FloatArray, spread: FloatArray) -> _Individuals:
+        """The individuals with their fitness, all in one batch."""
+        q = self.samples(vias)
+        count, n = q.shape[1:]
+        inner = q[1:-1].reshape(-1, n)
+        self.space.budget.spend(batch_work(len(inner)))
+        near = self.space.scene.collision.min_distance(inner, self.space.threshold)
+        lack = np.where(near.pair >= 0, self.space.threshold[near.pair] - near.distance, -np.inf)
+        lack = lack.reshape(-1, count)
+        low, high = self.space.low, self.space.high
+        excess = np.maximum(np.maximum(low - q, q - high), 0.0).sum(axis=(0, 2))
+        cost = (np.abs(np.diff(q, axis=0)) @ self.weights).sum(axis=0) / self.straight
+        worst = np.argmax(lack, axis=0)
+        columns = np.arange(count)
+        fitness = (
+            cost
+            + self.settings.clearance_penalty * np.maximum(lack, 0.0).mean(axis=0)
+            + self.settings.limit_penalty * excess
+        )
+        fitness += (lack[worst, columns] >= 0.0) | (excess > 0.0)
+        return _Individuals(
+            vias,
+            spread,
+            fitness,
+            lack[worst, columns],
+            excess,
+            worst + 1,
+            near.pair.reshape(-1, count)[worst, columns],
+        )
+
+    def _first(self) -> _Individuals:
+        """Random individuals around the straight stretch, the best of each island's."""
+        s, rng, n = self.settings, self.rng, len(self.a)
+        count = s.islands * self.per_island * s.first
+        spread = np.exp(rng.uniform(np.log(s.spread_least), np.log(s.spread_most), (count, 1, 1)))
+        line = self.a + self.along * (self.b - self.a)
+        noise = rng.standard_normal((count, 1, n)) + _OWN * rng.standard_normal((count, s.vias, n))
+        vias = np.clip(line + spread * noise, self.space.low, self.space.high)
+        drawn = self.evaluated(vias, np.full(count, s.mutation))
+        return self._ranked(drawn, s.first * self.per_island)
+
+    def _ranked(self, people: _Individuals, per_island: int) -> _Individuals:
+        """The best of each island, islands one after the other, each sorted by fitness."""
+        order = np.argsort(people.fitness.reshape(-1, per_island), axis=1, kind="stable")
+        rows = order[:, : self.per_island] + per_island * np.arange(len(order))[:, None]
+        return people.of(rows.ravel())
+
+    def _next(self, people: _Individuals) -> _Individuals:
+        """One generation: the elite stays, the rest are children of tournament winners."""
+        s, rng, n = self.settings, self.rng, len(self.a)
+        islands, per, children = s.islands, self.per_island, self.per_island - self.elite
+        base = per * np.arange(islands)[:, None]
+        # islands are sorted by fitness: the lowest of some random places wins a tournament
+        won = rng.integers(0, per, (2, islands, children, s.tournament)).min(axis=3) + base
+        mother, father = won.reshape(2, -1)
+        count = len(mother)
+        vias = people.vias[mother]
+        crossed = rng.random(count) < s.crossover
+        share = rng.uniform(-_BEYOND, 1.0 + _BEYOND, (count, 1, n)) * crossed[:, None, None]
+        child = vias + share * (people.vias[father] - vias)
+        child += self._parting(people, mother) * (rng.random(count) < s.parting)[:, None, None]
+        spread = people.spread[mother] * np.exp(s.adaptation * rng.standard_normal(count))
+        spread = np.clip(spread, s.mutation_least, _LARGEST)
+        noise = rng.standard_normal((count, 1, n)) + _OWN * rng.standard_normal(vias.shape)
+        mutated = rng.random((count, 1, n)) < s.mutated_share
+        child += spread[:, None, None] * noise * mutated
+        child = np.clip(child, self.space.low, self.space.high)
+        stay = (base + np.arange(self.elite)).ravel()
+        both = _Individuals.joined(people.of(stay), self.evaluated(child, spread))
+        island = np.concatenate([stay // per, np.arange(count) // children])
+        return self._ranked(both.of(np.argsort(island, kind="stable")), per)
+
+    def _parting(self, people: _Individuals, rows: IntArray) -> FloatArray:
+        """Steps (N, V, n) that part the pair which lacks most, to first order by one to two times."""
+        vias, sample, pair = people.vias[rows], people.sample[rows], np.maximum(people.pair[rows], 0)
+        blend = self.blend[sample]  # (N, V)
+        q = self.fixed[sample] + (blend[:, None, :] @ vias)[:, 0]
+        gradient = self.space.scene.collision.gradients(q, pair)
+        size = np.maximum((gradient**2).sum(axis=1) * (blend**2).sum(axis=1), 1e-3)
+        lack = np.clip(people.shortfall[rows], 0.0, 1.0) * self.rng.uniform(1.0, 2.0, len(rows))
+        step: FloatArray = (lack / size)[:, None, None] * blend[:, :, None] * gradient[:, None, :]
+        return np.clip(step, -1.0, 1.0)
+
+    def _collect(self, people: _Individuals) -> None:
+        """Certify the best of each island that samples call free."""
+        free = (people.shortfall < 0.0) & (people.excess <= 0.0)
+        for island in range(self.settings.islands):
+            here = np.flatnonzero(free[island * self.per_island : (island + 1) * self.per_island])
+            if len(here) == 0:
+                continue
+            row = island * self.per_island + int(here[0])
+            vias = people.vias[row]
+            key = vias.tobytes()
+            if key in self.tried:
+                continue
+            self.tried.add(key)
+            way = self._way(vias)
+            proof = self.space.certificates(way[:-1], way[1:])
+            if (proof.verdict == FREE).all():
+                self.found.append(way)
+            else:
+                self._correct(people, row, way, proof)
+
+    def _correct(self, people: _Individuals, row: int, way: FloatArray, proof: Certificates) -> None:
+        """An individual that collides between samples is one that collides."""
+        step = int(np.argmax(proof.verdict != FREE))
+        share, pair = float(proof.t1[step]), int(proof.pair[step])
+        q = way[step] + share * (way[step + 1] - way[step])
+        distance = self.space.scene.collision.witnesses(q[None], np.array([pair])).distance[0]
+        lack = max(float(self.space.threshold[pair] - distance), 0.0)
+        last = self.settings.samples - 1
+        people.sample[row] = np.clip(round((step + share) / (len(way) - 1) * last), 1, last - 1)
+        people.pair[row], people.shortfall[row] = pair, lack
+        people.fitness[row] += 1.0 + self.settings.clearance_penalty * lack
+
+    def _way(self, vias: FloatArray) -> FloatArray:
+        if self.settings.shape == "polyline":
+            return np.concatenate([self.a[None], vias, self.b[None]])
+        return np.ascontiguousarray(self.samples(vias[None])[:, 0])

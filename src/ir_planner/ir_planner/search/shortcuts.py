@@ -1,0 +1,95 @@
+"""Shorter ways through the same gap: leave waypoints out, and pull those that stay towards their neighbours.
+
+Everything is tried in batches of certified edges, so a polished path is as free as the one it came from.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_planner.checks import FreeSpace
+from ir_planner.scene import movement_cost, path_cost
+
+FloatArray = NDArray[np.float64]
+_POINTS = 16
+_PULLS = (1.0, 0.6, 0.3, 0.12)
+_ROUNDS = 6
+_CORNER = 0.04  # what a corner costs, as a share of the straight movement's W: it takes time
+
+
+def fewest_corners(
+    path: FloatArray, space: FreeSpace, weights: FloatArray, candidates: int = _POINTS
+) -> FloatArray:
+    """The cheapest path over points of `path` (M, n), `candidates` or as many as it has: all shortcuts
+    certified in one call, then shortest path.
+    """
+    points = densified(path, candidates)
+    count = len(points)
+    first, last = np.triu_indices(count, 1)
+    free = np.full((count, count), False)
+    free[first, last] = space.edges_free(points[first], points[last])
+    free[np.arange(count - 1), np.arange(1, count)] = True  # steps of the path itself
+    corner = _CORNER * float(movement_cost(weights, points[0], points[-1]))
+    cost = np.full(count, np.inf)
+    cost[0] = 0.0
+    came = np.zeros(count, dtype=int)
+    for k in range(1, count):
+        through = np.where(
+            free[:k, k], cost[:k] + movement_cost(weights, points[:k], points[k]) + corner, np.inf
+        )
+        came[k] = int(np.argmin(through))
+        cost[k] = through[came[k]]
+    chosen = [count - 1]
+    while chosen[-1] != 0:
+        chosen.append(int(came[chosen[-1]]))
+    return points[chosen[::-1]]
+
+
+def densified(path: FloatArray, count: int) -> FloatArray:
+    """The path with points added in its longest steps until there are `count`."""
+    points = np.array(path)
+    while len(points) < count:
+        k = int(np.argmax(np.square(np.diff(points, axis=0)).sum(axis=1)))
+        middle = 0.5 * (points[k] + points[k + 1])
+        points = np.concatenate([points[: k + 1], middle[None], points[k + 1 :]])
+    return points
+
+
+def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray:
+    """The path with every inner waypoint moved towards the straight line as far as certified edges allow.
+
+    W of eq. (9) only asks that a joint does not turn back: so each joint is also moved alone into the range
+    of the neighbours.
+    """
+    path = path.copy()
+    for _ in range(_ROUNDS):
+        before = path_cost(weights, path)
+        for k in range(1, len(path) - 1):
+            if space.budget.exhausted:
+                return path
+            path[k] = _best_pull(path[k - 1], path[k], path[k + 1], space, weights)
+        if path_cost(weights, path) > 0.995 * before:
+            break
+    return path
+
+
+def _best_pull(
+    before: FloatArray, via: FloatArray, after: FloatArray, space: FreeSpace, weights: FloatArray
+) -> FloatArray:
+    way = after - before
+    along = float(np.clip((via - before) @ way / max(float(way @ way), 1e-12), 0.05, 0.95))
+    inside = np.clip(via, np.minimum(before, after), np.maximum(before, after))
+    targets = [before + along * way, inside]
+    for joint in range(len(via)):
+        alone = via.copy()
+        alone[joint] = inside[joint]
+        targets.append(alone)
+    trials = np.array([via + share * (target - via) for target in targets for share in _PULLS])
+    cost = movement_cost(weights, before, trials) + movement_cost(weights, trials, after)
+    now = float(movement_cost(weights, before, via) + movement_cost(weights, via, after))
+    trials, cost = trials[cost < now - 1e-9], cost[cost < now - 1e-9]
+    if len(trials) == 0:
+        return via
+    count = len(trials)
+    ends = np.repeat(np.stack([before, after]), count, axis=0)
+    free = space.edges_free(ends, np.concatenate([trials, trials])).reshape(2, count).all(axis=0)
+    return trials[int(np.argmin(np.where(free, cost, np.inf)))] if free.any() else via

@@ -1,0 +1,139 @@
+"""Service movement: out of a station along -x of the tool (exit), or into it the same way (entry).
+
+The straight line of the tcp over the station's approach distance is followed through closed-form
+configurations of one branch, point by point; a joint spline (eq. 10) runs through them. On the way the
+station's allowed contacts hold; the outer end keeps S_m from everything.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.options import PlanOptions
+from numpy.typing import NDArray
+
+from ir_description import Station
+from ir_planner.checks import FreeSpace, evaluate_trajectory
+from ir_planner.errors import TimingError
+from ir_planner.optimize import movement_over
+from ir_planner.request import Budget
+from ir_planner.scene import PlanningScene
+from ir_planner.timing import TimedMovement, best_stretch, stretched, time_spline
+
+FloatArray = NDArray[np.float64]
+SPACING = 0.03  # m between points of the line
+_JUMP = 0.35  # rad: a larger step between neighbours is another branch or a singular wrist
+_TORQUE_SHARES = (0.97, 0.92, 0.85)
+
+
+@dataclass(frozen=True, eq=False)
+class ServiceLine:
+    """Configurations (L, n) from the work configuration to the outer end.
+
+    straight: points of a straight way of the tool; else waypoints of a withdrawal (eq. 7).
+    """
+
+    points: FloatArray
+    straight: bool = True
+
+    @property
+    def work(self) -> FloatArray:
+        """At the station."""
+        first: FloatArray = self.points[0]
+        return first
+
+    @property
+    def outside(self) -> FloatArray:
+        """At the outer end."""
+        last: FloatArray = self.points[-1]
+        return last
+
+
+def retreat_poses(station: Station) -> FloatArray:
+    """Poses (L, 4, 4) of the tcp from the station backwards along its -x; one pose where the approach is 0
+    m.
+    """
+    count = int(np.ceil(station.approach_distance / SPACING)) + 1
+    back = np.linspace(0.0, station.approach_distance, max(count, 1))
+    poses = np.repeat(np.asarray(station.pose)[None], len(back), axis=0)
+    poses[:, :3, 3] -= back[:, None] * np.asarray(station.pose)[:3, 0]
+    return poses
+
+
+def service_lines(
+    work: FloatArray, station: Station, scene: PlanningScene, rejected: Counter[str]
+) -> list[ServiceLine]:
+    """Lines from work configurations (K, n); those that leave the limits or change branch are counted and
+    dropped.
+    """
+    poses = retreat_poses(station)
+    found = scene.inverse_kinematics.solve(poses)
+    lines = []
+    for q in work:
+        points = [q]
+        for k in range(1, len(poses)):
+            candidates = found.of_pose(k)
+            jump = np.abs(candidates - points[-1]).max(axis=1) if len(candidates) else np.array([np.inf])
+            nearest = int(np.argmin(jump))
+            if jump[nearest] > _JUMP:
+                break
+            points.append(candidates[nearest])
+        if len(points) == len(poses):
+            lines.append(ServiceLine(np.array(points)))
+        else:
+            share = len(points) / len(poses)
+            rejected[f"retreat from {station.name} leaves the joint limits after {100 * share:.0f} %"] += 1
+    return lines
+
+
+def lines_free(
+    lines: list[ServiceLine],
+    station: Station,
+    scene: PlanningScene,
+    safety_distance: float,
+    budget: Budget,
+    rejected: Counter[str],
+) -> list[bool]:
+    """Which lines are free: on the way with the station's allowed contacts, at the outer end without."""
+    inside = FreeSpace.of(scene, safety_distance, budget, station.name)
+    outside = FreeSpace.of(scene, safety_distance, budget)
+    on_the_way = inside.paths_free([line.points for line in lines])
+    if not lines:
+        return []
+    ends = outside.states_free(np.array([line.outside for line in lines]))
+    rejected[f"retreat from {station.name} collides"] += int((~on_the_way).sum())
+    rejected[f"outer end at {station.name} is not free"] += int((on_the_way & ~ends).sum())
+    return [bool(way and end) for way, end in zip(on_the_way, ends, strict=True)]
+
+
+def timed_service(
+    line: ServiceLine, entry: bool, station: str, scene: PlanningScene, options: PlanOptions, budget: Budget
+) -> TimedMovement:
+    """The movement along the line, outwards or (entry) inwards, verified with the station's allowed contacts.
+
+    Raises TimingError when a torque does not suffice.
+    """
+    points = line.points[::-1] if entry else line.points
+    if len(points) < 3 or not line.straight:
+        return movement_over(points, scene, options, budget, station)
+    names = scene.cell.robot.joint_names
+    for share in _TORQUE_SHARES:
+        budget.check()
+        limits = scene.limits.scaled(
+            options.velocity_scaling, options.acceleration_scaling
+        ).with_torque_share(share)
+        fastest = time_spline(points, names, limits, scene.dynamics)
+        budget.check()
+        factor = best_stretch(fastest, scene, options.objective, options.time_value)
+        trajectory = stretched(fastest, factor)
+        budget.check()
+        evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
+        violation = evaluation.verification.violation
+        if violation is None:
+            break
+        if violation.what == "clearance":
+            # the spline leaves the certified polyline where points lie far apart: stop at none, but cut less
+            return movement_over(points, scene, options, budget, station)
+    if violation is not None and violation.what != "torque":
+        raise TimingError(violation.sentence, 0)
+    return TimedMovement(np.array(points), trajectory, evaluation)

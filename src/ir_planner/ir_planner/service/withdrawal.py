@@ -1,0 +1,263 @@
+"""Withdrawal from a machine's work area by the modified genetic algorithm of eq. (7): the raw walk.
+
+A population of copies of the work configuration is perturbed, q_i <- q_i + W_i n_i with n_i ~ N(mu_i, sigma).
+What comes nearer than S_m is dropped, with its reason; the rest is ranked by the total metric distance D to
+the machine. The mean grows with D and points where D grew and the tool leaves; the spread shrinks with the
+gain of D, and is 1 rad around a configuration whose offspring all collide, to get round what closes the zone.
+It goes on until D grows for every configuration and the zone is left. Every step is a certified edge.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from ir_kernels.collision import FREE
+from numpy.typing import NDArray
+
+from ir_planner.checks import FreeSpace
+from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.service.step_weights import step_weights
+from ir_planner.service.work_area import WorkArea
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+_DAMPING = 0.02  # of the retreat's least squares; m^2
+_ROTATION_LENGTH = 0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its way
+_SHARPEST = 0.25  # the spread shrinks at most to this share in one generation
+_LARGEST_MEAN = 4.0  # mean steps grow with D up to this factor
+_PER_PARENT = 3  # offspring of one configuration that may survive
+
+
+@dataclass(eq=False)
+class Walk:
+    """What a walk found: paths (M_k, n) from the work configuration to outside, in the order they came.
+
+    best: the configuration farthest out; rejected: dropped candidates by reason.
+    """
+
+    paths: list[FloatArray]
+    best: FloatArray
+    generations: int
+    candidates: int
+    rejected: Counter[str] = field(default_factory=Counter)
+
+
+@dataclass(eq=False)
+class _Population:
+    """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, index of their
+    node.
+    """
+
+    q: FloatArray
+    total: FloatArray
+    sigma: FloatArray
+    step: FloatArray
+    node: IntArray
+
+    def of(self, rows: IntArray) -> "_Population":
+        return _Population(self.q[rows], self.total[rows], self.sigma[rows], self.step[rows], self.node[rows])
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+def withdraw(
+    work: FloatArray,
+    area: WorkArea,
+    inside: FreeSpace,
+    is_out: Callable[[FloatArray], BoolArray],
+    settings: WithdrawalSettings,
+    rng: np.random.Generator,
+    wanted: int,
+) -> Walk:
+    """Walk from `work` (n,), free in `inside`, until `wanted` ways end where `is_out` (N, n) -> (N,) says so.
+
+    Ends at the settings' generations or when the budget is spent.
+    """
+    return _Walker(work, area, inside, is_out, settings, rng).run(wanted)
+
+
+class _Walker:
+    def __init__(
+        self,
+        work: FloatArray,
+        area: WorkArea,
+        inside: FreeSpace,
+        is_out: Callable[[FloatArray], BoolArray],
+        settings: WithdrawalSettings,
+        rng: np.random.Generator,
+    ) -> None:
+        self.area, self.inside, self.is_out = area, inside, is_out
+        self.settings, self.rng = settings, rng
+        scene = inside.scene
+        self.scene = scene
+        self.W = step_weights(
+            scene.cell.robot.link_mass, sum(x.mass for x in scene.loads), settings.weighting
+        )
+        self.nodes: list[FloatArray] = [work]
+        self.parents: list[int] = [0]
+        self.first_total = max(float(area.total_distance(work[None])[0]), 1e-3)
+        self.walk = Walk([], work, 0, 0)
+        self.best_zone = float(area.zone_distance(work[None])[0])
+
+    def run(self, wanted: int) -> Walk:
+        n, count = len(self.nodes[0]), self.settings.population
+        population = _Population(
+            self.nodes[0][None],
+            np.array([self.first_total]),
+            np.array([self.settings.spread]),
+            np.zeros((1, n)),
+            np.zeros(1, dtype=np.int64),
+        )
+        for _ in range(self.settings.generations):
+            if len(population) == 0 or self.inside.budget.exhausted or len(self.walk.paths) >= wanted:
+                break
+            self.walk.generations += 1
+            population = self._next(population, max(self.settings.offspring * count // len(population), 4))
+        return self.walk
+
+    def _next(self, parents: _Population, offspring: int) -> _Population:
+        """One generation: perturb, drop, rank, certify, keep the best."""
+        owner = np.repeat(np.arange(len(parents)), offspring)
+        mean = self._mean(parents)
+        spread = parents.sigma[owner] * 10.0 ** self.rng.uniform(
+            -self.settings.spread_decades, 0.0, len(owner)
+        )
+        noise = spread[:, None] * self.rng.standard_normal((len(owner), parents.q.shape[1]))
+        away = self.rng.random(len(owner))[:, None]  # part of the mean: short steps survive where it is tight
+        q = parents.q[owner] + mean[owner] * away + self.W * noise
+        self.walk.candidates += len(q)
+        q, owner, collided = self._free(q, owner, len(parents))
+        total = self.area.total_distance(q)
+        order = np.argsort(-total, kind="stable")
+        q, owner, total = q[order], owner[order], total[order]
+        chosen = self._certified(parents, q, owner)
+        children = self._children(parents, q[chosen], owner[chosen], total[chosen])
+        survivors = len(children)
+        children = self._finished(children)
+        stuck = np.flatnonzero(collided if survivors else np.ones(len(parents), dtype=bool))
+        if len(stuck):  # all of its offspring collide, or all steps do: look 1 rad around it
+            stay = parents.of(stuck)
+            again = _Population(
+                stay.q,
+                stay.total,
+                np.full(len(stuck), self.settings.collision_spread),
+                stay.step * 0.0,
+                stay.node,
+            )
+            children = _joined(children, again)
+        return children
+
+    def _mean(self, parents: _Population) -> FloatArray:
+        """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
+        counted = self.area.pairs > 0  # a zone without bodies has no D
+        grown = np.clip(
+            parents.total / self.first_total if counted else np.ones(len(parents)), 0.25, _LARGEST_MEAN
+        )
+        out = self._retreat(parents.q) * self.settings.step
+        length = np.linalg.norm(out, axis=1, keepdims=True)
+        last = parents.step
+        size = np.linalg.norm(last, axis=1, keepdims=True)
+        momentum = np.where(size > 1e-9, last / np.maximum(size, 1e-9) * length, out)
+        share = self.rng.uniform(0.0, self.settings.momentum, (len(parents), 1))
+        return np.asarray(grown[:, None] * ((1.0 - share) * out + share * momentum))
+
+    def _retreat(self, q: FloatArray) -> FloatArray:
+        """Joint rates (N, n) per metre of the tool's way along its -x, by damped least squares."""
+        J = self.scene.chain.jacobian(q)
+        J = J * np.array([1.0, 1.0, 1.0, *[_ROTATION_LENGTH] * 3])[:, None]
+        target = np.zeros((len(q), 6))
+        target[:, :3] = -self.scene.chain.tcp_poses(q)[:, :3, 0]
+        normal = J @ J.transpose(0, 2, 1) + _DAMPING**2 * np.eye(6)
+        rate: FloatArray = (J.transpose(0, 2, 1) @ np.linalg.solve(normal, target[:, :, None]))[:, :, 0]
+        return rate
+
+    def _free(self, q: FloatArray, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, BoolArray]:
+        """Candidates within the limits and free; and which parents lost all of theirs to collisions."""
+        low, high = self.inside.low, self.inside.high
+        beyond = (q < low) | (q > high)
+        names = self.scene.cell.robot.joint_names
+        for j, lost in enumerate((beyond & (np.cumsum(beyond, axis=1) == 1)).sum(axis=0)):
+            if lost:
+                self.walk.rejected[f"{names[j]} beyond its limit"] += int(lost)
+        within = ~beyond.any(axis=1)
+        q, owner = q[within], owner[within]
+        if len(q) == 0:
+            return q, owner, np.ones(count, dtype=bool)
+        near = self.scene.collision.min_distance(q, self.inside.threshold)
+        free = (near.pair < 0) | (near.distance > self.inside.threshold[near.pair])
+        self._count_pairs(near.pair[~free], "too near")
+        return q[free], owner[free], ~np.isin(np.arange(count), owner[free])
+
+    def _certified(self, parents: _Population, q: FloatArray, owner: IntArray) -> IntArray:
+        """The best candidates, in rank order, whose step from the parent is proved free."""
+        taken: Counter[int] = Counter()
+        ranked = []
+        for k, parent in enumerate(owner.tolist()):
+            if taken[parent] < max(_PER_PARENT, self.settings.population // len(parents)):
+                taken[parent] += 1
+                ranked.append(k)
+            if len(ranked) == self.settings.population:
+                break
+        rows = np.array(ranked, dtype=np.int64)
+        if len(rows) == 0:
+            return rows
+        self.walk.rejected["outranked: D smaller"] += len(q) - len(rows)
+        found = self.inside.certificates(parents.q[owner[rows]], q[rows])
+        free = found.verdict == FREE
+        self._count_pairs(found.pair[~free], "in between too near")
+        certified: IntArray = rows[free]
+        return certified
+
+    def _children(
+        self, parents: _Population, q: FloatArray, owner: IntArray, total: FloatArray
+    ) -> _Population:
+        """Survivors with their spread: it shrinks in proportion to the gain of D."""
+        gain = (total - parents.total[owner]) / np.maximum(parents.total[owner], 1e-3)
+        shrink = np.clip(1.0 - self.settings.shrink * gain, _SHARPEST, 1.3)
+        sigma = np.clip(
+            parents.sigma[owner] * shrink, self.settings.spread_least, self.settings.collision_spread
+        )
+        node = np.arange(len(self.nodes), len(self.nodes) + len(q))
+        self.nodes.extend(q)
+        self.parents.extend(int(k) for k in parents.node[owner])
+        return _Population(q, total, sigma, q - parents.q[owner], node)
+
+    def _finished(self, children: _Population) -> _Population:
+        """Take those out of the population that have left the zone; they count where D grew."""
+        if len(children) == 0:
+            return children
+        zone = self.area.zone_distance(children.q)
+        far = int(np.argmax(zone))
+        if zone[far] > self.best_zone:
+            self.best_zone, self.walk.best = float(zone[far]), children.q[far]
+        done = self.is_out(children.q)
+        grown = (children.total > self.first_total) | (self.area.pairs == 0)
+        if (done & ~grown).any():
+            self.walk.rejected["outside, but D did not grow"] += int((done & ~grown).sum())
+        for node in children.node[done & grown]:
+            self.walk.paths.append(self._path(int(node)))
+        return children.of(np.flatnonzero(~done))
+
+    def _path(self, node: int) -> FloatArray:
+        path = [node]
+        while path[-1] != 0:
+            path.append(self.parents[path[-1]])
+        return np.array([self.nodes[k] for k in path[::-1]])
+
+    def _count_pairs(self, pairs: IntArray, what: str) -> None:
+        for z, count in zip(*np.unique(pairs[pairs >= 0], return_counts=True), strict=True):
+            pair = self.scene.collision.pairs[int(z)]
+            self.walk.rejected[f"{pair.body_a} {what} {pair.body_b}"] += int(count)
+
+
+def _joined(a: _Population, b: _Population) -> _Population:
+    return _Population(
+        np.concatenate([a.q, b.q]),
+        np.concatenate([a.total, b.total]),
+        np.concatenate([a.sigma, b.sigma]),
+        np.concatenate([a.step, b.step]),
+        np.concatenate([a.node, b.node]),
+    )

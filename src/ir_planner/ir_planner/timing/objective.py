@@ -1,0 +1,103 @@
+"""What a movement is judged by, and the stretch of its duration that serves it best.
+
+movement_cost: W of eq. (9); time: T; energy: E at the mains; time_and_energy: J = E of the drives +
+time_value x T, without the base load of the controller, which is part of what a second is worth.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_planner.checks import movement_energy
+from ir_planner.scene import PlanningScene, path_cost
+from ir_planner.timing.blending import stretched
+
+FloatArray = NDArray[np.float64]
+_FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
+_REFINED = 5
+_COARSE_STEP = 4e-3  # s: energies are compared, not reported
+_MOST_STEPS = 5000  # of a movement that lasts long
+_DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it moves
+_TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
+_BESIDE = 5e-3  # weight of what breaks ties
+
+
+def objective_value(report: TrajectoryReport, objective: str, time_value: float) -> float:
+    """What is minimised; ties between equal W are broken by time."""
+    values = {
+        "movement_cost": report.movement_cost * (1.0 + 1e-6 * report.duration),
+        "time": report.duration,
+        "energy": report.energy,
+        "time_and_energy": report.energy - report.base_energy + time_value * report.duration,
+    }
+    return values[objective]
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveWeights:
+    """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about what a
+    second of movement costs in all.
+    """
+
+    energy: float
+    time: float
+    travel: FloatArray
+    power: float
+
+
+def objective_weights(options: PlanOptions, scene: PlanningScene, path: FloatArray) -> ObjectiveWeights:
+    """The objective as a sum that a descent can follow; with a wished duration only joules are left to
+    choose.
+    """
+    still = np.zeros(len(scene.weights))
+    if options.duration > 0.0 or options.objective == "energy":
+        return ObjectiveWeights(1.0, scene.base_watts, still, _DRIVES_WATTS + scene.base_watts)
+    if options.objective == "time":
+        return ObjectiveWeights(_BESIDE, _TIME_WATTS, still, _TIME_WATTS)
+    if options.objective == "movement_cost":  # in watts for a path of a second
+        travel = scene.weights * (_TIME_WATTS / max(path_cost(scene.weights, path), 1e-9))
+        return ObjectiveWeights(0.0, 10.0 * _BESIDE * _TIME_WATTS, travel, _TIME_WATTS)
+    return ObjectiveWeights(1.0, options.time_value, still, _DRIVES_WATTS + options.time_value)
+
+
+def coarse_step(trajectory: JointTrajectory) -> float:
+    """Seconds between the samples by which movements are compared."""
+    return max(_COARSE_STEP, trajectory.duration / _MOST_STEPS)
+
+
+def pace_value(trajectory: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
+    """J of a trajectory at the pace it has, or its joules where the objective is not J; sampled coarsely."""
+    energy = movement_energy(trajectory, scene, coarse_step(trajectory))
+    if objective == "time_and_energy":
+        return energy.total - energy.base + time_value * trajectory.duration
+    return energy.total
+
+
+def trajectory_value(trajectory: JointTrajectory, scene: PlanningScene, options: PlanOptions) -> float:
+    """What is minimised, for comparing movements: energies and ways are sampled coarsely."""
+    if options.objective == "time":
+        return trajectory.duration
+    if options.objective == "movement_cost":
+        times = np.arange(trajectory.times[0], trajectory.times[-1], coarse_step(trajectory))
+        return path_cost(scene.weights, trajectory.sample(times).q) * (1.0 + 1e-6 * trajectory.duration)
+    return pace_value(trajectory, scene, options.objective, options.time_value)
+
+
+def best_stretch(fastest: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
+    """Factor >= 1 on the duration of the fastest movement that minimises the objective."""
+    if objective in ("time", "movement_cost"):
+        return 1.0
+
+    def cost(factor: float) -> float:
+        return pace_value(stretched(fastest, factor), scene, objective, time_value)
+
+    costs = [cost(float(factor)) for factor in _FACTORS]
+    k = int(np.argmin(costs))
+    around = np.linspace(_FACTORS[max(k - 1, 0)], _FACTORS[min(k + 1, len(_FACTORS) - 1)], _REFINED + 2)[1:-1]
+    refined = [cost(float(factor)) for factor in around]
+    best = int(np.argmin(refined))
+    return float(around[best]) if refined[best] < costs[k] else float(_FACTORS[k])

@@ -1,0 +1,137 @@
+"""Time for a straight movement of all joints (PTP): as fast as speed, acceleration, jerk and torque allow.
+
+All joints follow one law s(t) (synchronous). The limits of the joints bound s'; the torque envelope is not
+a bound of s' alone: it depends on where the arm is and what it carries. So laws of several cruising speeds
+are tried, and for each the acceleration and the braking are raised, by halving, as far as the torque of
+every joint stays within its share of the envelope along the whole law; the shortest wins.
+"""
+
+import numpy as np
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_planner.errors import TimingError
+from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
+from ir_planner.timing.time_law import GRID_S, LawLimits, TimeLaw, law_states, phase_steps
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+_SPEEDS = np.array([1.0, 0.93, 0.86, 0.78, 0.7, 0.6, 0.5, 0.4, 0.28, 0.15])
+_REFINED = np.array([-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045])
+_HALVINGS = 7
+_PER_PHASE = 7
+
+
+def torque_per_segment(trajectory: JointTrajectory, dynamics: Dynamics, samples: int = 9) -> FloatArray:
+    """Largest sampled use of the torque envelope in each segment, (S, n); no proof."""
+    _, durations = trajectory.coefficients()
+    t = (trajectory.times[:-1, None] + durations[:, None] * np.linspace(0.0, 1.0, samples)).ravel()
+    motion = trajectory.sample(t)
+    use = torque_use(dynamics, motion.q, motion.qd, motion.qdd)
+    return np.asarray(use.reshape(len(durations), samples, -1).max(axis=1))
+
+
+def _law_samples(steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """s, sd, sdd (K, 7, P) at P instants of every phase, ends included."""
+    states = law_states(steps)
+    t = (steps * GRID_S)[:, :, None] * np.linspace(0.0, 1.0, _PER_PHASE)
+    j = states.jerk[:, :, None]
+    a0, v0, s0 = (x[:, :7, None] for x in (states.sdd, states.sd, states.s))
+    return s0 + t * (v0 + t * (a0 / 2 + j * t / 6)), v0 + t * (a0 + j * t / 2), a0 + j * t
+
+
+def _torque_of_laws(dynamics: Dynamics, start: FloatArray, delta: FloatArray, steps: IntArray) -> FloatArray:
+    """Largest use of torque (K, 2, n): while speeding up and cruising, and while braking."""
+    s, sd, sdd = _law_samples(steps)
+    shape = (*s.shape, len(start))
+    flat = [x.reshape(-1, 1) * delta for x in (s, sd, sdd)]
+    use = torque_use(dynamics, start + flat[0], flat[1], flat[2]).reshape(shape)
+    return np.stack([use[:, :4].max(axis=(1, 2)), use[:, 4:].max(axis=(1, 2))], axis=1)
+
+
+def path_limits(delta: FloatArray, limits: MotionLimits) -> tuple[float, float, float]:
+    """Bounds of s' [1/s], s'' and s''' for the movement by `delta` (n,)."""
+    size = np.maximum(np.abs(delta), 1e-300)
+    return tuple(float(np.min(bound / size)) for bound in (limits.velocity, limits.acceleration, limits.jerk))  # type: ignore[return-value]
+
+
+def free_law(bounds: tuple[float, float, float]) -> TimeLaw:
+    """The fastest law within bounds of the speed of s and its derivatives alone, whatever the torque."""
+    v, a, j = (np.array([bound]) for bound in bounds)
+    return TimeLaw(tuple(int(k) for k in phase_steps(LawLimits(v, a, a, j))[0]))
+
+
+def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics: Dynamics) -> TimeLaw:
+    """Law of the shortest synchronous movement from `start` to `goal` (n,).
+
+    Raises TimingError when some joint's torque does not suffice however slowly.
+    """
+    delta = np.asarray(goal) - np.asarray(start)
+    if np.max(np.abs(delta)) < STILL:
+        return TimeLaw((1, 0, 1, 0, 1, 0, 1))
+    v, a, j = path_limits(delta, limits)
+    free = free_law((v, a, j))
+    use = _torque_of_laws(dynamics, start, delta, np.array([free.steps]))
+    if use.max() <= limits.torque_share:
+        return free
+    top = float(law_states(np.array([free.steps])).sd[0, 3])
+    slower: FloatArray = top * 0.5 ** np.arange(3.0, 9.0)
+    best = _best_law(start, delta, top * _SPEEDS, (a, j), limits.torque_share, dynamics)
+    if best is None:
+        best = _best_law(start, delta, slower, (a, j), limits.torque_share, dynamics)
+    if best is None:
+        joint = int(np.argmax(use[0].max(axis=0)))
+        raise TimingError(
+            f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full speed and "
+            "too much at 1/256 of it as well: the load is too heavy for this movement",
+            joint,
+        )
+    return _refined(best, start, delta, (a, j), limits.torque_share, dynamics)
+
+
+def _refined(
+    best: TimeLaw,
+    start: FloatArray,
+    delta: FloatArray,
+    aj: tuple[float, float],
+    share: float,
+    dynamics: Dynamics,
+) -> TimeLaw:
+    speed = float(law_states(np.array([best.steps])).sd[0, 3])
+    better = _best_law(start, delta, speed * (1.0 + _REFINED), aj, share, dynamics)
+    return better if better is not None and better.total < best.total else best
+
+
+def _limits(speed: FloatArray, acceleration: FloatArray, braking: FloatArray, jerk: float) -> LawLimits:
+    return LawLimits(speed, acceleration, braking, np.full(len(speed), jerk))
+
+
+def _best_law(
+    start: FloatArray,
+    delta: FloatArray,
+    speeds: FloatArray,
+    aj: tuple[float, float],
+    share: float,
+    dynamics: Dynamics,
+) -> TimeLaw | None:
+    """Shortest law over cruising `speeds` (K,) whose torque stays within `share`; None when there is none."""
+    a, jerk = aj
+    count = len(speeds)
+    low, high = np.full((count, 2), 0.01 * a), np.full((count, 2), a)
+    trial = high
+    for k in range(_HALVINGS + 1):
+        steps = phase_steps(_limits(speeds, trial[:, 0], trial[:, 1], jerk))
+        fits = _torque_of_laws(dynamics, start, delta, steps).max(axis=2) <= share
+        low, high = np.where(fits, trial, low), np.where(fits & (k > 0), high, np.where(fits, a, trial))
+        trial = 0.5 * (low + high)
+    steps = phase_steps(_limits(speeds, low[:, 0], low[:, 1], jerk))
+    for _ in range(4):
+        fits_whole = _torque_of_laws(dynamics, start, delta, steps).max(axis=(1, 2)) <= share
+        if fits_whole.any():
+            totals = np.where(fits_whole, steps.sum(axis=1), np.iinfo(np.int64).max)
+            return TimeLaw(tuple(int(k) for k in steps[int(np.argmin(totals))]))
+        low = 0.85 * low
+        steps = phase_steps(_limits(speeds, low[:, 0], low[:, 1], jerk))
+    return None

@@ -1,0 +1,89 @@
+"""Time for the spline of eq. (10) through given points: interval by interval, until nothing exceeds its
+limit.
+
+The first guess runs every interval at the speed limit of its fastest joint. Then each interval is
+lengthened or shortened by how much of the limits it uses, and at last all of them together until the
+largest use is 1. Durations are whole grid steps (even, the virtual knots halve the first and the last).
+"""
+
+from typing import Any
+
+import numpy as np
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_planner.curves import extremes, natural_durations, spline_through, virtual_knots
+from ir_planner.errors import TimingError
+from ir_planner.scene import Dynamics, MotionLimits
+from ir_planner.timing.ptp import torque_per_segment
+from ir_planner.timing.time_law import GRID_NS, GRID_S
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+_ROUNDS = 14
+_STRETCHES = 12
+_SHORTEST = 20  # grid steps of an interval
+
+
+def time_spline(
+    points: FloatArray,
+    joint_names: tuple[str, ...],
+    limits: MotionLimits,
+    dynamics: Dynamics,
+    given: FloatArray | None = None,
+) -> JointTrajectory:
+    """Trajectory through `points` (M, n), M >= 3, within the limits; neighbouring points differ.
+
+    `given` (M-1,) s: wished durations; their proportions are kept, and all are stretched where limits ask
+    for it. Raises TimingError when a joint's torque does not suffice however slowly.
+    """
+    if given is None:
+        steps = _even(1.5 * natural_durations(points, limits.velocity))
+        for _ in range(_ROUNDS):
+            use = _interval_use(_spline(points, steps, joint_names), len(points), limits, dynamics)
+            steps = _even(steps * GRID_S * np.clip(use, 0.6, 1.7) ** 0.6)
+    else:
+        steps = _even(given)
+    for _ in range(_STRETCHES):
+        trajectory = _spline(points, steps, joint_names)
+        use = _interval_use(trajectory, len(points), limits, dynamics)
+        worst = float(use.max())
+        if worst <= 1.0:
+            return trajectory
+        steps = _even(steps * GRID_S * max(worst, 1.002))
+    joint = int(np.argmax(torque_per_segment(trajectory, dynamics).max(axis=0)))
+    raise TimingError(f"joint {joint + 1}: its torque does not carry the load along these points", joint)
+
+
+def _even(seconds: NDArray[np.floating[Any]]) -> IntArray:
+    half = np.ceil(np.asarray(seconds) / (2 * GRID_S) - 1e-9).astype(np.int64)
+    return np.maximum(2 * half, _SHORTEST)
+
+
+def _spline(points: FloatArray, steps: IntArray, joint_names: tuple[str, ...]) -> JointTrajectory:
+    at = np.concatenate([[0], np.cumsum(steps)])
+    knots = np.rint(virtual_knots(at)).astype(np.int64)
+    spline = spline_through(points, np.asarray(at * GRID_S), np.asarray(knots * GRID_S))
+    return JointTrajectory(
+        joint_names, knots * GRID_NS, spline.positions, spline.velocities, spline.accelerations
+    )
+
+
+def _interval_use(
+    trajectory: JointTrajectory, points: int, limits: MotionLimits, dynamics: Dynamics
+) -> FloatArray:
+    """By what factor each of the M-1 intervals should be longer: above 1 where a limit is exceeded."""
+    largest = extremes(*trajectory.coefficients())
+    use = np.maximum.reduce(
+        [
+            (largest.velocity / limits.velocity).max(axis=1),
+            np.sqrt((largest.acceleration / limits.acceleration).max(axis=1)),
+            np.cbrt((largest.jerk / limits.jerk).max(axis=1)),
+            np.sqrt(torque_per_segment(trajectory, dynamics).max(axis=1) / limits.torque_share),
+        ]
+    )
+    # segments to intervals: the first and the last interval have two segments each
+    interval = np.clip(np.arange(len(use)) - 1, 0, points - 2)
+    result = np.zeros(points - 1)
+    np.maximum.at(result, interval, use)
+    return result

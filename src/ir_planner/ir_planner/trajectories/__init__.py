@@ -1,0 +1,6 @@
+"""Trajectories through given points, and given trajectories made cheaper."""
+
+from ir_planner.trajectories.optimization import OptimizationPlan, optimize_trajectory
+from ir_planner.trajectories.through_points import POINTS_MAX, Reference, plan_through
+
+__all__ = ["POINTS_MAX", "OptimizationPlan", "Reference", "optimize_trajectory", "plan_through"]

@@ -1,0 +1,225 @@
+"""A trajectory that came from anywhere becomes cheaper between the same end points, and is proved.
+
+Its path is fitted by uniform splines (at its own pace, at an even one, and with corners left out), which
+descend for the objective; the best that is certified is the answer, unless the original is and costs less. A
+path that hits something is pushed out of it by the same descent; where that fails, ways round are searched.
+The trade of time for energy comes with the answer.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import PlanningInfo, TrajectoryReport
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from numpy.typing import NDArray
+
+from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
+from ir_planner.curves import UniformSpline
+from ir_planner.errors import RequestError
+from ir_planner.optimize import Descents, Measured, Task, at_even_distances, path_of
+from ir_planner.regional import search_regional
+from ir_planner.request import DURATION_MAX, Budget, Journal, bounded, within_limits
+from ir_planner.scene import STILL, PlanningScene
+from ir_planner.search import fewest_corners
+from ir_planner.timing import stretched
+from ir_planner.trajectories.pareto import pareto_front, thinned
+
+FloatArray = NDArray[np.float64]
+POINTS_MAX = 10_000
+_CORNERS = 22
+_AT_STATION = 1e-3  # m, and of the axes: a tcp that near is at the station
+_SAME_DURATION = 1e-6  # s
+
+
+@dataclass(frozen=True, eq=False)
+class OptimizationPlan:
+    """The answer: reports before and after; trajectory None unless the status is SUCCESS; front: certified
+    movements from the fastest to the one of least energy.
+    """
+
+    status: Status
+    info: PlanningInfo
+    before: TrajectoryReport
+    after: TrajectoryReport
+    trajectory: JointTrajectory | None = None
+    front: tuple[Measured, ...] = ()
+
+
+def optimize_trajectory(
+    original: JointTrajectory, scene: PlanningScene, options: PlanOptions, budget: Budget
+) -> OptimizationPlan:
+    """Improve a trajectory from rest to rest for the objective.
+
+    Raises RequestError for a trajectory that can't be taken and for a duration that is too short,
+    CancelledError when asked to stop.
+    """
+    _check(original, scene)
+    return _Optimization(original, scene, options, budget).run()
+
+
+def _check(original: JointTrajectory, scene: PlanningScene) -> None:
+    count = len(original.times_ns)
+    if not 2 <= count <= POINTS_MAX:
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN,
+            f"the trajectory has {count} point{'' if count == 1 else 's'}: 2 to {POINTS_MAX} are taken",
+        )
+    bounded(original.duration, 0.0, DURATION_MAX, "time of the last point", "s")
+    within_limits(original.positions[0], scene.cell, "the first point", StatusCode.START_STATE_INVALID)
+    within_limits(original.positions[-1], scene.cell, "the last point", StatusCode.GOAL_STATE_INVALID)
+    if original.velocities is None:  # straight between its points: a path with times
+        return
+    for speeds, verb in ((original.velocities[0], "starts"), (original.velocities[-1], "ends")):
+        j = int(np.argmax(np.abs(speeds)))
+        if abs(speeds[j]) > AT_REST:
+            raise RequestError(
+                StatusCode.INVALID_MOTION_PLAN,
+                f"the trajectory {verb} with velocity {speeds[j]:.4g} rad/s of {original.joint_names[j]}: "
+                f"it must lead from rest to rest (0 rad/s within {AT_REST:g})",
+            )
+
+
+class _Optimization:
+    """One request: the original, and what came of it."""
+
+    def __init__(
+        self, original: JointTrajectory, scene: PlanningScene, options: PlanOptions, budget: Budget
+    ) -> None:
+        self.scene, self.options = scene, options
+        self.path = path_of(original, scene)
+        self.journal = Journal(budget, options.seed, planner_id="descent")
+        self.task = Task(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
+        self.space = FreeSpace.of(scene, options.safety_distance, budget, self.task.station)
+        self.descents = Descents(self.task)
+        if self.task.station:
+            self.journal.note("station", f"allowed contacts of {self.task.station} hold in its zone")
+        with self.journal.stage("before") as notes:
+            self.original = self.task.measured(original)
+            violation = self.original.evaluation.verification.violation
+            self.wrong = "" if violation is None else violation.sentence
+            notes.append(self.wrong or "certified")
+
+    def run(self) -> OptimizationPlan:
+        """Improve, trade time for energy, and compare with the original."""
+        start, goal = self.path[0], self.path[-1]
+        blocked = end_in_collision(start, goal, self.space, self.options.safety_distance)
+        if blocked is not None:
+            return self._answer(blocked)
+        if np.abs(goal - start).max() < STILL:
+            return self._standing()
+        known = [self.original] if self._within_options(self.original) else []
+        found = self._descended()
+        if found is None and not self._fits(known):
+            status, found = self._round()
+            if found is None:
+                return self._answer(status)
+        known += [found] if found is not None else []
+        with self.journal.stage("pareto front") as notes:
+            first = sorted(known, key=lambda movement: movement is not found)
+            front = pareto_front(first, self.task)
+            shown = thinned(front)
+            notes.append("; ".join(_point(movement) for movement in shown))
+        best = min(self._fits([*known, *front]), key=self.descents.value)
+        if best is self.original:
+            what = "energy" if self.options.duration > 0.0 else self.options.objective
+            self.journal.note("result", f"the original is kept: nothing better by {what} was found")
+        return self._answer(Status.success(), best, shown)
+
+    def _descended(self) -> Measured | None:
+        """The best certified movement near the original."""
+        with self.journal.stage("descent") as notes:
+            found = self.descents.improved(self.original.trajectory, self._shortcut())
+            notes.append("certified" if found else "nothing certified")
+            if found is None and self.options.duration > 0.0:
+                found = self._slowed()
+                notes.append("the fastest one, slowed" if found else "nor is the fastest one")
+        return found
+
+    def _slowed(self) -> Measured | None:
+        """The fastest movement near the original, slowed to the wished duration.
+
+        Raises RequestError where it is longer already.
+        """
+        wished = self.options.duration
+        descents = Descents(self.task.asking("time"))
+        fastest = descents.improved(self.original.trajectory, self._shortcut())
+        if fastest is None:
+            return None
+        if fastest.report.duration > wished:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"duration is {wished:g} s: the shortest within the limits near the trajectory is "
+                f"{fastest.report.duration:.4g} s",
+            )
+        slowed = stretched(fastest.trajectory, wished / fastest.report.duration)
+        movement = self.task.measured(slowed)
+        return movement if movement.certified else None
+
+    def _shortcut(self) -> list[UniformSpline]:
+        """A start along the path with corners left out; none where its straight steps aren't free."""
+        corners = at_even_distances(self.path, _CORNERS)
+        if not self.space.edges_free(corners[:-1], corners[1:]).all():
+            return []
+        return [self.descents.start_along(fewest_corners(corners, self.space, self.scene.weights))]
+
+    def _round(self) -> tuple[Status, Measured | None]:
+        """A new movement between the same end points."""
+        self.journal.note("repair", "no descent from the original was certified: ways round are searched")
+        self.journal.planner_id = ""
+        start, goal = self.path[0], self.path[-1]
+        status, found = search_regional(start, goal, self.scene, self.options, self.journal)
+        if found is None:
+            why = f"the original can't be repaired ({self.wrong})" if self.wrong else "nothing was certified"
+            return Status(status.code, f"{why}; {status.message}"), None
+        self.journal.note("result", "not the original's way but a new one between its end points")
+        return status, Measured(found.trajectory, found.evaluation)
+
+    def _within_options(self, movement: Measured) -> bool:
+        """Whether a movement is certified and within the scalings."""
+        options, report = self.options, movement.report
+        return bool(
+            report.certified
+            and (report.velocity_ratio <= options.velocity_scaling + SLACK).all()
+            and (report.acceleration_ratio <= options.acceleration_scaling + SLACK).all()
+            and (report.jerk_ratio <= options.acceleration_scaling + SLACK).all()
+        )
+
+    def _fits(self, movements: list[Measured]) -> list[Measured]:
+        """Those that last as long as wished."""
+        wished = self.options.duration
+        return [m for m in movements if wished == 0.0 or abs(m.report.duration - wished) < _SAME_DURATION]
+
+    def _standing(self) -> OptimizationPlan:
+        """The end points are the same."""
+        moves = np.abs(np.diff(self.path, axis=0)).max() >= STILL
+        if moves or not self.original.certified:
+            why = "a loop would shrink to nothing: give its parts" if moves else self.wrong
+            raise RequestError(StatusCode.INVALID_MOTION_PLAN, f"the trajectory ends where it starts: {why}")
+        self.journal.note("result", "the original is kept: it stands still")
+        return self._answer(Status.success(), self.original)
+
+    def _answer(
+        self, status: Status, best: Measured | None = None, front: tuple[Measured, ...] = ()
+    ) -> OptimizationPlan:
+        info = self.journal.info(self.path[0], self.scene.cell.robot.joint_names)
+        before = self.original.report
+        if best is None:
+            return OptimizationPlan(status, info, before, TrajectoryReport())
+        return OptimizationPlan(status, info, before, best.report, best.trajectory, front)
+
+
+def _station_at(ends: FloatArray, scene: PlanningScene) -> str:
+    """The station with allowed contacts at whose pose the tcp is at one of the ends (2, n); "" for none."""
+    poses = scene.chain.tcp_poses(ends)
+    for station in scene.cell.stations:
+        if station.allowed_contacts and np.abs(poses - station.pose).max(axis=(1, 2)).min() < _AT_STATION:
+            return station.name
+    return ""
+
+
+def _point(movement: Measured) -> str:
+    return (
+        f"{movement.report.duration:.3f} s {movement.report.energy:.0f} J {movement.trajectory.trajectory_id}"
+    )
