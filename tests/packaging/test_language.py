@@ -47,7 +47,7 @@ WORDS = (
     Word("hopeless", "infeasible"),
     Word("tells?|telling|told", "state; report; notify", (r"\w+\.tell\(\)",)),  # a file's position
     Word("rooms?", "margin; package"),
-    Word("prove it", "test it"),
+    Word("then prove it", "run the tests"),
 )
 
 SUFFIXES = {".py", ".cpp", ".hpp", ".js", ".html", ".css", ".sh", ".md", ".yaml", ".msg", ".srv", ".action"}
@@ -67,8 +67,10 @@ PENDING: tuple[str, ...] = (
     "src/ir_kernels",
     "benchmarks",
     "tools",
-    "docs",
-    "examples",
+    "docs/cell_format.md",
+    "docs/driver.md",
+    "docs/notation.md",
+    "docs/recording.md",
 )
 
 GAP = r"[\s#/*_-]+"  # between two words: also the end of a commented line, or an underscore
@@ -85,6 +87,12 @@ def compiled(word: Word) -> re.Pattern[str]:
 
 
 PATTERNS = tuple((word, compiled(word)) for word in WORDS)
+
+
+def prose(path: Path) -> str:
+    """Text of a file; names in `backticks` of a page are left to the files that hold them."""
+    text = path.read_text("utf-8")
+    return re.sub(r"`[^`\n]+`|\]\([^)\s]+\)", "``", text) if path.suffix == ".md" else text
 
 
 def unwanted(text: str) -> Iterator[str]:
@@ -105,15 +113,13 @@ def sources() -> list[Path]:
 
 
 def is_pending(path: Path) -> bool:
-    return path.relative_to(ROOT).as_posix().startswith(tuple(f"{folder}/" for folder in PENDING))
+    return path.relative_to(ROOT).as_posix().startswith(PENDING)
 
 
 def test_only_words_of_the_field_are_used() -> None:
     read = [path for path in sources() if not is_pending(path)]
     assert len(read) > 50, "too few files: nothing was checked"
-    found = [
-        f"{path.relative_to(ROOT)}:{each}" for path in read for each in unwanted(path.read_text("utf-8"))
-    ]
+    found = [f"{path.relative_to(ROOT)}:{each}" for path in read for each in unwanted(prose(path))]
     assert not found, "\n".join(found)
 
 
