@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import re
 from collections.abc import Iterator
@@ -165,3 +166,24 @@ def test_a_name_that_does_not_exist_is_noticed() -> None:
     assert exists("ir_kernels")
     assert not exists("ir_kernels.no_such_module.f")
     assert not exists("ir_kernels.ccd.no_such_function")
+
+
+def rooms_of(package: str) -> dict[str, str]:
+    """First line of every sub-package and module of a package."""
+    folder = ROOT / "src" / package / package
+    files = (*folder.glob("*.py"), *folder.glob("*/__init__.py"))
+    named = {(path.parent.name if path.parent != folder else path.stem): path for path in files}
+    named.pop("__init__")
+    return {
+        name: (ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").splitlines()[0]
+        for name, path in named.items()
+    }
+
+
+def test_the_architecture_shows_every_room_with_its_first_line() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    sections = re.findall(r"^## Inside `(\w+)`\n(.*?)(?=^## |\Z)", page, re.DOTALL | re.MULTILINE)
+    assert sections
+    for package, section in sections:
+        shown = dict(re.findall(r"^\| `(\w+)` \| (.+?) \|", section, re.MULTILINE))
+        assert shown == rooms_of(package), package

@@ -46,7 +46,7 @@ WORDS = (
     Word("guilty", "violating"),
     Word("hopeless", "infeasible"),
     Word("tells?|telling|told", "state; report; notify", (r"\w+\.tell\(\)",)),  # a file's position
-    Word("rooms?", "margin; package"),
+    Word("room(?!s)", "margin", ("(a|each|every|one|another) room", "room (of|imports|knows)")),
     Word("then prove it", "run the tests"),
 )
 
