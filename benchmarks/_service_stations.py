@@ -13,7 +13,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.inverse_kinematics import free_configurations
 from ir_planner.configurations.settings import InteractionSettings
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.service_movement import ServiceRequest, plan_service
 from ir_planner.service.settings import WithdrawalSettings
@@ -99,8 +99,8 @@ def measured(scene: PlanningScene, station: Station, seeds: int) -> StationFigur
     margin = margin_at(scene, station)
     threshold, park = scene.thresholds(margin, station.name), np.array(scene.cell.park)
 
-    def budget() -> Budget:
-        return Budget(60_000, time.monotonic() + 30.0, time.monotonic)
+    def budget() -> Work:
+        return Work(60_000, time.monotonic() + 30.0, time.monotonic)
 
     def closed() -> Any:
         q = scene.inverse_kinematics.solve(station.pose[None]).q
@@ -125,7 +125,7 @@ def measured(scene: PlanningScene, station: Station, seeds: int) -> StationFigur
         for weighting in walks:
             problem = Exit.of(free.q[0], scene, station, margin, budget())
             walk = withdraw(
-                problem.work,
+                problem.interaction,
                 problem.area,
                 problem.inside,
                 problem.is_out,

@@ -22,7 +22,7 @@ import numpy as np
 from _regional_figures import Claim, at_least, at_most
 from _regional_tasks import CELLS, Task, tasks_of
 from ir_planner.checks.free_space import FreeSpace
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.search.correction import Correction, corrected
 from ir_planner.search.genetic_settings import GeneticSettings
@@ -60,7 +60,7 @@ class Search:
 
 def space_of(task: Task) -> FreeSpace:
     """Free space of a task with a budget of its own."""
-    budget = Budget(EDGES, time.perf_counter() + 60.0, time.perf_counter)
+    budget = Work(EDGES, time.perf_counter() + 60.0, time.perf_counter)
     return FreeSpace.of(task.scene, task.margin, budget)
 
 
@@ -81,7 +81,7 @@ def searched(task: Task, settings: GeneticSettings, seed: int) -> Search:
     """One seed."""
     _, first_ms, _ = timed(task, replace(settings, settle=0, ways=1), seed)
     found, all_ms, space = timed(task, settings, seed)
-    work, weights = space.budget.iterations, task.scene.weights
+    work, weights = space.work.iterations, task.scene.weights
     if not found.ways:
         return Search(False, first_ms, all_ms, 0, np.nan, np.nan, work)
     straight = float(movement_cost(weights, task.start, task.goal))

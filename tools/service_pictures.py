@@ -19,7 +19,7 @@ import numpy as np
 from ir_msgs_py.options import PlanOptions
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.settings import InteractionSettings
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
 from ir_planner.service.settings import WithdrawalSettings
@@ -57,8 +57,8 @@ def draw(cell_name: str, station_name: str, path: Path) -> None:
     station = scene.station(station_name)
     park = np.array(cell.park)
 
-    def budget() -> Budget:
-        return Budget(60_000, time.monotonic() + 60.0, time.monotonic)
+    def budget() -> Work:
+        return Work(60_000, time.monotonic() + 60.0, time.monotonic)
 
     threshold = scene.thresholds(S_M, station_name)
     goals = searched_configurations(
@@ -66,7 +66,7 @@ def draw(cell_name: str, station_name: str, path: Path) -> None:
     )
     problem = Exit.of(goals.q[0], scene, station, S_M, budget())
     walk = withdraw(
-        problem.work,
+        problem.interaction,
         problem.area,
         problem.inside,
         problem.is_out,

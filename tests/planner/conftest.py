@@ -11,7 +11,7 @@ import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 
 from ir_description import Cell, PowerData, load_cell, load_power_data
@@ -45,8 +45,8 @@ def scene_of(power: PowerData) -> Callable[[str], PlanningScene]:
 
 
 @pytest.fixture
-def budget() -> Budget:
-    return Budget(60_000, time.monotonic() + 60.0, time.monotonic)
+def budget() -> Work:
+    return Work(60_000, time.monotonic() + 60.0, time.monotonic)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from ir_kernels.power import REGENERATIONS
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import holding_watts, movement_energy
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import standing, stretched
 from ir_planner.timing.movement import timed_movement
@@ -22,7 +22,7 @@ Degrees = Callable[..., Any]
 
 
 @pytest.fixture
-def fast(demo_scene: PlanningScene, degrees: Degrees, budget: Budget) -> JointTrajectory:
+def fast(demo_scene: PlanningScene, degrees: Degrees, budget: Work) -> JointTrajectory:
     path = np.stack([degrees(0, -50, 60, 0, 0, 0), degrees(80, -110, 120, 0, 30, 0)])
     return timed_movement(path, demo_scene, PlanOptions(objective="time"), budget).trajectory
 
@@ -62,7 +62,7 @@ def test_holding_at_machine_home_is_table_2(demo_scene: PlanningScene) -> None:
 
 
 def test_lowering_a_load_gives_energy_back_on_the_bus(
-    demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+    demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     path = np.stack([degrees(0, -90, 60, 0, 0, 0), degrees(0, -40, 60, 0, 0, 0)])
     slow = timed_movement(path, demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget).trajectory

@@ -18,7 +18,7 @@ from ir_planner.checks.free_space import FreeSpace
 from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
 from ir_planner.errors import CancelledError
 from ir_planner.regional.regional import plan_regional
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
 from ir_planner.search.correction import colliding_stretch, corrected, different
@@ -40,11 +40,11 @@ TASKS = [
 ]
 
 
-def a_budget(edges: int = 10**9, cancelled: Callable[[], bool] = lambda: False) -> Budget:
-    return Budget(edges, time.monotonic() + 600.0, time.monotonic, cancelled)
+def a_budget(edges: int = 10**9, cancelled: Callable[[], bool] = lambda: False) -> Work:
+    return Work(edges, time.monotonic() + 600.0, time.monotonic, cancelled)
 
 
-def space_of(scene: PlanningScene, budget: Budget | None = None) -> FreeSpace:
+def space_of(scene: PlanningScene, budget: Work | None = None) -> FreeSpace:
     return FreeSpace.of(scene, S_M, budget or a_budget())
 
 
@@ -287,7 +287,7 @@ equipment:
 """
 
 
-def caged(budget: Budget, degrees: Any, options: PlanOptions) -> Any:
+def caged(budget: Work, degrees: Any, options: PlanOptions) -> Any:
     cell = cell_from_yaml(CAGE)
     scene = scene_with(cell, load_text(cell), load_power_data())
     home, across = degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0)

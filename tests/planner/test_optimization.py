@@ -19,7 +19,7 @@ from ir_planner.checks.energy import movement_energy
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.optimize.descents import Descents
 from ir_planner.planner import Planner
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.trajectories.optimization import POINTS_MAX, OptimizationPlan, optimize_trajectory
 from ir_planner.trajectories.pareto import non_dominated
@@ -35,8 +35,8 @@ OPTIONS = PlanOptions(planning_time=600.0, max_iterations=4000)  # a main descen
 ROUNDING = 1e-6  # s
 
 
-def budget(options: PlanOptions, cancelled: Callable[[], bool] = lambda: False) -> Budget:
-    return Budget(options.max_iterations or 400_000, time.monotonic() + 600.0, time.monotonic, cancelled)
+def budget(options: PlanOptions, cancelled: Callable[[], bool] = lambda: False) -> Work:
+    return Work(options.max_iterations or 400_000, time.monotonic() + 600.0, time.monotonic, cancelled)
 
 
 def optimized(
@@ -338,7 +338,7 @@ def test_little_work_is_a_smaller_answer_and_no_time_a_truncated_one(
     assert little.info.iterations < full.info.iterations
     assert not little.info.truncated
     assert little.after.certified
-    late = Budget(400_000, time.monotonic() - 1.0, time.monotonic)
+    late = Work(400_000, time.monotonic() - 1.0, time.monotonic)
     cut = optimize_trajectory(detour, scene, OPTIONS, late)
     assert cut.info.truncated
     assert cut.after.certified

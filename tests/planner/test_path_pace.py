@@ -18,7 +18,7 @@ from ir_planner.optimize.fixed_path import FixedPath
 from ir_planner.optimize.passing import Passing
 from ir_planner.optimize.path_timing import Paced, _Descent, along_its_path
 from ir_planner.regional.regional import MovementPlan
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import stretched
 from ir_planner.timing.spline_timing import time_spline
@@ -29,8 +29,8 @@ FloatArray = NDArray[np.float64]
 TIME = PlanOptions(objective="time", planning_time=600.0)
 
 
-def budget(cancelled: Callable[[], bool] = lambda: False, work: int = 400_000) -> Budget:
-    return Budget(work, time.monotonic() + 600.0, time.monotonic, cancelled)
+def budget(cancelled: Callable[[], bool] = lambda: False, work: int = 400_000) -> Work:
+    return Work(work, time.monotonic() + 600.0, time.monotonic, cancelled)
 
 
 @pytest.fixture(scope="module")

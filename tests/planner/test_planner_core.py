@@ -17,7 +17,7 @@ from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.planner import Planner
 from ir_planner.request.bounds import PLANNING_TIME_MAX
 from ir_planner.request.goals import Goal, parse_goal
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import scene_with, with_parts
 from ir_planner.service.service_lines import retreat_poses, service_lines
 from ir_planner.store import Store
@@ -162,7 +162,7 @@ def test_the_bound_of_an_allowed_contact_is_its_own(planner: Planner) -> None:
     closer = np.array(station.pose)
     closer[:3, 3] += closer[:3, 0] * 0.0045  # towards the spindle: 0.5 mm are left where 1 mm must be
     q = scene.inverse_kinematics.solve(closer[None]).q
-    space = FreeSpace.of(scene, 0.02, Budget(1, 1.0, lambda: 0.0), "lathe_work")
+    space = FreeSpace.of(scene, 0.02, Work(1, 1.0, lambda: 0.0), "lathe_work")
     told = [too_near(at, space, "start", 0.02) for at in q if not space.states_free(at[None])[0]]
     own = [text for text in told if contact.body_a in text and contact.body_b in text]
     assert own

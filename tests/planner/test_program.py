@@ -14,7 +14,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 
 from ir_description import Cell, PowerData, load_cell
 
@@ -30,7 +30,7 @@ def planned(
     request = ProgramRequest(
         cell, power, stations, np.array(cell.machine_home), PlanOptions(**choices), cycle_time
     )
-    return plan_program(request, Budget(100_000, time.monotonic() + 60.0, time.monotonic), no_progress)
+    return plan_program(request, Work(100_000, time.monotonic() + 60.0, time.monotonic), no_progress)
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,7 @@ def test_progress_tells_the_cost_of_the_chain_to_the_end(demo_cell: Cell, power:
     )
     plan_program(
         request,
-        Budget(100_000, time.monotonic() + 60.0, time.monotonic),
+        Work(100_000, time.monotonic() + 60.0, time.monotonic),
         lambda phase, done, total, cost: told.setdefault(phase, []).append(cost),
     )
     assert told["movements"] == pytest.approx([told["station graph"][-1]] * len(told["movements"]))
@@ -162,7 +162,7 @@ def test_an_unknown_station_lists_the_known(demo_cell: Cell, power: PowerData) -
 def test_progress_is_told_and_a_cancel_stops(demo_cell: Cell, power: PowerData) -> None:
     heard: list[str] = []
     request = ProgramRequest(demo_cell, power, (), np.array(demo_cell.machine_home), PlanOptions())
-    budget = Budget(100_000, time.monotonic() + 60.0, time.monotonic, lambda: "movements" in heard)
+    budget = Work(100_000, time.monotonic() + 60.0, time.monotonic, lambda: "movements" in heard)
     with pytest.raises(CancelledError):
         plan_program(request, budget, lambda phase, done, total, cost: heard.append(phase))
     assert heard.index("configurations") < heard.index("station graph") < heard.index("movements")

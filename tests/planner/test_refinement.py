@@ -15,7 +15,7 @@ from ir_planner.curves.uniform_spline import UniformSpline, along_path
 from ir_planner.errors import RequestError
 from ir_planner.optimize.refinement import Refinement, movement_over
 from ir_planner.regional.regional import plan_regional
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.service.service_movement import ServiceRequest, plan_service
 from ir_planner.service.settings import WithdrawalSettings
@@ -28,8 +28,8 @@ SceneOf = Callable[[str], PlanningScene]
 FloatArray = NDArray[np.float64]
 
 
-def unhurried() -> Budget:
-    return Budget(400_000, time.monotonic() + 60.0, time.monotonic)
+def unhurried() -> Work:
+    return Work(400_000, time.monotonic() + 60.0, time.monotonic)
 
 
 def random_spline(count: int = 9, interval: float = 0.07) -> UniformSpline:

@@ -13,7 +13,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import CancelledError
 from ir_planner.regional.regional import plan_regional
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
 
 from ir_description import cell_from_yaml, load_cell, load_power_data
@@ -35,7 +35,7 @@ def clearance_along(trajectory: Any, scene: PlanningScene, step: float = 5e-4) -
 
 @pytest.mark.parametrize(("cell", "task", "flip"), TASKS)
 def test_every_task_of_the_open_cells_is_solved_and_certified(
-    cell: str, task: str, flip: bool, scene_of: SceneOf, budget: Budget, options: PlanOptions
+    cell: str, task: str, flip: bool, scene_of: SceneOf, budget: Work, options: PlanOptions
 ) -> None:
     scene = scene_of(cell)
     asked = scene.cell.task(task)
@@ -53,7 +53,7 @@ def test_every_task_of_the_open_cells_is_solved_and_certified(
 
 @pytest.mark.parametrize(("cell", "task"), [("cnc_door", "cnc->pal"), ("deep_box", "bin->pal")])
 def test_trees_find_the_way_out_where_detours_do_not(
-    cell: str, task: str, scene_of: SceneOf, budget: Budget, options: PlanOptions
+    cell: str, task: str, scene_of: SceneOf, budget: Work, options: PlanOptions
 ) -> None:
     scene = scene_of(cell)
     asked = scene.cell.task(task)
@@ -67,7 +67,7 @@ def test_trees_find_the_way_out_where_detours_do_not(
 
 
 def test_a_tunnel_is_left_the_way_the_tool_points(
-    scene_of: SceneOf, budget: Budget, options: PlanOptions
+    scene_of: SceneOf, budget: Work, options: PlanOptions
 ) -> None:
     scene = scene_of("deep_box")
     asked = scene.cell.task("tun->bin")
@@ -87,7 +87,7 @@ def test_the_same_request_gives_the_same_bytes_and_the_seed_is_echoed(
     task = scene.cell.task("p1->p2")
 
     def plan(seed: int) -> Any:
-        budget = Budget(60_000, time.monotonic() + 60.0, time.monotonic)
+        budget = Work(60_000, time.monotonic() + 60.0, time.monotonic)
         fresh = scene_with(scene.cell, scene.load_text, scene.power)
         return plan_regional(
             np.array(task.start), np.array(task.goal), fresh, replace(options, seed=seed), budget
@@ -108,7 +108,7 @@ def test_an_end_in_collision_is_named_with_pair_and_depth(
     code: StatusCode,
     demo_scene: PlanningScene,
     degrees: Any,
-    budget: Budget,
+    budget: Work,
     options: PlanOptions,
 ) -> None:
     home, inside = np.array(demo_scene.cell.machine_home), degrees(0, -20, 60, 0, 0, 0)
@@ -143,7 +143,7 @@ def test_where_no_way_leads_the_pair_the_place_and_what_was_tried_are_named(
 ) -> None:
     cell = cell_from_yaml(CAGE)
     scene = scene_with(cell, load_text(cell), load_power_data())
-    budget = Budget(2000, time.monotonic() + 60.0, time.monotonic)
+    budget = Work(2000, time.monotonic() + 60.0, time.monotonic)
     home, across = degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0)
     plan = plan_regional(home, across, scene, options, budget)
     assert plan.status.code == StatusCode.PLANNING_FAILED
@@ -157,7 +157,7 @@ def test_a_blocked_way_says_what_was_tried(demo_scene: PlanningScene, options: P
     cell = load_cell("open")
     scene = scene_with(cell, load_text(cell), demo_scene.power)
     task = cell.task("p1->p2")
-    budget = Budget(60_000, time.monotonic() + 60.0, time.monotonic)
+    budget = Work(60_000, time.monotonic() + 60.0, time.monotonic)
     plan = plan_regional(
         np.array(task.start), np.array(task.goal), scene, replace(options, planner_id="direct"), budget
     )
@@ -170,7 +170,7 @@ def test_planning_time_cuts_a_search_and_says_truncated(scene_of: SceneOf, optio
     scene = scene_of("open")
     task = scene.cell.task("p1->p2")
     clock = iter(range(10_000))
-    budget = Budget(60_000, 0.5, lambda: float(next(clock)))
+    budget = Work(60_000, 0.5, lambda: float(next(clock)))
     plan = plan_regional(
         np.array(task.start), np.array(task.goal), scene, replace(options, planner_id="tree"), budget
     )
@@ -183,13 +183,13 @@ def test_a_cancelled_search_stops(scene_of: SceneOf, options: PlanOptions) -> No
     scene = scene_of("open")
     task = scene.cell.task("p1->p2")
     asked = iter([False] * 3 + [True] * 10_000)
-    budget = Budget(60_000, time.monotonic() + 60.0, time.monotonic, lambda: next(asked))
+    budget = Work(60_000, time.monotonic() + 60.0, time.monotonic, lambda: next(asked))
     with pytest.raises(CancelledError):
         plan_regional(np.array(task.start), np.array(task.goal), scene, options, budget)
 
 
 def test_a_safety_distance_of_zero_is_taken_literally(
-    scene_of: SceneOf, options: PlanOptions, budget: Budget
+    scene_of: SceneOf, options: PlanOptions, budget: Work
 ) -> None:
     scene = scene_of("table_columns")
     task = scene.cell.task("tL->tR")

@@ -21,7 +21,7 @@ from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.request.goals import parse_goal
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
@@ -71,7 +71,7 @@ def test_the_work_of_a_search_is_its_sweeps_of_all_starts(
     scene = scene_of("open")
     pose = np.eye(4)
     pose[:3, 3] = 50.0, 0.0, 1.0
-    budget = Budget(10_000, np.inf, lambda: 0.0)
+    budget = Work(10_000, np.inf, lambda: 0.0)
     chosen, nothing = InteractionSettings(sweeps=2), np.full(len(scene.collision.pairs), -np.inf)
     searched_configurations(pose, scene, nothing, HOME, starts, 0, chosen, budget)
     assert budget.iterations == 2 * starts
@@ -80,7 +80,7 @@ def test_the_work_of_a_search_is_its_sweeps_of_all_starts(
 def test_a_search_ends_when_its_work_is_spent(scene_of: Callable[[str], PlanningScene]) -> None:
     scene = scene_of("demo")
     pose, threshold = scene.station("lathe_work").pose, scene.thresholds(0.02, "lathe_work")
-    budget = Budget(30, np.inf, lambda: 0.0)
+    budget = Work(30, np.inf, lambda: 0.0)
     searched_configurations(pose, scene, threshold, HOME, 32, 1, InteractionSettings(), budget)
     assert budget.iterations == 32
 
@@ -103,7 +103,7 @@ def test_what_collided_before_the_step_is_not_set_back() -> None:
     ("cell", "station"), [("cnc_door", "cncL"), ("deep_box", "bin"), ("deep_box", "tun")]
 )
 def test_the_search_finds_a_part_of_the_complete_set(
-    cell: str, station: str, set_back: str, scene_of: Callable[[str], PlanningScene], budget: Budget
+    cell: str, station: str, set_back: str, scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
     scene = scene_of(cell)
     pose, threshold = scene.station(station).pose, scene.thresholds(0.02, station)
@@ -120,7 +120,7 @@ def test_the_search_finds_a_part_of_the_complete_set(
 
 
 def test_the_same_seed_gives_the_same_configurations(
-    scene_of: Callable[[str], PlanningScene], budget: Budget
+    scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
     scene = scene_of("cnc_door")
     pose, threshold = scene.station("press").pose, scene.thresholds(0.02, "press")
@@ -132,7 +132,7 @@ def test_the_same_seed_gives_the_same_configurations(
 
 
 def test_every_start_is_accepted_or_rejected_with_a_reason(
-    scene_of: Callable[[str], PlanningScene], budget: Budget
+    scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
     scene = scene_of("deep_box")
     pose, threshold = scene.station("bin").pose, scene.thresholds(0.02, "bin")
@@ -173,7 +173,7 @@ def test_branches_are_those_of_the_closed_form(scene_of: Callable[[str], Plannin
 
 def test_a_budget_that_is_spent_ends_the_search(scene_of: Callable[[str], PlanningScene]) -> None:
     scene = scene_of("cnc_door")
-    spent = Budget(10, time.monotonic() - 1.0, time.monotonic)
+    spent = Work(10, time.monotonic() - 1.0, time.monotonic)
     pose, threshold = scene.station("press").pose, scene.thresholds(0.02, "press")
     found = searched_configurations(pose, scene, threshold, HOME, 8, 0, InteractionSettings(), spent)
     assert len(found.q) == 0

@@ -18,7 +18,7 @@ from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
 from ir_planner.program.program import ProgramRequest, plan_program
 from ir_planner.request.journal import Journal
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
 from ir_planner.service.settings import WithdrawalSettings
@@ -43,8 +43,8 @@ IN_ZONES = [
 SceneOf = Callable[[str], PlanningScene]
 
 
-def a_budget(edges: int = 60_000) -> Budget:
-    return Budget(edges, time.monotonic() + 60.0, time.monotonic)
+def a_budget(edges: int = 60_000) -> Work:
+    return Work(edges, time.monotonic() + 60.0, time.monotonic)
 
 
 def planned(scene: PlanningScene, station: str, direction: str = "exit", **choices: Any) -> ServicePlan:
@@ -57,7 +57,7 @@ def planned(scene: PlanningScene, station: str, direction: str = "exit", **choic
     return plan_service(request, scene, options, WithdrawalSettings(), a_budget())
 
 
-def problem_at(scene: PlanningScene, name: str, budget: Budget) -> Exit:
+def problem_at(scene: PlanningScene, name: str, budget: Work) -> Exit:
     station = scene.station(name)
     free = free_configurations(station.pose, scene, scene.thresholds(0.02, name), scene.cell.park)
     return Exit.of(free.q[0], scene, station, 0.02, budget)
@@ -93,7 +93,7 @@ def test_the_modified_ga_walks_out_over_certified_steps_while_d_grows(
         problem = problem_at(scene, station, a_budget())
         chosen = WithdrawalSettings(weighting=weighting)
         walk = withdraw(
-            problem.work,
+            problem.interaction,
             problem.area,
             problem.inside,
             problem.is_out,
@@ -103,7 +103,7 @@ def test_the_modified_ga_walks_out_over_certified_steps_while_d_grows(
         )
         assert walk.paths, walk.rejected.most_common(3)
         path = walk.paths[0]
-        assert np.array_equal(path[0], problem.work)
+        assert np.array_equal(path[0], problem.interaction)
         assert problem.inside.edges_free(path[:-1], path[1:]).all()
         total = problem.area.total_distance(path)
         assert total[-1] > total[0]
@@ -129,7 +129,7 @@ def test_d_counts_only_what_moves_and_this_machine(demo_scene: PlanningScene) ->
 def test_every_candidate_of_the_walk_is_kept_or_has_a_reason(scene_of: SceneOf) -> None:
     problem = problem_at(scene_of("deep_box"), "tun", a_budget())
     walk = withdraw(
-        problem.work,
+        problem.interaction,
         problem.area,
         problem.inside,
         problem.is_out,
@@ -196,7 +196,7 @@ def test_the_tree_finds_a_way_where_it_is_asked_to(cell: str, station: str, scen
 def test_the_tree_takes_over_where_the_walk_is_given_up(scene_of: SceneOf) -> None:
     scene = scene_of("deep_box")
     problem = problem_at(scene, "bin", a_budget())
-    journal = Journal(problem.inside.budget, 0)
+    journal = Journal(problem.inside.work, 0)
     found = ways_out(problem, WithdrawalSettings(generations=1), 1, "", journal)
     assert [way.method for way in found.ways] == ["tree"]
     assert [stage.name for stage in journal.stages] == ["modified GA", "tree", "shorten"]
@@ -331,7 +331,7 @@ def test_without_a_way_out_the_answer_says_how_far_it_came_and_what_was_in_the_w
 
 def test_cancelling_ends_the_search(scene_of: SceneOf) -> None:
     scene = scene_of("deep_box")
-    budget = Budget(60_000, time.monotonic() + 60.0, time.monotonic, lambda: True)
+    budget = Work(60_000, time.monotonic() + 60.0, time.monotonic, lambda: True)
     request = ServiceRequest(scene.station("tun"), "exit", None, np.array(scene.cell.park))
     with pytest.raises(CancelledError):
         plan_service(request, scene, PlanOptions(), WithdrawalSettings(), budget)

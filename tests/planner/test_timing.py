@@ -17,7 +17,7 @@ from ir_planner.checks.energy import movement_energy
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.motion_limits import MotionLimits, torque_use
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.asynchronous import own_laws
@@ -52,7 +52,7 @@ def at_10_khz(trajectory: JointTrajectory) -> Any:
 
 @pytest.mark.parametrize(("start", "goal"), MOVES)
 def test_a_ptp_keeps_all_limits_and_uses_one_of_them_up(
-    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     options = PlanOptions(objective="time", safety_distance=0.0)
     movement = timed_movement(np.stack([degrees(*start), degrees(*goal)]), demo_scene, options, budget)
@@ -92,7 +92,7 @@ def test_a_heavier_load_takes_longer(demo_scene: PlanningScene, degrees: Degrees
     assert fastest_law(a, b, empty.limits, empty.dynamics).total < with_tool
 
 
-def test_scaling_limits_what_it_says(demo_scene: PlanningScene, degrees: Degrees, budget: Budget) -> None:
+def test_scaling_limits_what_it_says(demo_scene: PlanningScene, degrees: Degrees, budget: Work) -> None:
     path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(90, -60, 60, 30, 30, 0)])
     options = PlanOptions(
         objective="time", velocity_scaling=0.3, acceleration_scaling=0.5, safety_distance=0.0
@@ -103,7 +103,7 @@ def test_scaling_limits_what_it_says(demo_scene: PlanningScene, degrees: Degrees
 
 
 def test_a_wished_duration_is_met_and_too_short_a_one_refused(
-    demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+    demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(40, -80, 90, 0, 0, 0)])
     movement = timed_movement(path, demo_scene, PlanOptions(duration=3.25), budget)
@@ -115,7 +115,7 @@ def test_a_wished_duration_is_met_and_too_short_a_one_refused(
 
 @pytest.mark.parametrize(("start", "goal"), MOVES[:3])
 def test_asynchronous_joints_arrive_on_their_own(
-    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     path = np.stack([degrees(*start), degrees(*goal)])
     options = PlanOptions(objective="time", timing="asynchronous", safety_distance=0.0)
@@ -134,7 +134,7 @@ def test_asynchronous_joints_arrive_on_their_own(
 
 
 def test_corners_are_cut_within_the_limits_and_save_time(
-    demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+    demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     path = np.stack(
         [degrees(0, -90, 90, 0, 0, 0), degrees(30, -95, 95, 0, 0, 0), degrees(60, -90, 90, 0, 0, 0)]
@@ -190,7 +190,7 @@ def test_a_movement_that_would_take_hours_is_refused(scaling: float, says: str, 
         planner.plan_regional(home, park, PlanOptions(velocity_scaling=scaling))
 
 
-def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene, budget: Budget) -> None:
+def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene, budget: Work) -> None:
     home = np.array(demo_scene.cell.machine_home)
     movement = timed_movement(np.stack([home, home]), demo_scene, PlanOptions(), budget)
     assert movement.trajectory == standing(home, NAMES)
@@ -229,7 +229,7 @@ def test_limits_scale_with_the_request() -> None:
 
 @pytest.mark.parametrize(("start", "goal"), MOVES[:3])
 def test_where_joules_count_the_best_shape_is_taken(
-    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Budget
+    start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     """The fastest law stretched is one of the candidates: never worse than it."""
     path = np.stack([degrees(*start), degrees(*goal)])

@@ -9,7 +9,7 @@ import pytest
 from ir_kernels.collision import FREE
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.errors import CancelledError
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search.tree import connect, joint_scale
 
@@ -23,12 +23,12 @@ def asked(scene: PlanningScene) -> tuple[np.ndarray, np.ndarray]:
     return np.array(task.start), np.array([task.goal])
 
 
-def space_of(scene: PlanningScene, budget: Budget) -> FreeSpace:
+def space_of(scene: PlanningScene, budget: Work) -> FreeSpace:
     return FreeSpace.of(scene, 0.02, budget)
 
 
-def endless(most: int, cancelled: Callable[[], bool] = lambda: False) -> Budget:
-    return Budget(most, 1.0, lambda: 0.0, cancelled)
+def endless(most: int, cancelled: Callable[[], bool] = lambda: False) -> Work:
+    return Work(most, 1.0, lambda: 0.0, cancelled)
 
 
 def test_a_path_is_free_and_what_it_cost_is_charged(scene_of: SceneOf) -> None:
@@ -62,7 +62,7 @@ def test_a_request_is_heard_between_slices(scene_of: SceneOf) -> None:
 def test_a_deadline_is_heard_between_slices(scene_of: SceneOf) -> None:
     scene = scene_of("deep_box")
     ticks = iter(range(10))
-    budget = Budget(100_000, 2.0, lambda: float(next(ticks)))
+    budget = Work(100_000, 2.0, lambda: float(next(ticks)))
     assert connect(*asked(scene), space_of(scene, budget), SEED).path is None
     assert budget.truncated
     assert budget.iterations == 2 * 256

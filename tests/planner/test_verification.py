@@ -13,7 +13,7 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.checks.verification import verify
-from ir_planner.request.work import Budget
+from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.scene.zones import polynomials_between
 from ir_planner.timing.movement import timed_movement
@@ -106,7 +106,7 @@ def test_missing_velocities_jump_and_are_no_motion_for_a_robot(demo_scene: Plann
 
 
 def test_a_load_that_is_too_much_for_the_speed_is_a_torque_violation(
-    demo_scene: PlanningScene, budget: Budget
+    demo_scene: PlanningScene, budget: Work
 ) -> None:
     path = np.stack([HOME, HOME + np.radians([0, 40, -40, 0, 40, 0])])
     light = scene_with(demo_scene.cell, "none", demo_scene.power)
@@ -157,7 +157,7 @@ def test_allowed_contacts_hold_only_while_the_tcp_is_in_the_zone(
     assert "gear_lying" in violation.sentence
 
 
-def test_a_cut_trajectory_is_the_same_motion(demo_scene: PlanningScene, budget: Budget) -> None:
+def test_a_cut_trajectory_is_the_same_motion(demo_scene: PlanningScene, budget: Work) -> None:
     path = np.stack([HOME, HOME + np.radians([40, 10, -10, 0, 20, 0])])
     trajectory = timed_movement(path, demo_scene, PlanOptions(safety_distance=0.0), budget).trajectory
     begin, end = 0.21 * trajectory.duration, 0.77 * trajectory.duration

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import DistancePair, PlannedMovement, PlanningInfo, PlanningStage, TrajectoryReport
 from ir_msgs_py.stations import IkSolution
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes
-from numpy.typing import NDArray
 
 from ir_description import Cell, PowerData, cell_from_yaml, load_cell, load_power_data
 from ir_planner.checks import Evaluation, evaluate_trajectory, nearest_pairs, too_near_sentence
@@ -29,10 +29,10 @@ from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.program import ProgramPlan, ProgramRequest, Standby, plan_program, plan_standby
 from ir_planner.regional import MovementPlan, plan_regional
 from ir_planner.request import (
-    Budget,
     Clock,
     Goal,
     Journal,
+    Work,
     bounded,
     checked_options,
     chosen,
@@ -53,7 +53,6 @@ from ir_planner.settings import PlannerSettings
 from ir_planner.store import Store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 
-FloatArray = NDArray[np.float64]
 IK_METHODS = ("analytic", "ccd")
 PAIRS_MAX = 1000
 _NEVER: Callable[[], bool] = lambda: False  # noqa: E731 - a default argument
@@ -211,7 +210,7 @@ class Planner:
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 "goal is a configuration: compute_ik takes a pose or a station",
             )
-        journal = Journal(self._budget(PlanOptions(), _NEVER), seed, planner_id=method)
+        journal = Journal(self._work(PlanOptions(), _NEVER), seed, planner_id=method)
         scene = self.scene(load)
         threshold = scene.thresholds(margin, goal.station)
         with journal.stage("closed form" if method == "analytic" else "ccd") as notes:
@@ -219,7 +218,7 @@ class Planner:
                 found = free_configurations(goal.pose, scene, threshold, near)
             else:
                 found = searched_configurations(
-                    goal.pose, scene, threshold, near, starts, seed, self.interaction, journal.budget
+                    goal.pose, scene, threshold, near, starts, seed, self.interaction, journal.work
                 )
             notes.append(f"{found.reached} reach the pose")
         journal.rejected.update(found.rejected)
@@ -252,7 +251,7 @@ class Planner:
         options, note = checked_options(options)
         scene = self.scene(options.load)
         start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
-        budget = self._budget(options, cancelled)
+        work = self._work(options, cancelled)
         if goal.configuration is not None:
             candidates = goal.configuration[None]
         else:
@@ -261,10 +260,10 @@ class Planner:
             found = free_configurations(goal.pose, scene, threshold, start)
             if len(found.q) == 0:
                 status = no_configuration(goal.pose, scene, found, goal.text or "goal")
-                info = Journal(budget, options.seed).info(start, scene.cell.robot.joint_names)
+                info = Journal(work, options.seed).info(start, scene.cell.robot.joint_names)
                 return MovementPlan(status, info, TrajectoryReport())
             candidates = found.q
-        plan = plan_regional(start, candidates, scene, options, budget, self.genetic)
+        plan = plan_regional(start, candidates, scene, options, work, self.genetic)
         return self._kept(plan, note)
 
     def plan_service(
@@ -290,7 +289,7 @@ class Planner:
             )
         request = ServiceRequest(scene.station(station), direction, configuration, near, max_candidates)
         options = replace(options, planner_id=method)
-        plan = plan_service(request, scene, options, self.withdrawal, self._budget(options, cancelled))
+        plan = plan_service(request, scene, options, self.withdrawal, self._work(options, cancelled))
         for candidate in plan.candidates:
             if candidate.trajectory is not None:
                 self.trajectories.add(candidate.trajectory)
@@ -302,7 +301,7 @@ class Planner:
         """Trajectory through points."""
         options, note = checked_options(options)
         scene = self.scene(options.load)
-        return self._kept(plan_through(reference, scene, options, self._budget(options, cancelled)), note)
+        return self._kept(plan_through(reference, scene, options, self._work(options, cancelled)), note)
 
     def optimize_trajectory(
         self,
@@ -314,8 +313,8 @@ class Planner:
         options, note = checked_options(options or PlanOptions())
         scene = self.scene(options.load)
         names = scene.cell.robot.joint_names
-        budget = self._budget(options, cancelled)
-        plan = optimize_trajectory(trajectory.reordered(names), scene, options, budget)
+        work = self._work(options, cancelled)
+        plan = optimize_trajectory(trajectory.reordered(names), scene, options, work)
         for point in plan.front:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:
@@ -348,7 +347,7 @@ class Planner:
             self.genetic,
         )
         movements = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
-        plan = plan_program(request, self._budget(options, cancelled, movements), progress)
+        plan = plan_program(request, self._work(options, cancelled, movements), progress)
         if plan.status.ok:
             for movement in plan.movements:
                 if movement.trajectory is not None:
@@ -361,11 +360,11 @@ class Planner:
             self.trajectories.add(plan.trajectory)
         return replace(plan, info=_noted(plan.info, note))
 
-    def _budget(self, options: PlanOptions, cancelled: Callable[[], bool], movements: int = 1) -> Budget:
-        work = (options.max_iterations or self.settings.max_iterations) * movements
+    def _work(self, options: PlanOptions, cancelled: Callable[[], bool], movements: int = 1) -> Work:
+        most = (options.max_iterations or self.settings.max_iterations) * movements
         improvement = options.max_iterations or self.settings.improvement_iterations
         deadline = self.clock() + options.planning_time * movements
-        return Budget(work, deadline, self.clock, cancelled, improvement)
+        return Work(most, deadline, self.clock, cancelled, improvement)
 
 
 def _noted(info: PlanningInfo, note: str) -> PlanningInfo:

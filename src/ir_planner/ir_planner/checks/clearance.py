@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_kernels.collision import Witnesses
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
 from ir_planner.scene import PlanningScene
 
-FloatArray = NDArray[np.float64]
 _ZOOMS = 4
 _PER_ZOOM = 9
 _DIPS = 4  # local minima that are looked at closely

@@ -3,16 +3,13 @@
 At a station its allowed contacts hold while the tcp is in the machine's zone; outside every pair keeps S_m.
 """
 
-import numpy as np
 from ir_kernels.collision import COLLIDES, FREE
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks.clearance import pair_value
 from ir_planner.checks.limit_checks import Violation, segment_at
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, polynomials_between, spans_outside, tcp_inside
-
-FloatArray = NDArray[np.float64]
 
 
 def clearance_violation(

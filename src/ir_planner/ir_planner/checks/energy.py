@@ -8,13 +8,12 @@ end is not credited.
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_kernels import dc_bus
 from ir_planner.scene import PlanningScene
 
-FloatArray = NDArray[np.float64]
 STEP_S = 1e-3
 _PIECE = 20_000  # samples at a time: an hour has millions
 

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_kernels.collision import FREE, Certificates
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import BoolArray, FloatArray
 
-from ir_planner.request import Budget
+from ir_planner.request import Work
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,14 +18,14 @@ class FreeSpace:
 
     scene: PlanningScene
     threshold: FloatArray
-    budget: Budget
+    work: Work
 
     @staticmethod
-    def of(scene: PlanningScene, safety_distance: float, budget: Budget, station: str = "") -> "FreeSpace":
+    def of(scene: PlanningScene, safety_distance: float, work: Work, station: str = "") -> "FreeSpace":
         """Free space for S_m, or what `station` allows its pairs; half of the proof's tolerance is kept in
         hand.
         """
-        return FreeSpace(scene, scene.thresholds(safety_distance, station) - PROOF_TOLERANCE / 2, budget)
+        return FreeSpace(scene, scene.thresholds(safety_distance, station) - PROOF_TOLERANCE / 2, work)
 
     @property
     def low(self) -> FloatArray:
@@ -48,7 +45,7 @@ class FreeSpace:
 
     def certificates(self, q0: FloatArray, q1: FloatArray) -> Certificates:
         """Certificates of the straight movements (N, n) to (N, n)."""
-        self.budget.spend(len(q0))
+        self.work.spend(len(q0))
         return self.scene.collision.certify_edges(q0, q1, self.threshold)
 
     def edges_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:

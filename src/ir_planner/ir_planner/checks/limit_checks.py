@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.curves import Extremes
 from ir_planner.scene import PlanningScene
 
-FloatArray = NDArray[np.float64]
 SLACK = 1e-6  # relative: what rounding of a limit that is reached exactly may cost
 POSITION_SLACK = 1e-9  # rad
 JUMP = 1e-4  # rad/s, rad/s^2: rounding of times and points

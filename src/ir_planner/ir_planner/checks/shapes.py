@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_description import Body, Cell
 from ir_planner.checks.clearance import ClearanceProfile
 from ir_planner.scene import PlanningScene
 
-FloatArray = NDArray[np.float64]
 Colour = tuple[float, float, float, float]
 BODY: Colour = (0.55, 0.58, 0.62, 1.0)
 PART: Colour = (0.85, 0.6, 0.2, 1.0)

@@ -1,15 +1,12 @@
 """Whether a configuration is free, and the sentence that names the pair which is too near."""
 
-import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
-from numpy.typing import NDArray
 
 from ir_planner.checks.clearance import pair_value
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.scene import PROOF_TOLERANCE
-
-FloatArray = NDArray[np.float64]
 
 
 def end_in_collision(

@@ -6,9 +6,9 @@ named with place, limit and excess.
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks.clearance_checks import clearance_violation
 from ir_planner.checks.limit_checks import (
@@ -22,8 +22,6 @@ from ir_planner.checks.limit_checks import (
 )
 from ir_planner.curves import extremes
 from ir_planner.scene import PlanningScene, torque_use
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,16 +11,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from ir_kernels.reference.ccd import best_value
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 from ir_kernels import CcdSettings, ccd
 from ir_planner.configurations.set_back import shares_back
 from ir_planner.configurations.settings import InteractionSettings
-from ir_planner.request import Budget
+from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 ROTATION_LENGTH = 0.5  # m/rad: lambda of eq. (2)
 _STALLED = 0.02  # of Psi that a sweep must gain where it was set back
 _PATIENCE = 3  # sweeps without that gain
@@ -41,13 +39,13 @@ def descend(
     scene: PlanningScene,
     threshold: FloatArray,
     settings: InteractionSettings,
-    budget: Budget,
+    work: Work,
 ) -> Descent:
     """Bring the tcp to `pose` (4, 4) from `starts` (P, n), every pair above its threshold (Z,) m.
 
     Work: one for each sweep of each start over its joints.
     """
-    return _Descent(pose, scene, threshold, settings).run(starts, budget)
+    return _Descent(pose, scene, threshold, settings).run(starts, work)
 
 
 class _Descent:
@@ -59,14 +57,14 @@ class _Descent:
         self.low, self.high, self.axis = robot.position_min, robot.position_max, robot.joint_axis
         self.rejected: Counter[str] = Counter()
 
-    def run(self, starts: FloatArray, budget: Budget) -> Descent:
+    def run(self, starts: FloatArray, work: Work) -> Descent:
         q, found = starts.copy(), [starts[:0]]
         distance = self.scene.collision.distances(q)
         psi, stalled = self._psi(q), np.zeros(len(q), dtype=int)
         blocked = np.full(len(q), -1)  # the pair that last set a start back
         sweeps = 0
-        while len(q) and sweeps < self.settings.sweeps and not budget.exhausted:
-            budget.spend(len(q))
+        while len(q) and sweeps < self.settings.sweeps and not work.exhausted:
+            work.spend(len(q))
             q, distance, blocked = self._sweep(q, distance, blocked)
             sweeps += 1
             now = self._psi(q)
@@ -89,8 +87,8 @@ class _Descent:
         return Descent(np.concatenate(found), sweeps, self.rejected)
 
     def _sweep(
-        self, q: FloatArray, distance: FloatArray, blocked: NDArray[np.int64]
-    ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+        self, q: FloatArray, distance: FloatArray, blocked: IntArray
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
         """One pass over the joints, tool to base: a joint does not move the links before it."""
         q, blocked = q.copy(), blocked.copy()
         links = self.scene.chain.link_poses(q)
@@ -121,7 +119,7 @@ class _Descent:
 
     def _stepped(
         self, q: FloatArray, i: int, value: FloatArray, before: FloatArray
-    ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
         """Joint i at `value` (P,), or as far as it may; distances (P, Z) there; the pair that set it back, or
         -1.
         """
@@ -164,7 +162,7 @@ class _Descent:
         wo = ROTATION_LENGTH**2 / 2.0
         return np.asarray((step**2).sum(axis=1) + wo * (turn**2).sum(axis=(1, 2)))
 
-    def _count(self, pairs: NDArray[np.int64], what: str) -> None:
+    def _count(self, pairs: IntArray, what: str) -> None:
         for z, count in zip(*np.unique(pairs, return_counts=True), strict=True):
             pair = self.scene.collision.pairs[int(z)]
             self.rejected[f"{what}: {pair.body_a} too near {pair.body_b}"] += int(count)

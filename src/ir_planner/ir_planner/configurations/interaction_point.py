@@ -6,15 +6,14 @@ complete set, made distinct and ranked as that is.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 from ir_planner.configurations.ccd_search import descend
 from ir_planner.configurations.inverse_kinematics import Configurations
 from ir_planner.configurations.settings import InteractionSettings
-from ir_planner.request import Budget
+from ir_planner.request import Work
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
 
-FloatArray = NDArray[np.float64]
 STARTS_MAX = 10_000
 _SIGMAS = 3.0  # mid-range to limit, in standard deviations: sigma is a sixth of the range
 _SAME = 1e-3  # rad: configurations nearer to each other are one
@@ -42,7 +41,7 @@ def searched_configurations(
     starts: int,
     seed: int,
     settings: InteractionSettings,
-    budget: Budget,
+    work: Work,
 ) -> Configurations:
     """Free configurations that bring the tcp to `pose` (4, 4), found from `starts` random starts.
 
@@ -52,7 +51,7 @@ def searched_configurations(
     rng = np.random.default_rng(seed)
     first = random_starts(robot.position_min, robot.position_max, starts, settings.distribution, rng)
     limit = threshold - PROOF_TOLERANCE / 2
-    found = descend(pose, first, scene, limit, settings, budget)
+    found = descend(pose, first, scene, limit, settings, work)
     q = distinct_configurations(found.q)
     margin = scene.collision.min_distance(q, limit).distance if len(q) else np.zeros(0)
     order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
@@ -70,7 +69,7 @@ def distinct_configurations(q: FloatArray) -> FloatArray:
     return np.ascontiguousarray(q[chosen])
 
 
-def branches(q: FloatArray, scene: PlanningScene) -> NDArray[np.int64]:
+def branches(q: FloatArray, scene: PlanningScene) -> IntArray:
     """Branch (K,) of configurations (K, n): that of the closed-form solution which is the same."""
     result = np.zeros(len(q), dtype=np.int64)
     if len(q) == 0:

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_kernels.collision import MinDistance
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.stations import IkSolution
 from ir_msgs_py.status import Status, StatusCode
-from numpy.typing import NDArray
 
 from ir_planner.checks import nearest_pair
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +25,7 @@ class Configurations:
     """
 
     q: FloatArray
-    branch: NDArray[np.int64]
+    branch: IntArray
     reached: int
     rejected: Counter[str]
     nearest: str = ""

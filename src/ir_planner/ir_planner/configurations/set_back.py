@@ -6,9 +6,8 @@ the gain of distance in metres as the factor.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 SECANT, LITERAL = "secant", "literal"
 
 

@@ -9,11 +9,10 @@ none is missed and no sampling takes part.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_kernels import Extrema, polynomial_extrema
 
-FloatArray = NDArray[np.float64]
 _HALVINGS = 15  # a root to 3e-5 of the segment: the value at an extreme is off by its square
 
 

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 from scipy.interpolate import PPoly, make_interp_spline
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

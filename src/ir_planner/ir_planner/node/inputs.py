@@ -6,6 +6,7 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import BASE_FRAME
 from ir_msgs_py.options import PlanOptions
@@ -21,7 +22,6 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_description import Cell
 from ir_planner.errors import RequestError
@@ -29,7 +29,6 @@ from ir_planner.planner import Planner
 from ir_planner.request import Goal, one_goal
 from ir_planner.trajectories import POINTS_MAX, Reference
 
-FloatArray = NDArray[np.float64]
 AT_REST = 0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
 MEASURED = 9  # decimals of rad: finer than any encoder, and less than what counts as movement
 

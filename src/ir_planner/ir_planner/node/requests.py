@@ -8,12 +8,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError, PoseError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, robot_urdf
 from ir_kernels import KernelError
@@ -43,8 +43,6 @@ from ir_planner.node.inputs import (
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan
 from ir_planner.service import ServicePlan
-
-FloatArray = NDArray[np.float64]
 
 
 def refused(error: Exception) -> Status:

@@ -3,10 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks import Evaluation, evaluate_trajectory
 from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
@@ -15,7 +15,6 @@ from ir_planner.request import Journal
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import objective_value
 
-FloatArray = NDArray[np.float64]
 _SPACING = 0.1  # s between the knots of the coarsest spline
 _FEWEST, _MOST = 12, 64  # its control points
 _FEW = (12, 18)  # that leave the path in tight corners, but are often quicker in the end
@@ -89,7 +88,7 @@ class Descents:
 
     def __init__(self, task: Task) -> None:
         self.task, self.scene, self.options, self.journal = task, task.scene, task.options, task.journal
-        self._refinement = Refinement(task.scene, task.options, task.journal.budget, task.station)
+        self._refinement = Refinement(task.scene, task.options, task.journal.work, task.station)
 
     def starts(self, trajectory: JointTrajectory, path: FloatArray) -> list[UniformSpline]:
         """Coarse splines along a trajectory: at its own pace, and at an even one, also with so few control
@@ -121,7 +120,7 @@ class Descents:
                 break
             gain = np.inf if found is None else 1.0 - self.value(again) / self.value(found)
             found = again if gain > 0.0 else found
-            if gain < _GAIN or self.journal.budget.exhausted:
+            if gain < _GAIN or self.journal.work.exhausted:
                 break
             trajectory = again.trajectory
         return found
@@ -150,14 +149,14 @@ class Descents:
         """The best certified movement from the starts that look best after a short way down; None where none
         can be certified. path (M, n): what they came from.
         """
-        budget = self.journal.budget
+        work = self.journal.work
         drafts: list[Draft] = []
         for start in starts:
-            if not drafts or not budget.exhausted:
+            if not drafts or not work.exhausted:
                 drafts.append(self._refinement.continued(start, path, THOROUGH.coarse))
         found: list[Measured] = []
         for draft in sorted(drafts, key=lambda draft: draft.cost)[:_FINISHED]:
-            if found and budget.exhausted:
+            if found and work.exhausted:
                 break
             refined = self._refinement.finished(draft, path, THOROUGH)
             movement = self.task.measured(refined.trajectory) if refined else None

@@ -1,6 +1,7 @@
 """A path p(s) that stays as it is: the places that a trajectory passes, whatever its pace."""
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
@@ -8,7 +9,6 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ir_planner.curves import UniformSpline
 
-FloatArray = NDArray[np.float64]
 _PLACES = 2000  # of the path, between which it is interpolated
 _STANDING = 0.001  # share of the mean speed by which places part where the given motion stands
 _APART = 0.3  # of the distance between places: what is nearer to a point of the trajectory is left out

@@ -8,9 +8,8 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
 _MEMORY = 16
 _TRIES = 12  # of the line search

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ir_planner.curves import UniformSpline
 
-FloatArray = NDArray[np.float64]
 _KNOT = 0.02  # intervals: what is nearer to a knot is passed there
 _PER_POINT = 2.0  # control points that each point must have to itself
 _LITTLE = 1e-9  # weight of the size of a correction beside its jerk

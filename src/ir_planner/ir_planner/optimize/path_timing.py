@@ -11,9 +11,9 @@ correction of least jerk, where that costs little time.
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.linalg.lapack import dtbtrs
@@ -25,11 +25,10 @@ from ir_planner.optimize.fixed_path import FixedPath, knot_factor
 from ir_planner.optimize.lbfgs import descend
 from ir_planner.optimize.passing import Passing, jerk_bands
 from ir_planner.optimize.refinement import within_limits
-from ir_planner.request import Budget
+from ir_planner.request import Work
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
 from ir_planner.timing import objective_weights
 
-FloatArray = NDArray[np.float64]
 _SPARSE = 40  # places of the path for the weight of an objective
 _STEP = 0.1  # s between the knots of the coarsest spline
 _FEWEST, _MOST = 12, 150  # its intervals
@@ -63,7 +62,7 @@ def along_its_path(
     scene: PlanningScene,
     options: PlanOptions,
     limits: MotionLimits,
-    budget: Budget,
+    work: Work,
 ) -> Paced | None:
     """The path of a trajectory from rest to rest, at the best pace for the objective or in the wished
     duration; torque at samples, the proof comes after. None where no such pace is found.
@@ -74,7 +73,7 @@ def along_its_path(
     """
     path = FixedPath(given, points)
     for pace in _WISHED_PACES if options.duration > 0.0 else (1.0,):
-        found = _along(path, points, scene, options, limits, pace, budget)
+        found = _along(path, points, scene, options, limits, pace, work)
         if found is not None:
             spline, passing, way = found
             trajectory, exact = passing.sent(spline, given.joint_names)
@@ -89,7 +88,7 @@ def _along(
     options: PlanOptions,
     limits: MotionLimits,
     pace: float,
-    budget: Budget,
+    work: Work,
 ) -> tuple[UniformSpline, Passing, FloatArray] | None:
     """The spline within the limits, what it passes exactly, and its places; None where it is too slow."""
     wished = options.duration
@@ -97,14 +96,14 @@ def _along(
     count = int(np.clip(np.ceil(total / _STEP), _FEWEST, _MOST))
     way = path.places(count)
     for k, stiffness in enumerate(_STIFFNESS):
-        budget.check()
-        if k > 0 and budget.exhausted:
+        work.check()
+        if k > 0 and work.exhausted:
             break
         if k > 0:
             way, count = path.finer(way), 2 * count
         descent = _Descent(path, scene, options, limits.paced(pace), stiffness, way, total)
         way, total, evaluations = descent.run(wished > 0.0)
-        budget.spend(int(np.ceil(evaluations * count * _EDGES_PER_INTERVAL)))
+        work.spend(int(np.ceil(evaluations * count * _EDGES_PER_INTERVAL)))
     way, total = _slowed_where_needed(path, way, total, limits, scene)
     spline = path.spline(way, total)
     near = within_limits(spline, limits, scene)

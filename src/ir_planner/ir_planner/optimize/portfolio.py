@@ -9,7 +9,7 @@ makes it better.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.checks import FreeSpace, evaluate_trajectory
 from ir_planner.errors import TimingError
@@ -18,7 +18,6 @@ from ir_planner.request import Journal
 from ir_planner.search import fewest_corners
 from ir_planner.timing import TimedMovement, objective_value, timed_movement
 
-FloatArray = NDArray[np.float64]
 _SAME = 0.12  # rad: drafts that are nearer to each other along their way are one way round
 _PLACES = np.linspace(0.1, 0.9, 9)
 _HOPELESS = 1.25  # drafts that cost this much more than the best are not finished
@@ -105,7 +104,7 @@ class Portfolio:
         best: tuple[str, TimedMovement] | None = None
         for method, path in ways:
             try:
-                movement = timed_movement(path, scene, options, self.journal.budget)
+                movement = timed_movement(path, scene, options, self.journal.work)
             except TimingError as error:
                 self.journal.reject(f"torque: {error}")
                 continue

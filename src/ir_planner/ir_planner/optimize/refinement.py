@@ -10,6 +10,7 @@ comes too near gets more room and the descent goes on from there.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -19,7 +20,7 @@ from ir_kernels import SplineCost, SplineTerms
 from ir_planner.checks import Evaluation, Violation, clearance_violation, evaluate_trajectory
 from ir_planner.curves import UniformSpline, along_path, fewest_seconds
 from ir_planner.errors import RequestError
-from ir_planner.request import Budget
+from ir_planner.request import Work
 from ir_planner.scene import PROOF_TOLERANCE, MotionLimits, PlanningScene, tcp_inside, torque_use
 from ir_planner.timing import (
     DURATION_SLACK,
@@ -34,9 +35,7 @@ from ir_planner.timing import (
     trajectory_value,
 )
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 _SPACING = 0.1  # s between the knots of the coarsest spline
 _FEWEST, _MOST = 12, 64  # control points of the coarsest spline
 _SLOWER = 1.3  # than the path at full speed: where the descent starts
@@ -106,12 +105,12 @@ class Refinement:
         self,
         scene: PlanningScene,
         options: PlanOptions,
-        budget: Budget,
+        work: Work,
         station: str = "",
         *,
         measured: bool = False,
     ) -> None:
-        self.scene, self.options, self.budget, self.station = scene, options, budget, station
+        self.scene, self.options, self.work, self.station = scene, options, work, station
         self.measured = measured
         self.limits = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
         plain = scene.thresholds(options.safety_distance) - PROOF_TOLERANCE / 2
@@ -152,7 +151,7 @@ class Refinement:
     def _slowed_to_wish(self, path: FloatArray) -> Refined | None:
         """The fastest movement near a path, at a wished duration that leaves no joules to choose."""
         hurry = replace(self.options, objective="time", duration=0.0)
-        fastest = Refinement(self.scene, hurry, self.budget, self.station)
+        fastest = Refinement(self.scene, hurry, self.work, self.station)
         for effort in (QUICK, THOROUGH):
             found = fastest.finished(fastest.drafted(path, effort.coarse), path, effort)
             if found is None:
@@ -193,7 +192,7 @@ class Refinement:
         return None
 
     def _descended(self, draft: Draft, path: FloatArray, evaluations: int) -> Draft:
-        self.budget.check()
+        self.work.check()
         spline = draft.spline
         found = self._cost(draft, path).descend(
             spline.control,
@@ -202,7 +201,7 @@ class Refinement:
             fixed_interval=self.options.duration > 0.0,
             evaluations=evaluations,
         )
-        self.budget.spend(int(np.ceil(found.evaluations * spline.intervals * _EDGES_PER_INTERVAL)))
+        self.work.spend(int(np.ceil(found.evaluations * spline.intervals * _EDGES_PER_INTERVAL)))
         robot = self.scene.cell.robot
         # a spline stays within the range of its control points
         control = np.clip(found.control, robot.position_min, robot.position_max)
@@ -257,7 +256,7 @@ class Refinement:
         """The movement, or what is in its way; None where its torque does not suffice."""
         scene, options = self.scene, self.options
         for share in _TORQUE_SHARES:
-            self.budget.check()
+            self.work.check()
             trajectory = self._slowed(draft.spline, self.limits.with_torque_share(share))
             if trajectory is None:
                 return None
@@ -313,7 +312,7 @@ def within_limits(spline: UniformSpline, limits: MotionLimits, scene: PlanningSc
 
 
 def movement_over(
-    path: FloatArray, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = ""
+    path: FloatArray, scene: PlanningScene, options: PlanOptions, work: Work, station: str = ""
 ) -> TimedMovement:
     """The movement over a free path (M, n): refined, or in straight steps where that isn't certified or the
     joints are to take their own time.
@@ -322,7 +321,7 @@ def movement_over(
     """
     path = distinct(path)
     if len(path) > 1 and options.timing == "synchronous":
-        refinement = Refinement(scene, options, budget, station, measured=True)
+        refinement = Refinement(scene, options, work, station, measured=True)
         found = refinement.finished(refinement.drafted(path), path)
         if found is not None:
             evaluation = found.evaluation or evaluate_trajectory(
@@ -332,4 +331,4 @@ def movement_over(
             if movement.violation is None:
                 return movement
         refinement.check_wish()
-    return timed_movement(path, scene, options, budget, station)
+    return timed_movement(path, scene, options, work, station)

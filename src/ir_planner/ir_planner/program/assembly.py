@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.transitions import TransitionTimes
-from numpy.typing import NDArray
 
 from ir_planner.checks import evaluate_trajectory
 from ir_planner.program.standby import pause_energy, plan_standby
@@ -13,7 +13,6 @@ from ir_planner.program.steps import PlacedStep, Scenes, signal_text
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import TimedMovement, stretched
 
-FloatArray = NDArray[np.float64]
 AUTO = "AUTO"
 
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from ir_kernels.power import Regeneration
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-from numpy.typing import NDArray
 
 from ir_description import Cell, PowerData
 from ir_planner.checks import FreeSpace, total_report
@@ -26,13 +26,12 @@ from ir_planner.program.station_graph import Certify, Gap, Node, Plan, StationGr
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.program.stops import posture_nodes, station_nodes
 from ir_planner.regional import search_regional
-from ir_planner.request import DURATION_MAX, Budget, Journal
+from ir_planner.request import DURATION_MAX, Journal, Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search import GeneticSettings
 from ir_planner.service import ServiceLine, WithdrawalSettings, timed_service
 from ir_planner.timing import TimedMovement
 
-FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int, float], None]
 
 
@@ -73,9 +72,9 @@ class _FailedError(Exception):
         self.status = status
 
 
-def plan_program(request: ProgramRequest, budget: Budget, progress: Progress) -> ProgramPlan:
+def plan_program(request: ProgramRequest, work: Work, progress: Progress) -> ProgramPlan:
     """Plan a program. Raises RequestError for a request that makes no sense, CancelledError when stopped."""
-    journal = Journal(budget, request.options.seed)
+    journal = Journal(work, request.options.seed)
     try:
         movements, elapsed = _Planner(request, journal, progress).run()
         status = Status.success()
@@ -192,7 +191,7 @@ class _Planner:
 
     def _certify(self, stops: list[int]) -> Certify:
         spaces = [
-            FreeSpace.of(self._scene(k), self.options.safety_distance, self.journal.budget) for k in stops
+            FreeSpace.of(self._scene(k), self.options.safety_distance, self.journal.work) for k in stops
         ]
         return lambda gap, q0, q1: spaces[gap].edges_free(q0, q1)
 
@@ -208,7 +207,7 @@ class _Planner:
         key = (gap, id(first), id(second))
         if key not in self.ways:
             scene = self._scene(stops[gap])
-            inner = Journal(self.journal.budget, self.journal.seed)
+            inner = Journal(self.journal.work, self.journal.seed)
             ends, settings = (first.outside, second.outside), self.request.genetic
             status, found = search_regional(*ends, scene, self.options, inner, settings)
             self.journal.rejected.update(inner.rejected)
@@ -235,12 +234,12 @@ class _Planner:
         return legs
 
     def _leg(self, stops: list[int], place: int, first: Node, second: Node) -> Leg:
-        scene, budget = self._scene(stops[place]), self.journal.budget
+        scene, work = self._scene(stops[place]), self.journal.work
         from_name = self.steps[stops[place - 1]].step.target if place else ""
         to_name = self.steps[stops[place]].step.target
         movements: list[tuple[MovementKind, TimedMovement]] = []
         if len(first.line.points) > 1:
-            leaving = timed_service(first.line, False, from_name, scene, self.options, budget)
+            leaving = timed_service(first.line, False, from_name, scene, self.options, work)
             movements.append((MovementKind.SERVICE_EXIT, self._proved(leaving, f"leaving {from_name}")))
         if np.abs(second.outside - first.outside).max() > 1e-9:
             across = self._movement(stops, place, first, second)
@@ -248,7 +247,7 @@ class _Planner:
                 raise _FailedError(self._unreachable)
             movements.append((MovementKind.REGIONAL, across))
         if len(second.line.points) > 1:
-            entering = timed_service(second.line, True, to_name, scene, self.options, budget)
+            entering = timed_service(second.line, True, to_name, scene, self.options, work)
             movements.append((MovementKind.SERVICE_ENTRY, self._proved(entering, f"entering {to_name}")))
         return Leg(from_name, to_name, scene, tuple(movements))
 

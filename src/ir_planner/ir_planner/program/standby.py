@@ -8,16 +8,15 @@ well: an assumption of the power data that decides every break-even.
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.power import REST_MODES, Mode, PowerMode
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-from numpy.typing import NDArray
 
 from ir_planner.checks import holding_watts
 from ir_planner.errors import RequestError
 from ir_planner.scene import PlanningScene
 
-FloatArray = NDArray[np.float64]
 MOTORS = "STAND_ON_MOTORS"
 PAUSE_MAX = 604_800.0  # s: a week
 

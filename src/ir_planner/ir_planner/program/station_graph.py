@@ -10,13 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from numpy.typing import NDArray
 
 from ir_planner.scene import movement_cost
 from ir_planner.service import ServiceLine
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 UNKNOWN, STRAIGHT, BLOCKED, PLANNED, IMPOSSIBLE = range(5)
 _BATCH = 12
 _DETOUR = 1.6  # a first guess: a way round costs this times the straight movement
@@ -31,9 +30,9 @@ class Node:
     line: ServiceLine
 
     @property
-    def work(self) -> FloatArray:
+    def interaction(self) -> FloatArray:
         """At the stop."""
-        return self.line.work
+        return self.line.interaction
 
     @property
     def outside(self) -> FloatArray:

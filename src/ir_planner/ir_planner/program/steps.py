@@ -4,10 +4,8 @@ it.
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
 from ir_kernels.power import Regeneration
 from ir_msgs_py.status import StatusCode
-from numpy.typing import NDArray
 
 from ir_description import Cell, InvalidValueError, PartPlaces, PowerData, ProgramStep, Signal
 from ir_description import UnknownNameError as DescriptionNameError
@@ -15,7 +13,6 @@ from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.request import POSTURES
 from ir_planner.scene import PlanningScene, with_parts
 
-FloatArray = NDArray[np.float64]
 STEPS_MAX = 500
 
 

@@ -5,9 +5,9 @@ then.
 from collections import Counter
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
-from numpy.typing import NDArray
 
 from ir_planner.checks import FreeSpace, too_near
 from ir_planner.configurations import free_configurations, no_configuration
@@ -17,7 +17,6 @@ from ir_planner.request import Journal
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ServiceLine, WithdrawalSettings, lines_free, service_lines
 
-FloatArray = NDArray[np.float64]
 _MOST = 24  # configurations per station that take part
 
 
@@ -26,7 +25,7 @@ def posture_nodes(
 ) -> tuple[list[Node], Status]:
     """The one configuration of a posture, or none with the pair that is too near."""
     q = np.array(arriving.cell.posture(name))
-    space = FreeSpace.of(arriving, safety_distance, journal.budget)
+    space = FreeSpace.of(arriving, safety_distance, journal.work)
     if not space.states_free(q[None])[0]:
         return [], Status(
             StatusCode.GOAL_IN_COLLISION, too_near(q, space, f"posture {name}", safety_distance)
@@ -59,7 +58,7 @@ def station_nodes(
     rejected: Counter[str] = Counter()
     lines = service_lines(found.q[:_MOST], station, arriving, rejected)
     for scene in (arriving, leaving):
-        free = lines_free(lines, station, scene, safety_distance, journal.budget, rejected)
+        free = lines_free(lines, station, scene, safety_distance, journal.work, rejected)
         lines = [line for line, is_free in zip(lines, free, strict=True) if is_free]
     out = leaves_zone(lines, station, arriving, safety_distance)
     if not any(out):

@@ -7,8 +7,8 @@ must be free both with what is held on arriving and with what is held on leaving
 from collections import Counter
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
-from numpy.typing import NDArray
 
 from ir_description import Station
 from ir_planner.checks import FreeSpace
@@ -16,7 +16,6 @@ from ir_planner.request import Journal
 from ir_planner.scene import PlanningScene
 from ir_planner.service import Exit, ServiceLine, WithdrawalSettings, WorkArea, ways_out
 
-FloatArray = NDArray[np.float64]
 _WANTED = 2  # ways per branch: the second is for the scene in which the first collides
 _SAME = 1e-6  # rad
 
@@ -28,13 +27,13 @@ def leaves_zone(
     if not lines:
         return []
     area = WorkArea.of(scene, station)
-    work = area.left(np.array([line.work for line in lines]), margin)
+    interaction = area.left(np.array([line.interaction for line in lines]), margin)
     outer = area.left(np.array([line.outside for line in lines]), margin)
-    return [bool(out) for out in work | outer]
+    return [bool(out) for out in interaction | outer]
 
 
 def withdrawn_lines(
-    work: FloatArray,
+    interaction: FloatArray,
     station: Station,
     scenes: tuple[PlanningScene, PlanningScene],
     options: PlanOptions,
@@ -46,10 +45,10 @@ def withdrawn_lines(
     found: list[ServiceLine] = []
     failed: list[FloatArray] = []
     low, high = scenes[0].cell.robot.position_min, scenes[0].cell.robot.position_max
-    for q in work:
-        twin = next((line for line in found if _turned(q, line.work)), None)
+    for q in interaction:
+        twin = next((line for line in found if _turned(q, line.interaction)), None)
         if twin is not None:
-            shifted = twin.points + (q - twin.work)
+            shifted = twin.points + (q - twin.interaction)
             if (shifted >= low).all() and (shifted <= high).all():
                 found.append(ServiceLine(shifted, straight=False))
             continue
@@ -78,15 +77,15 @@ def _way(
     journal: Journal,
 ) -> FloatArray | None:
     """The cheapest way (M, n) that is free in both scenes; searched in each of them."""
-    margin, budget = options.safety_distance, journal.budget
+    margin, work = options.safety_distance, journal.work
     for here, there in (scenes, scenes[::-1]):
-        if budget.exhausted:
+        if work.exhausted:
             return None
-        if not FreeSpace.of(here, margin, budget, station.name).states_free(q[None])[0]:
+        if not FreeSpace.of(here, margin, work, station.name).states_free(q[None])[0]:
             return None
-        problem = Exit.of(q, here, station, margin, budget)
-        other = Exit.of(q, there, station, margin, budget)
-        inner = Journal(budget, journal.seed)
+        problem = Exit.of(q, here, station, margin, work)
+        other = Exit.of(q, there, station, margin, work)
+        inner = Journal(work, journal.seed)
         for way in ways_out(problem, settings, _WANTED, "", inner).ways:
             path = way.points
             free = other.inside.edges_free(path[:-1], path[1:]).all() and other.is_out(path[-1:])[0]

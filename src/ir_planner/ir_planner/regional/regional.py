@@ -11,20 +11,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_kernels.collision import FREE
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks import FreeSpace, end_in_collision, pair_value
 from ir_planner.optimize import Portfolio, Refinement
-from ir_planner.request import Budget, Journal
+from ir_planner.request import Journal, Work
 from ir_planner.scene import STILL, PlanningScene, path_cost
 from ir_planner.search import BY_NAME_ONLY, EXPLORERS, SEARCHES, Ends, GeneticSettings, fewest_corners, pulled
 from ir_planner.timing import TimedMovement
 
-FloatArray = NDArray[np.float64]
 _GENETIC = GeneticSettings()
 _FINISHED = 2  # drafts that are finished in one round
 _TIMED_BY_LAWS = 3
@@ -46,7 +45,7 @@ def plan_regional(
     goals: FloatArray,
     scene: PlanningScene,
     options: PlanOptions,
-    budget: Budget,
+    work: Work,
     settings: GeneticSettings = _GENETIC,
 ) -> MovementPlan:
     """Movement from start (n,) to a goal (n,), or to the best reachable of goals (G, n), cheapest by W first.
@@ -54,7 +53,7 @@ def plan_regional(
     All within the limits. Raises RequestError for options that can't be met (duration), CancelledError when
     asked to stop.
     """
-    journal = Journal(budget, options.seed)
+    journal = Journal(work, options.seed)
     names = scene.cell.robot.joint_names
     status, found = search_regional(start, goals, scene, options, journal, settings)
     info = journal.info(start, names)
@@ -73,11 +72,11 @@ def search_regional(
 ) -> tuple[Status, TimedMovement | None]:
     """The best movement found, with the status that says so or says why not."""
     ends = Ends(start, np.atleast_2d(goals))
-    space = FreeSpace.of(scene, options.safety_distance, journal.budget)
+    space = FreeSpace.of(scene, options.safety_distance, journal.work)
     blocked = end_in_collision(start, ends.goals[0], space, options.safety_distance)
     if blocked is not None:
         return blocked, None
-    portfolio = Portfolio(space, Refinement(scene, options, journal.budget), journal)
+    portfolio = Portfolio(space, Refinement(scene, options, journal.work), journal)
     ways = _first_ways(ends, space, options, journal, settings)
     best: tuple[str, TimedMovement] | None = None
     there = np.abs(ends.goals - start).max(axis=1).min() < STILL
@@ -122,7 +121,7 @@ def _first_ways(
                 notes.append("nothing free" + (f", {found.note}" if found.note else ""))
         if found.ways:
             return [(name, path) for path in found.ways]
-        if journal.budget.exhausted:
+        if journal.work.exhausted:
             break
     return []
 
@@ -138,10 +137,10 @@ def _improve(
     the work is spent.
     """
     journal = portfolio.journal
-    until = journal.budget.iterations + journal.budget.improvement
+    until = journal.work.iterations + journal.work.improvement
 
     def more() -> bool:
-        return journal.budget.iterations < until and not journal.budget.exhausted
+        return journal.work.iterations < until and not journal.work.exhausted
 
     with journal.stage("refine") as notes:
         portfolio.add(ways[0][0], [way for _, way in ways])
@@ -151,7 +150,7 @@ def _improve(
     with journal.stage("improve") as notes:
         new, certified = Counter[str](), 0
         while more():
-            before = journal.budget.iterations
+            before = journal.work.iterations
             for name, search in explorers:
                 if more() and not (name == "genetic" and turn == 0 and len(explorers) > 1):
                     found = search(ends, portfolio.space, settings, _seed(options.seed, turn, name))
@@ -160,7 +159,7 @@ def _improve(
             if more():
                 certified += portfolio.deepen()
             turn += 1
-            if journal.budget.iterations == before:
+            if journal.work.iterations == before:
                 break  # nothing left to do
         others = ", ".join(f"{count} by {name}" for name, count in new.items() if count)
         notes.append(f"{turn} turns, new ways: {others or 'none'}; {certified} certified")
@@ -182,7 +181,7 @@ def _blocked_status(
 ) -> Status:
     found = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
-    cut = " within planning_time" if journal.budget.truncated else ""
+    cut = " within planning_time" if journal.work.truncated else ""
     if found.verdict[0] == FREE:
         reasons = "; ".join(f"{reason} ({count})" for reason, count in journal.rejected.items())
         return Status(

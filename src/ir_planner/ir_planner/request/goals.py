@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_description.poses import rotation_from_abc
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
-from numpy.typing import NDArray
 
 from ir_description import Cell
 from ir_planner.errors import RequestError, UnknownNameError
 
-FloatArray = NDArray[np.float64]
 POSTURES = ("home", "park")
 _POSE_KEYS = ("X", "Y", "Z", "A", "B", "C")
 _WORDS = re.compile(r"[A-Za-z]+\d*|\S+")

@@ -6,19 +6,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
-from numpy.typing import NDArray
 
-from ir_planner.request.work import Budget
-
-FloatArray = NDArray[np.float64]
+from ir_planner.request.work import Work
 
 
 @dataclass
 class Journal:
     """Kept by one request; the clock is its budget's."""
 
-    budget: Budget
+    work: Work
     seed: int
     begin: float = 0.0
     planner_id: str = ""
@@ -26,17 +24,17 @@ class Journal:
     rejected: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
-        self.begin = self.budget.clock()
+        self.begin = self.work.clock()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
         """Time a stage; what is appended to the list becomes its note."""
         notes: list[str] = []
-        begin = self.budget.clock()
+        begin = self.work.clock()
         try:
             yield notes
         finally:
-            self.stages.append(PlanningStage(name, self.budget.clock() - begin, "; ".join(notes)))
+            self.stages.append(PlanningStage(name, self.work.clock() - begin, "; ".join(notes)))
 
     def note(self, name: str, text: str) -> None:
         """A remark without duration."""
@@ -55,9 +53,9 @@ class Journal:
             seed=self.seed,
             start=np.zeros(0) if start is None else start,
             start_names=() if start is None else joint_names,
-            iterations=self.budget.iterations,
-            truncated=self.budget.truncated,
-            planning_time=self.budget.clock() - self.begin,
+            iterations=self.work.iterations,
+            truncated=self.work.truncated,
+            planning_time=self.work.clock() - self.begin,
             stages=tuple(self.stages),
             rejected=tuple(Rejection(reason, count) for reason, count in sorted(self.rejected.items())),
         )

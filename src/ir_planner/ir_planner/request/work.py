@@ -13,7 +13,7 @@ Clock = Callable[[], float]
 
 
 @dataclass
-class Budget:
+class Work:
     """Work left for one request.
 
     `max_iterations`: edges that searches may certify; the evaluations of a descent count as edges too.

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 STILL = 1e-9  # rad: nothing moves
 
 

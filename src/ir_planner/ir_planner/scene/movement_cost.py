@@ -8,9 +8,8 @@ starts at the joint.) W ranks movements; it is not their energy.
 import itertools
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 def movement_weights(link_mass: FloatArray, velocity_max: FloatArray, load_mass: float = 0.0) -> FloatArray:

@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 from ir_kernels.power import Regeneration
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
-from numpy.typing import NDArray
 
 from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station, Zone
 from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
@@ -20,8 +20,6 @@ from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.scene.motion_limits import MotionLimits
 from ir_planner.scene.movement_cost import movement_weights
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 PROOF_TOLERANCE = 1e-6  # m: proofs show d > S_m - 1e-6
 RUNNING = "STAND_ON_MOTORS"
 

@@ -6,13 +6,11 @@ checked with the plain safety distance.
 """
 
 import numpy as np
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.scene.planning_scene import PlanningScene
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 _SAMPLES = 400
 _PARTS, _ROUNDS = 32, 6  # 2^30 parts of the time between two samples
 

@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ir_kernels.collision import FREE, Certificates
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import path_cost
 from ir_planner.search.genetic_settings import SAMPLES_MAX, GeneticSettings
 from ir_planner.search.population import Evolution, batch_work, evolve
 
-FloatArray = NDArray[np.float64]
 _SPACING = 0.02  # rad between samples of a way in search of what collides
 _WIDER = 4.0  # by how much each further attempt widens the margin
 _COMPARED = 16  # places along two ways at which they are compared
@@ -61,7 +60,7 @@ def corrected(
             proof = space.certificates(way[:-1], way[1:])
             if (proof.verdict == FREE).all():
                 clean.append(way)
-            elif not space.budget.exhausted:
+            elif not space.work.exhausted:
                 found = _round_stretch(way, proof, space, settings, rng, wanted)
                 generations += found.generations
                 following.extend(found.ways)
@@ -96,7 +95,7 @@ def _round_stretch(
             return replace(found, ways=different(whole, wanted, settings.difference), generations=generations)
         if found.shortfall < best.shortfall:
             best = found
-        if space.budget.exhausted:
+        if space.work.exhausted:
             break
     return replace(best, generations=generations)
 
@@ -115,7 +114,7 @@ def colliding_stretch(
     step = np.repeat(np.arange(len(counts)), counts)
     share = (np.arange(len(step)) - first[step]) / counts[step]
     points = np.concatenate([way[step] + share[:, None] * (way[step + 1] - way[step]), way[-1:]])
-    space.budget.spend(batch_work(len(points)))
+    space.work.spend(batch_work(len(points)))
     free = space.states_free(points)
     blocked = ~(free[:-1] & free[1:])  # (K,): the parts between samples
     unproved = np.flatnonzero(proof.verdict != FREE)

@@ -5,9 +5,8 @@ Candidates are generated in one go and judged in one batch; which of them are fr
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 _SPREADS = (0.15, 0.35, 0.7)  # rad: how far vias are scattered around the straight movement
 

@@ -11,16 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_kernels.collision import FREE, Certificates
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import spline_through, to_ppoly, virtual_knots
 from ir_planner.scene import movement_cost, path_cost
 from ir_planner.search.genetic_settings import GeneticSettings
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 _SAMPLES_PER_EDGE = 40  # configurations that cost as much as one certified edge
 _BEYOND = 0.25  # crossover reaches this share beyond both parents
 _OWN = 0.5  # vias of one individual mutate together, and by this share on their own
@@ -125,7 +122,7 @@ class _Breeder:
         while True:
             self._collect(people)
             since += bool(self.found)
-            if since > s.settle or generations >= s.generations or self.space.budget.exhausted:
+            if since > s.settle or generations >= s.generations or self.space.work.exhausted:
                 break
             people = self._next(people)
             generations += 1
@@ -147,7 +144,7 @@ class _Breeder:
         q = self.samples(vias)
         count, n = q.shape[1:]
         inner = q[1:-1].reshape(-1, n)
-        self.space.budget.spend(batch_work(len(inner)))
+        self.space.work.spend(batch_work(len(inner)))
         near = self.space.scene.collision.min_distance(inner, self.space.threshold)
         lack = np.where(near.pair >= 0, self.space.threshold[near.pair] - near.distance, -np.inf)
         lack = lack.reshape(-1, count)

@@ -6,12 +6,11 @@ the machine than a straight way out; this is the cheap attempt before the trees.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.checks import FreeSpace
 from ir_planner.search.detours import drawn_back, over_postures, scattered
 
-FloatArray = NDArray[np.float64]
 SPACING = 0.05  # m
 LENGTH = 1.0  # m
 _JUMP = 0.35  # rad

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import path_cost
@@ -18,7 +18,6 @@ from ir_planner.search.genetic_settings import GeneticSettings
 from ir_planner.search.retract import retreating_paths
 from ir_planner.search.tree import Meeting, connect
 
-FloatArray = NDArray[np.float64]
 _SCATTERED = 160
 _WAYS = 3  # different ways round of one search
 _DIFFERENT = 0.15  # rad: ways whose vias are nearer are one way

@@ -4,12 +4,11 @@ Everything is tried in batches of certified edges, so a polished path is as free
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import movement_cost, path_cost
 
-FloatArray = NDArray[np.float64]
 _POINTS = 16
 _PULLS = (1.0, 0.6, 0.3, 0.12)
 _ROUNDS = 6
@@ -64,7 +63,7 @@ def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArra
     for _ in range(_ROUNDS):
         before = path_cost(weights, path)
         for k in range(1, len(path) - 1):
-            if space.budget.exhausted:
+            if space.work.exhausted:
                 return path
             path[k] = _best_pull(path[k - 1], path[k], path[k + 1], space, weights)
         if path_cost(weights, path) > 0.995 * before:

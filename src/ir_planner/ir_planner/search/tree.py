@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_kernels.search import BidirectionalTree
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.checks import FreeSpace
 
-FloatArray = NDArray[np.float64]
 _SLICE = 256  # edges between two looks at the clock, about 2 ms
 _LEAST_SCALE = 0.1
 
@@ -40,14 +39,14 @@ def connect(start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, m
 
     Raises CancelledError when asked to stop, ir_kernels.InputError where start, or every goal, isn't free.
     """
-    budget = space.budget
+    work = space.work
     search = BidirectionalTree(
         space.scene.collision, start, goals, space.threshold, space.low, space.high, joint_scale(space), seed
     )
-    while not budget.exhausted and search.edges < most:
+    while not work.exhausted and search.edges < most:
         before = search.edges
-        found = search.grow(min(_SLICE, budget.max_iterations - budget.iterations, most - before))
-        budget.spend(search.edges - before)
+        found = search.grow(min(_SLICE, work.max_iterations - work.iterations, most - before))
+        work.spend(search.edges - before)
         if found:
             return Meeting(search.path, 0.0)
     return Meeting(None, search.gap)

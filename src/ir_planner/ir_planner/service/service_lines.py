@@ -9,18 +9,17 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
-from numpy.typing import NDArray
 
 from ir_description import Station
 from ir_planner.checks import FreeSpace, evaluate_trajectory
 from ir_planner.errors import TimingError
 from ir_planner.optimize import movement_over
-from ir_planner.request import Budget
+from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import TimedMovement, best_stretch, stretched, time_spline
 
-FloatArray = NDArray[np.float64]
 SPACING = 0.03  # m between points of the line
 _JUMP = 0.35  # rad: a larger step between neighbours is another branch or a singular wrist
 _TORQUE_SHARES = (0.97, 0.92, 0.85)
@@ -37,7 +36,7 @@ class ServiceLine:
     straight: bool = True
 
     @property
-    def work(self) -> FloatArray:
+    def interaction(self) -> FloatArray:
         """At the station."""
         first: FloatArray = self.points[0]
         return first
@@ -61,7 +60,7 @@ def retreat_poses(station: Station) -> FloatArray:
 
 
 def service_lines(
-    work: FloatArray, station: Station, scene: PlanningScene, rejected: Counter[str]
+    interaction: FloatArray, station: Station, scene: PlanningScene, rejected: Counter[str]
 ) -> list[ServiceLine]:
     """Lines from work configurations (K, n); those that leave the limits or change branch are counted and
     dropped.
@@ -69,7 +68,7 @@ def service_lines(
     poses = retreat_poses(station)
     found = scene.inverse_kinematics.solve(poses)
     lines = []
-    for q in work:
+    for q in interaction:
         points = [q]
         for k in range(1, len(poses)):
             candidates = found.of_pose(k)
@@ -91,12 +90,12 @@ def lines_free(
     station: Station,
     scene: PlanningScene,
     safety_distance: float,
-    budget: Budget,
+    work: Work,
     rejected: Counter[str],
 ) -> list[bool]:
     """Which lines are free: on the way with the station's allowed contacts, at the outer end without."""
-    inside = FreeSpace.of(scene, safety_distance, budget, station.name)
-    outside = FreeSpace.of(scene, safety_distance, budget)
+    inside = FreeSpace.of(scene, safety_distance, work, station.name)
+    outside = FreeSpace.of(scene, safety_distance, work)
     on_the_way = inside.paths_free([line.points for line in lines])
     if not lines:
         return []
@@ -107,7 +106,7 @@ def lines_free(
 
 
 def timed_service(
-    line: ServiceLine, entry: bool, station: str, scene: PlanningScene, options: PlanOptions, budget: Budget
+    line: ServiceLine, entry: bool, station: str, scene: PlanningScene, options: PlanOptions, work: Work
 ) -> TimedMovement:
     """The movement along the line, outwards or (entry) inwards, verified with the station's allowed contacts.
 
@@ -115,25 +114,25 @@ def timed_service(
     """
     points = line.points[::-1] if entry else line.points
     if len(points) < 3 or not line.straight:
-        return movement_over(points, scene, options, budget, station)
+        return movement_over(points, scene, options, work, station)
     names = scene.cell.robot.joint_names
     for share in _TORQUE_SHARES:
-        budget.check()
+        work.check()
         limits = scene.limits.scaled(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
         fastest = time_spline(points, names, limits, scene.dynamics)
-        budget.check()
+        work.check()
         factor = best_stretch(fastest, scene, options.objective, options.time_value)
         trajectory = stretched(fastest, factor)
-        budget.check()
+        work.check()
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
         if violation is None:
             break
         if violation.what == "clearance":
             # the spline leaves the certified polyline where points lie far apart: stop at none, but cut less
-            return movement_over(points, scene, options, budget, station)
+            return movement_over(points, scene, options, work, station)
     if violation is not None and violation.what != "torque":
         raise TimingError(violation.sentence, 0)
     return TimedMovement(np.array(points), trajectory, evaluation)

@@ -9,24 +9,23 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo
 from ir_msgs_py.stations import ServiceCandidate
 from ir_msgs_py.status import Status, StatusCode
-from numpy.typing import NDArray
 
 from ir_description import Station
 from ir_planner.checks import FreeSpace, nearest_pair, too_near
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import movement_over
-from ir_planner.request import Budget, Journal
+from ir_planner.request import Journal, Work
 from ir_planner.scene import PlanningScene
 from ir_planner.service.settings import WithdrawalSettings
 from ir_planner.service.withdrawal_paths import Exit, Way, Ways, known_method, ways_out
 from ir_planner.timing import TimedMovement, objective_value
 
-FloatArray = NDArray[np.float64]
 EXIT, ENTRY = "exit", "entry"
 CANDIDATES_MAX = 20
 _BRANCHES = 4  # work configurations that are tried
@@ -60,12 +59,12 @@ def plan_service(
     scene: PlanningScene,
     options: PlanOptions,
     settings: WithdrawalSettings,
-    budget: Budget,
+    work: Work,
 ) -> ServicePlan:
     """Plan a service movement. Raises RequestError for options that can't be met, CancelledError when asked
     to stop.
     """
-    journal = Journal(budget, options.seed)
+    journal = Journal(work, options.seed)
     status, candidates = _search(request, scene, options, settings, journal)
     start = candidates[0].trajectory.positions[0] if candidates and candidates[0].trajectory else None
     return ServicePlan(status, candidates, journal.info(start, scene.cell.robot.joint_names))
@@ -80,13 +79,13 @@ def _search(
 ) -> tuple[Status, tuple[ServiceCandidate, ...]]:
     method = known_method(options.planner_id)
     with journal.stage("configurations") as notes:
-        work, status = work_configurations(request, scene, options.safety_distance, journal)
-        notes.append(f"{len(work)} to try")
+        interaction, status = work_configurations(request, scene, options.safety_distance, journal)
+        notes.append(f"{len(interaction)} to try")
     if not status.ok:
         return status, ()
     failed = Status(StatusCode.PLANNING_FAILED, "nothing was tried")
-    for q in work:
-        problem = Exit.of(q, scene, request.station, options.safety_distance, journal.budget)
+    for q in interaction:
+        problem = Exit.of(q, scene, request.station, options.safety_distance, journal.work)
         found = ways_out(problem, settings, request.max_candidates, method, journal)
         with journal.stage("timing") as notes:
             timed = [_timed(way, request, scene, options, journal) for way in found.ways]
@@ -96,7 +95,7 @@ def _search(
             journal.planner_id = certified[0][0].method
             return Status.success(), _ranked(certified, request, scene, options)
         failed = blocked(found, problem, journal)
-        if journal.budget.exhausted:
+        if journal.work.exhausted:
             break
     return failed, ()
 
@@ -105,7 +104,7 @@ def work_configurations(
     request: ServiceRequest, scene: PlanningScene, safety_distance: float, journal: Journal
 ) -> tuple[list[FloatArray], Status]:
     """Free configurations at the station to start from, one per branch, best first; or none and why."""
-    inside = FreeSpace.of(scene, safety_distance, journal.budget, request.station.name)
+    inside = FreeSpace.of(scene, safety_distance, journal.work, request.station.name)
     if request.configuration is not None:
         q = request.configuration
         if inside.states_free(q[None])[0]:
@@ -146,7 +145,7 @@ def _timed(
     """The certified movement over a way, or None with its reason counted."""
     points = way.points[::-1] if request.direction == ENTRY else way.points
     try:
-        movement = movement_over(points, scene, options, journal.budget, request.station.name)
+        movement = movement_over(points, scene, options, journal.work, request.station.name)
     except TimingError as error:
         journal.reject(f"torque: {error}")
         return None
@@ -193,7 +192,7 @@ def blocked(found: Ways, problem: Exit, journal: Journal) -> Status:
         else f" (clearance there {pair.distance * 1e3:.1f} mm, {pair.body_a} to {pair.body_b})"
     )
     depth = max(problem.safety_distance - found.zone_distance, 0.0)
-    cut = " within planning_time" if journal.budget.truncated else ""
+    cut = " within planning_time" if journal.work.truncated else ""
     met = Counter({reason: n for reason, n in found.met.items() if "too near" in reason})
     way = ", ".join(f"{reason} ({count})" for reason, count in met.most_common(4)) or "nothing met"
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages if stage.note)

@@ -5,9 +5,8 @@ option "inverse" lets the light joints, which move little of the arm, step more.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 WEIGHTINGS = ("literal", "inverse")
 
 

@@ -13,16 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from ir_kernels.collision import FREE
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 from ir_planner.checks import FreeSpace
 from ir_planner.service.settings import WithdrawalSettings
 from ir_planner.service.step_weights import step_weights
 from ir_planner.service.work_area import WorkArea
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 _DAMPING = 0.02  # of the retreat's least squares; m^2
 _ROTATION_LENGTH = 0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its way
 _SHARPEST = 0.25  # the spread shrinks at most to this share in one generation
@@ -64,7 +61,7 @@ class _Population:
 
 
 def withdraw(
-    work: FloatArray,
+    interaction: FloatArray,
     area: WorkArea,
     inside: FreeSpace,
     is_out: Callable[[FloatArray], BoolArray],
@@ -76,13 +73,13 @@ def withdraw(
 
     Ends at the settings' generations or when the budget is spent.
     """
-    return _Walker(work, area, inside, is_out, settings, rng).run(wanted)
+    return _Walker(interaction, area, inside, is_out, settings, rng).run(wanted)
 
 
 class _Walker:
     def __init__(
         self,
-        work: FloatArray,
+        interaction: FloatArray,
         area: WorkArea,
         inside: FreeSpace,
         is_out: Callable[[FloatArray], BoolArray],
@@ -96,11 +93,11 @@ class _Walker:
         self.W = step_weights(
             scene.cell.robot.link_mass, sum(x.mass for x in scene.loads), settings.weighting
         )
-        self.nodes: list[FloatArray] = [work]
+        self.nodes: list[FloatArray] = [interaction]
         self.parents: list[int] = [0]
-        self.first_total = max(float(area.total_distance(work[None])[0]), 1e-3)
-        self.walk = Walk([], work, 0, 0)
-        self.best_zone = float(area.zone_distance(work[None])[0])
+        self.first_total = max(float(area.total_distance(interaction[None])[0]), 1e-3)
+        self.walk = Walk([], interaction, 0, 0)
+        self.best_zone = float(area.zone_distance(interaction[None])[0])
 
     def run(self, wanted: int) -> Walk:
         n, count = len(self.nodes[0]), self.settings.population
@@ -112,7 +109,7 @@ class _Walker:
             np.zeros(1, dtype=np.int64),
         )
         for _ in range(self.settings.generations):
-            if len(population) == 0 or self.inside.budget.exhausted or len(self.walk.paths) >= wanted:
+            if len(population) == 0 or self.inside.work.exhausted or len(self.walk.paths) >= wanted:
                 break
             self.walk.generations += 1
             population = self._next(population, max(self.settings.offspring * count // len(population), 4))

@@ -9,20 +9,20 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from numpy.typing import NDArray
 
 from ir_description import Station
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
-from ir_planner.request import Budget, Journal
+from ir_planner.request import Journal, Work
 from ir_planner.scene import PlanningScene, path_cost, tcp_inside
 from ir_planner.search import connect, fewest_corners, joint_scale
 from ir_planner.service.settings import WithdrawalSettings
 from ir_planner.service.withdrawal import Walk, withdraw
 from ir_planner.service.work_area import WorkArea
 
-FloatArray = NDArray[np.float64]
 MODIFIED_GA, TREE = "modified_ga", "tree"
 METHODS = (MODIFIED_GA, TREE)
 _SEARCHED = 2  # raw ways per candidate that is wanted
@@ -60,7 +60,7 @@ class Exit:
     outside (without), S_m.
     """
 
-    work: FloatArray
+    interaction: FloatArray
     area: WorkArea
     inside: FreeSpace
     outside: FreeSpace
@@ -68,14 +68,14 @@ class Exit:
 
     @staticmethod
     def of(
-        work: FloatArray, scene: PlanningScene, station: Station, safety_distance: float, budget: Budget
+        interaction: FloatArray, scene: PlanningScene, station: Station, safety_distance: float, work: Work
     ) -> "Exit":
         """The problem of leaving a station from `work` (n,)."""
         return Exit(
-            work,
+            interaction,
             WorkArea.of(scene, station),
-            FreeSpace.of(scene, safety_distance, budget, station.name),
-            FreeSpace.of(scene, safety_distance, budget),
+            FreeSpace.of(scene, safety_distance, work, station.name),
+            FreeSpace.of(scene, safety_distance, work),
             safety_distance,
         )
 
@@ -84,7 +84,7 @@ class Exit:
         """How far [m] the tcp must go: by the approach distance where the work configuration is outside the
         zone already, as above a pallet; else leaving the zone is what counts.
         """
-        outside = self.area.left(self.work[None], self.safety_distance)[0]
+        outside = self.area.left(self.interaction[None], self.safety_distance)[0]
         return float(self.area.station.approach_distance) if outside else 0.0
 
     def is_out(self, q: FloatArray) -> NDArray[np.bool_]:
@@ -92,7 +92,7 @@ class Exit:
         out = self.area.left(q, self.safety_distance)
         if self.least_way > 0.0:
             chain = self.inside.scene.chain
-            way = chain.tcp_poses(q)[:, :3, 3] - chain.tcp_poses(self.work[None])[:, :3, 3]
+            way = chain.tcp_poses(q)[:, :3, 3] - chain.tcp_poses(self.interaction[None])[:, :3, 3]
             out &= np.linalg.norm(way, axis=1) >= self.least_way
         out[out] = self.outside.states_free(q[out])
         return out
@@ -122,14 +122,14 @@ def ways_out(
 
     method: one of METHODS, or "": the tree only where eq. (7) finds none.
     """
-    work = problem.work
+    interaction = problem.interaction
     seed = np.random.SeedSequence([journal.seed % 2**63, 7])
-    depth = float(problem.area.zone_distance(work[None])[0])
-    found = Ways([], work, depth, Counter())
+    depth = float(problem.area.zone_distance(interaction[None])[0])
+    found = Ways([], interaction, depth, Counter())
     if method in ("", MODIFIED_GA):
         with journal.stage("modified GA") as notes:
             walk = withdraw(
-                work,
+                interaction,
                 problem.area,
                 problem.inside,
                 problem.is_out,
@@ -163,7 +163,7 @@ def tree_out(problem: Exit, rng: np.random.Generator) -> FloatArray | None:
     goals = _outside(problem, rng)
     if len(goals) == 0:
         return None
-    path = connect(problem.work, goals, problem.inside, int(rng.integers(2**63))).path
+    path = connect(problem.interaction, goals, problem.inside, int(rng.integers(2**63))).path
     return None if path is None else _until_out(path, problem)
 
 
@@ -175,7 +175,7 @@ def _outside(problem: Exit, rng: np.random.Generator) -> FloatArray:
     postures = np.array([cell.park, cell.machine_home])
     drawn = rng.uniform(space.low, space.high, (_OUTSIDE_TRIES, len(postures[0])))
     drawn = drawn[problem.is_out(drawn)]
-    away = np.linalg.norm((drawn - problem.work) * joint_scale(space), axis=1)
+    away = np.linalg.norm((drawn - problem.interaction) * joint_scale(space), axis=1)
     nearest = drawn[np.argsort(away, kind="stable")[:_OUTSIDE_GOALS]]
     return np.concatenate([postures[problem.is_out(postures)], nearest])
 

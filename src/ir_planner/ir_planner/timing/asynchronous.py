@@ -6,13 +6,12 @@ clearance is another question than for the synchronous movement.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.errors import TimingError
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.timing.time_law import GRID_S, LawLimits, StepLaws, TimeLaw, phase_steps
 
-FloatArray = NDArray[np.float64]
 _HALVINGS = 8
 _SAMPLE = 4  # grid steps
 

@@ -10,13 +10,10 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.timing.time_law import GRID_NS, StepLaws
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

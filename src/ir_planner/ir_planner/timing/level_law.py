@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 from ir_planner.timing.time_law import GRID_S
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 BANDS = np.array([0.6, 0.84, 1.0])  # upper ends of the bands, as shares of the cruising speed
 LEVELS = len(BANDS)
 PHASES = 4 * LEVELS + 3

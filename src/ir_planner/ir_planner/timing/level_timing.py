@@ -3,15 +3,13 @@ halving.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import BoolArray, FloatArray
 
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.timing.level_law import LEVELS, LevelLaw, LevelLaws, level_laws
 from ir_planner.timing.ptp import fastest_law, free_law, path_limits
 from ir_planner.timing.time_law import GRID_S, Law
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 _SPEEDS = np.array([1.0, 0.96, 0.92, 0.87, 0.82, 0.76, 0.7, 0.62, 0.54, 0.45])
 _HALVINGS = 7
 _PER_PHASE = 6

@@ -12,15 +12,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks import Evaluation, Violation, clearance_violation, evaluate_trajectory
 from ir_planner.curves import extremes
 from ir_planner.errors import RequestError
-from ir_planner.request import DURATION_MAX, Budget
+from ir_planner.request import DURATION_MAX, Work
 from ir_planner.scene import STILL, Dynamics, MotionLimits, PlanningScene
 from ir_planner.timing.asynchronous import own_laws
 from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing, stretched
@@ -29,7 +29,6 @@ from ir_planner.timing.objective import best_stretch, pace_value
 from ir_planner.timing.ptp import fastest_law, torque_per_segment
 from ir_planner.timing.time_law import GRID_S, Law, StepLaws
 
-FloatArray = NDArray[np.float64]
 _TORQUE_SHARES = (0.98, 0.95, 0.9, 0.8)
 MakeLaw = Callable[[FloatArray, FloatArray, MotionLimits, Dynamics], Law]
 # how steps are timed, and the share of the acceleration they may use; the fastest first
@@ -56,7 +55,7 @@ class TimedMovement:
 
 
 def timed_movement(
-    waypoints: FloatArray, scene: PlanningScene, options: PlanOptions, budget: Budget, station: str = ""
+    waypoints: FloatArray, scene: PlanningScene, options: PlanOptions, work: Work, station: str = ""
 ) -> TimedMovement:
     """The movement over `waypoints` (M, n), whose straight steps are free, at the best duration for the
     objective.
@@ -70,12 +69,12 @@ def timed_movement(
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         return TimedMovement(waypoints, trajectory, evaluation, "the goal is the start")
     for share in _TORQUE_SHARES:
-        budget.check()
+        work.check()
         limits = scene.limits.scaled(
             options.velocity_scaling, options.acceleration_scaling
         ).with_torque_share(share)
-        trajectory, note = _paced(waypoints, scene, options, limits, budget, station)
-        budget.check()
+        trajectory, note = _paced(waypoints, scene, options, limits, work, station)
+        work.check()
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
         if violation is None or violation.what != "torque":
@@ -100,7 +99,7 @@ def _paced(
     scene: PlanningScene,
     options: PlanOptions,
     limits: MotionLimits,
-    budget: Budget,
+    work: Work,
     station: str,
 ) -> tuple[JointTrajectory, str]:
     """The trajectory in the shape and at the duration that the objective likes best.
@@ -109,9 +108,9 @@ def _paced(
     """
     best: tuple[float, JointTrajectory, str] | None = None
     for law, share in _SHAPES if _joules_count(options) else _SHAPES[:1]:
-        budget.check()
+        work.check()
         gentle = limits.scaled(1.0, share)
-        quickest, note = _fastest(waypoints, scene, options, gentle, budget, station, law)
+        quickest, note = _fastest(waypoints, scene, options, gentle, work, station, law)
         if best is not None and 0.0 < options.duration < quickest.duration:
             continue
         trajectory = stretched_to_wish(quickest, scene, options)
@@ -133,7 +132,7 @@ def _fastest(
     scene: PlanningScene,
     options: PlanOptions,
     limits: MotionLimits,
-    budget: Budget,
+    work: Work,
     station: str,
     law: MakeLaw,
 ) -> tuple[JointTrajectory, str]:
@@ -148,7 +147,7 @@ def _fastest(
             return trajectory, note
         note = f"asynchronous timing is not free ({blocked.sentence}), so the timing is synchronous"
     laws = tuple(StepLaws((law(a, b, limits, dynamics),)) for a, b in steps)
-    return _cut_corners(waypoints, laws, scene, options, limits, budget, station), note
+    return _cut_corners(waypoints, laws, scene, options, limits, work, station), note
 
 
 def _cut_corners(
@@ -157,7 +156,7 @@ def _cut_corners(
     scene: PlanningScene,
     options: PlanOptions,
     limits: MotionLimits,
-    budget: Budget,
+    work: Work,
     station: str,
 ) -> JointTrajectory:
     """The blended trajectory with the largest overlaps that keep limits and clearance."""
@@ -165,7 +164,7 @@ def _cut_corners(
     largest = largest_overlaps(laws)
     cut = [0] * len(largest)  # index into _CUTS per corner
     while True:
-        budget.check()
+        work.check()
         overlaps = tuple(int(full * _CUTS[k]) for full, k in zip(largest, cut, strict=True))
         path = TimedPath(waypoints, laws, overlaps)
         trajectory = blended(path, names)

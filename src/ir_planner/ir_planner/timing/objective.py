@@ -7,16 +7,15 @@ time_value x T, without the base load of the controller, which is part of what a
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks import movement_energy
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.timing.blending import stretched
 
-FloatArray = NDArray[np.float64]
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported

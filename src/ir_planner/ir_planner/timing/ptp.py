@@ -7,16 +7,12 @@ every joint stays within its share of the envelope along the whole law; the shor
 """
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.errors import TimingError
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.timing.time_law import GRID_S, LawLimits, TimeLaw, law_states, phase_steps
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 
 _SPEEDS = np.array([1.0, 0.93, 0.86, 0.78, 0.7, 0.6, 0.5, 0.4, 0.28, 0.15])
 _REFINED = np.array([-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045])

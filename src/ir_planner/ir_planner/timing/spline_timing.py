@@ -9,6 +9,7 @@ largest use is 1. Durations are whole grid steps (even, the virtual knots halve 
 from typing import Any
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
@@ -18,8 +19,6 @@ from ir_planner.scene import Dynamics, MotionLimits
 from ir_planner.timing.ptp import torque_per_segment
 from ir_planner.timing.time_law import GRID_NS, GRID_S
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _ROUNDS = 14
 _STRETCHES = 12
 _SHORTEST = 20  # grid steps of an interval

@@ -12,10 +12,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 GRID_S = 1e-3
 GRID_NS = 1_000_000
 _NEWTON_STEPS = 40

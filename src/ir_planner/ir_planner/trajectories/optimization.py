@@ -9,24 +9,23 @@ The trade of time for energy comes with the answer.
 from dataclasses import dataclass
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
 from ir_planner.curves import UniformSpline
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Descents, Measured, Task, at_even_distances, path_of
 from ir_planner.regional import search_regional
-from ir_planner.request import DURATION_MAX, Budget, Journal, bounded, within_limits
+from ir_planner.request import DURATION_MAX, Journal, Work, bounded, within_limits
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.search import fewest_corners
 from ir_planner.timing import stretched
 from ir_planner.trajectories.pareto import pareto_front, thinned
 
-FloatArray = NDArray[np.float64]
 POINTS_MAX = 10_000
 _CORNERS = 22
 _AT_STATION = 1e-3  # m, and of the axes: a tcp that near is at the station
@@ -48,7 +47,7 @@ class OptimizationPlan:
 
 
 def optimize_trajectory(
-    original: JointTrajectory, scene: PlanningScene, options: PlanOptions, budget: Budget
+    original: JointTrajectory, scene: PlanningScene, options: PlanOptions, work: Work
 ) -> OptimizationPlan:
     """Improve a trajectory from rest to rest for the objective.
 
@@ -56,7 +55,7 @@ def optimize_trajectory(
     CancelledError when asked to stop.
     """
     _check(original, scene)
-    return _Optimization(original, scene, options, budget).run()
+    return _Optimization(original, scene, options, work).run()
 
 
 def _check(original: JointTrajectory, scene: PlanningScene) -> None:
@@ -85,13 +84,13 @@ class _Optimization:
     """One request: the original, and what came of it."""
 
     def __init__(
-        self, original: JointTrajectory, scene: PlanningScene, options: PlanOptions, budget: Budget
+        self, original: JointTrajectory, scene: PlanningScene, options: PlanOptions, work: Work
     ) -> None:
         self.scene, self.options = scene, options
         self.path = path_of(original, scene)
-        self.journal = Journal(budget, options.seed, planner_id="descent")
+        self.journal = Journal(work, options.seed, planner_id="descent")
         self.task = Task(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
-        self.space = FreeSpace.of(scene, options.safety_distance, budget, self.task.station)
+        self.space = FreeSpace.of(scene, options.safety_distance, work, self.task.station)
         self.descents = Descents(self.task)
         if self.task.station:
             self.journal.note("station", f"allowed contacts of {self.task.station} hold in its zone")

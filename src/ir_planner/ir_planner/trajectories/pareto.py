@@ -22,7 +22,7 @@ def pareto_front(known: list[Measured], task: Task) -> tuple[Measured, ...]:
     points = list(known)
 
     def descend(start: Measured, objective: str, duration: float = 0.0) -> Measured | None:
-        if task.journal.budget.exhausted:
+        if task.journal.work.exhausted:
             return None
         rounds = 1 if duration > 0.0 else 3
         try:

@@ -10,17 +10,17 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
 
 from ir_planner.checks import Evaluation, FreeSpace, end_in_collision, evaluate_trajectory
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import Paced, along_its_path
 from ir_planner.regional import MovementPlan
-from ir_planner.request import DURATION_MAX, Budget, Journal, bounded, within_limits
+from ir_planner.request import DURATION_MAX, Journal, Work, bounded, within_limits
 from ir_planner.scene import MotionLimits, PlanningScene
 from ir_planner.timing import (
     StepLaws,
@@ -36,7 +36,6 @@ from ir_planner.timing import (
     timed_movement,
 )
 
-FloatArray = NDArray[np.float64]
 POINTS_MAX = 1000
 KEPT = 1e-3  # rad by which a pace may leave its path
 _AT_STOPS = ("clearance", "position")  # violations that straight steps avoid
@@ -52,17 +51,17 @@ class Reference:
 
 
 def plan_through(
-    reference: Reference, scene: PlanningScene, options: PlanOptions, budget: Budget
+    reference: Reference, scene: PlanningScene, options: PlanOptions, work: Work
 ) -> MovementPlan:
     """Trajectory through all points, at rest at the first and the last.
 
     Wished times keep their proportions and are stretched where limits ask for it. Raises RequestError.
     """
     _check_points(reference, scene)
-    journal = Journal(budget, options.seed)
+    journal = Journal(work, options.seed)
     names = scene.cell.robot.joint_names
     start = reference.points[0]
-    space = FreeSpace.of(scene, options.safety_distance, budget)
+    space = FreeSpace.of(scene, options.safety_distance, work)
     blocked = end_in_collision(start, reference.points[-1], space, options.safety_distance)
     if blocked is not None:
         return MovementPlan(blocked, journal.info(start, names), TrajectoryReport())
@@ -97,7 +96,7 @@ def _followed(
     if len(points) < 3:
         with journal.stage("ptp"):
             journal.planner_id = "ptp"
-            movement = _ptp(points, reference, scene, options, journal.budget)
+            movement = _ptp(points, reference, scene, options, journal.work)
         return movement.trajectory, movement.evaluation
     limits = scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
     names = scene.cell.robot.joint_names
@@ -125,15 +124,15 @@ def _followed(
 
 
 def _ptp(
-    points: FloatArray, reference: Reference, scene: PlanningScene, options: PlanOptions, budget: Budget
+    points: FloatArray, reference: Reference, scene: PlanningScene, options: PlanOptions, work: Work
 ) -> TimedMovement:
     if reference.times is None or options.duration > 0.0 or len(reference.points) != 2 or len(points) != 2:
-        return timed_movement(points, scene, options, budget)
-    fastest_one = timed_movement(points, scene, replace(options, objective="time"), budget)
+        return timed_movement(points, scene, options, work)
+    fastest_one = timed_movement(points, scene, replace(options, objective="time"), work)
     wished = float(reference.times[-1] - reference.times[0])
     if wished <= fastest_one.trajectory.duration:
         return fastest_one
-    return timed_movement(points, scene, replace(options, duration=wished), budget)
+    return timed_movement(points, scene, replace(options, duration=wished), work)
 
 
 def _spline(
@@ -146,7 +145,7 @@ def _spline(
 ) -> tuple[JointTrajectory, Evaluation]:
     """The spline with the durations `given` (M-1,) s in their proportions."""
     for share in _TORQUE_SHARES:
-        journal.budget.check()
+        journal.work.check()
         limits = _limits(scene, options, share)
         quickest = time_spline(points, scene.cell.robot.joint_names, limits, scene.dynamics, given)
         wished = given is not None and options.duration == 0.0
@@ -194,10 +193,10 @@ def _paced(
 ) -> Paced | None:
     """The certified pace along a trajectory's path; None where there is none, or no work left for it."""
     for share in _TORQUE_SHARES:
-        if journal.budget.exhausted:
+        if journal.work.exhausted:
             return None
         limits = _limits(scene, options, share)
-        pace = along_its_path(trajectory, points, scene, options, limits, journal.budget)
+        pace = along_its_path(trajectory, points, scene, options, limits, journal.work)
         if pace is None or pace.deviation > KEPT:
             journal.reject("no better pace along the path")
             return None
