@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from ir_msgs_py.power import Mode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.assembly import make_simulation
-from ir_sim_driver.driver import Driver
-from ir_sim_driver.goal import TrajectoryGoal
-from ir_sim_driver.simulation import Simulation
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.motion.goal import TrajectoryGoal
 
 from ir_description import Cell, load_power_data
 

@@ -21,10 +21,10 @@ from _driver_power import energy_rows, table_2_rows, transition_rows
 from _driver_stream import streamed
 from ir_kernels.power import DcBusParameters, dc_bus
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.assembly import make_simulation
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.goal import TrajectoryGoal
-from ir_sim_driver.simulation import Simulation
+from ir_sim_driver.motion.goal import TrajectoryGoal
 from kernels import commit, machine
 
 from ir_description import Cell, load_cell

@@ -15,8 +15,8 @@ import argparse
 import socket
 import time
 
-from ir_sim_driver.modbus_map import COILS, HEARTBEAT, INPUT_REGISTERS, PAUSE
-from ir_sim_driver.wake_on_lan import magic_packet
+from ir_sim_driver.plc.modbus_map import COILS, HEARTBEAT, INPUT_REGISTERS, PAUSE
+from ir_sim_driver.plc.wake_on_lan import magic_packet
 from pymodbus.client import ModbusTcpClient
 
 MODES = {0: "stand on motors", 1: "moving", 2: "stand on brakes", 3: "bus power off", 4: "hibernation"}

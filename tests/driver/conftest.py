@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.assembly import make_simulation
-from ir_sim_driver.goal import Outcome, TrajectoryGoal
-from ir_sim_driver.simulation import Simulation
-from ir_sim_driver.simulation_settings import SimulationSettings
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.motion.goal import Outcome, TrajectoryGoal
 
 from ir_description import Cell, load_cell
 

@@ -9,10 +9,10 @@ import pytest
 from ir_kernels.chain import Chain
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.power import Mode
-from ir_sim_driver.assembly import make_simulation
-from ir_sim_driver.drivetrain import Drivetrain
-from ir_sim_driver.ideal_backend import IdealBackend
-from ir_sim_driver.simulation_settings import ControllerSettings
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.settings import ControllerSettings
+from ir_sim_driver.plant.drivetrain import Drivetrain
+from ir_sim_driver.plant.ideal_backend import IdealBackend
 from scipy.spatial.transform import Rotation
 
 from ir_description import Load, load_power_data

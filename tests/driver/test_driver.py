@@ -7,11 +7,11 @@ import threading
 import numpy as np
 import pytest
 from ir_msgs_py.power import Mode
-from ir_sim_driver.driver import NO_GOAL, QUEUE_MAX, Driver
+from ir_sim_driver.controller.driver import NO_GOAL, QUEUE_MAX, Driver
+from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.goal import ErrorCode, TrajectoryGoal
-from ir_sim_driver.power_modes import TransitionSettings
-from ir_sim_driver.simulation_settings import ControllerSettings
+from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
+from ir_sim_driver.power.power_modes import TransitionSettings
 
 PERIOD = 2_000_000
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from ir_msgs_py.options import PlanOptions
 from ir_planner.planner import Planner
-from ir_sim_driver.assembly import make_simulation
-from ir_sim_driver.goal import ErrorCode, TrajectoryGoal
-from ir_sim_driver.loads import carried
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
+from ir_sim_driver.plant.loads import carried
 
 from ir_description import load_cell
 

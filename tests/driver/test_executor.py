@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.assembly import make_simulation
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.goal import ErrorCode, JointTolerance
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ErrorCode, JointTolerance
 
 EXACT = 1e-9  # rad; the ideal robot is where it was commanded
 DT = 0.001
@@ -266,7 +266,7 @@ def test_a_stamp_in_the_near_future_waits(make, plan, start, home, there):
 
 
 def test_a_goal_opens_the_brakes_and_waits_for_them(make, plan, start, run_out, home, there):
-    from ir_sim_driver.simulation_settings import ControllerSettings
+    from ir_sim_driver.controller.settings import ControllerSettings
 
     simulation = make(controller=ControllerSettings(start_mode="STAND_ON_BRAKES"))
     start(simulation, plan(2.0, home, there))

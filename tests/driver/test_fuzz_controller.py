@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.power import Mode
+from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import DriverError
-from ir_sim_driver.loads import carried
-from ir_sim_driver.plc import BITS
-from ir_sim_driver.power_modes import TransitionSettings
-from ir_sim_driver.simulation_settings import ControllerSettings
+from ir_sim_driver.plant.loads import carried
+from ir_sim_driver.plc.inputs import BITS
+from ir_sim_driver.power.power_modes import TransitionSettings
 
 QUICK = TransitionSettings(
     stand_on_brakes_enter=0.02,

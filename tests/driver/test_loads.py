@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.loads import carried, custom_load
+from ir_sim_driver.plant.loads import carried, custom_load
 
 from ir_description import load_cell
 

@@ -10,14 +10,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ir_msgs_py.power import Mode
-from ir_sim_driver.driver import Driver
+from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.modbus import ModbusServer
-from ir_sim_driver.modbus_map import COILS, DISCRETE_INPUTS, HEARTBEAT, INPUT_REGISTERS, OPERATING_MODE, PAUSE
-from ir_sim_driver.plc import PlcSettings
-from ir_sim_driver.plc_link import PlcLink
-from ir_sim_driver.power_modes import TransitionSettings
-from ir_sim_driver.simulation_settings import ControllerSettings
+from ir_sim_driver.plc.inputs import PlcSettings
+from ir_sim_driver.plc.modbus import ModbusServer
+from ir_sim_driver.plc.modbus_map import (
+    COILS,
+    DISCRETE_INPUTS,
+    HEARTBEAT,
+    INPUT_REGISTERS,
+    OPERATING_MODE,
+    PAUSE,
+)
+from ir_sim_driver.plc.plc_link import PlcLink
+from ir_sim_driver.power.power_modes import TransitionSettings
 from pymodbus.client import ModbusTcpClient
 
 PERIOD = 2_000_000

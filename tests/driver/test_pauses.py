@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.power import Mode
+from ir_sim_driver.controller.pause import best_mode, energy_of
+from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.pause import best_mode, energy_of
-from ir_sim_driver.power_modes import TransitionSettings
-from ir_sim_driver.simulation_settings import ControllerSettings
+from ir_sim_driver.power.power_modes import TransitionSettings
 
 
 def by_mode(simulation):

@@ -6,7 +6,7 @@ import pytest
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.power import Mode
 from ir_sim_driver.notices import Notices
-from ir_sim_driver.plc import Plc, PlcSettings
+from ir_sim_driver.plc.inputs import Plc, PlcSettings
 
 DT = 0.001
 

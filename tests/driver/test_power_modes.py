@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ir_msgs_py.power import Mode
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.power_modes import NO_WISH, PowerModes, TransitionSettings, Wish
+from ir_sim_driver.power.power_modes import NO_WISH, PowerModes, TransitionSettings, Wish
 
 DT = 0.001
 STEP = DT * 1.5  # a wish counts from the next step on

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from ir_msgs_py.errors import TrajectoryError
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.goal import ErrorCode, JointTolerance
-from ir_sim_driver.simulation_settings import ControllerSettings
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ErrorCode, JointTolerance
 
 INVALID = ErrorCode.INVALID_GOAL
 

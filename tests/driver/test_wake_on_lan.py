@@ -7,7 +7,7 @@ import threading
 
 import pytest
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.wake_on_lan import WakeListener, magic_packet, wakes
+from ir_sim_driver.plc.wake_on_lan import WakeListener, magic_packet, wakes
 
 MAC = "02:00:00:c4:02:10"
 PACKET = magic_packet(MAC)

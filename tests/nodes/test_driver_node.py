@@ -13,9 +13,9 @@ from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, Sta
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.modbus_map import COILS
 from ir_sim_driver.node import SimDriver
-from ir_sim_driver.wake_on_lan import magic_packet
+from ir_sim_driver.plc.modbus_map import COILS
+from ir_sim_driver.plc.wake_on_lan import magic_packet
 from pymodbus.client import ModbusTcpClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ir_msgs_py.settings import Setting, describe
 from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_program_runner.parameters import declare_parameters
-from ir_sim_driver.power_modes import TransitionSettings
+from ir_sim_driver.power.power_modes import TransitionSettings
 from rclpy.node import Node
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ir_kernels.dynamics import DynamicsModel
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import STANDING, Work
+from ir_sim_driver.plant.backend import STANDING, Work
 
 BRAKE_FACTOR = 2.0
 """Deceleration of the mechanical brakes over the joint's acceleration limit."""

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import Backend
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
-from ir_sim_driver.lead_in import Route
-from ir_sim_driver.path import Motion, Path
-from ir_sim_driver.path_speed import PathSpeed
-from ir_sim_driver.tolerances import Tolerances
-from ir_sim_driver.tool_point import EXACT_FROM, ToolPoint
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.motion.lead_in import Route
+from ir_sim_driver.motion.path import Motion, Path
+from ir_sim_driver.motion.path_speed import PathSpeed
+from ir_sim_driver.motion.tolerances import Tolerances
+from ir_sim_driver.motion.tool_point import EXACT_FROM, ToolPoint
+from ir_sim_driver.plant.backend import Backend
 
 
 @dataclass(eq=False)

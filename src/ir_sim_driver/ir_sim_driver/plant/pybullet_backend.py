@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import STANDING, Work
-from ir_sim_driver.control import CommandFollower, ControlSettings
-from ir_sim_driver.drivetrain import Drivetrain
 from ir_sim_driver.errors import BackendError
+from ir_sim_driver.plant.backend import STANDING, Work
+from ir_sim_driver.plant.control import CommandFollower, ControlSettings
+from ir_sim_driver.plant.drivetrain import Drivetrain
 
 GRAVITY = 9.80665
 BRAKE_FACTOR = 1.5

@@ -9,12 +9,12 @@ from __future__ import annotations
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.status import StatusCode
 
-from ir_sim_driver.driver import Driver
+from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.modbus_map import COILS, HEARTBEAT, Readout
 from ir_sim_driver.notices import Level
-from ir_sim_driver.plc import MODBUS
-from ir_sim_driver.simulation import Simulation
+from ir_sim_driver.plc.inputs import MODBUS
+from ir_sim_driver.plc.modbus_map import COILS, HEARTBEAT, Readout
 
 
 class PlcLink:

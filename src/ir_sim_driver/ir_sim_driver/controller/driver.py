@@ -16,10 +16,10 @@ from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_msgs_py.power import PowerState
 
 from ir_sim_driver.arrays import Array
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.executor import Following
-from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
-from ir_sim_driver.simulation import Simulation
+from ir_sim_driver.motion.executor import Following
+from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 
 POWER_PERIOD = 10  # steps: 100 Hz
 CONTROLLER_PERIOD = 20  # steps: 50 Hz

@@ -16,8 +16,8 @@ from ir_msgs_py.ros.conversions import (
 
 from ir_sim_driver.arrays import Array
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.executor import Following
-from ir_sim_driver.goal import ErrorCode, JointTolerance, TrajectoryGoal
+from ir_sim_driver.motion.executor import Following
+from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
 

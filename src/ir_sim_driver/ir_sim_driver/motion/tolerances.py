@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.goal import JointTolerance
+from ir_sim_driver.motion.goal import JointTolerance
 
 
 @dataclass(frozen=True, eq=False)

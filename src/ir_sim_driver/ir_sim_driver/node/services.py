@@ -15,11 +15,11 @@ from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.ros.conversions import plc_inputs_to_msg, power_mode_to_msg, status_to_msg
 from ir_msgs_py.status import Status, StatusCode
 
-from ir_sim_driver.driver import Driver
+from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import DriverError, RequestRefusedError
-from ir_sim_driver.loads import CUSTOM, carried, custom_load
-from ir_sim_driver.plc import SERVICE
-from ir_sim_driver.simulation import Simulation
+from ir_sim_driver.plant.loads import CUSTOM, carried, custom_load
+from ir_sim_driver.plc.inputs import SERVICE
 
 
 class Services:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_sim_driver.path import Path
-from ir_sim_driver.tool_point import ToolPoint
+from ir_sim_driver.motion.path import Path
+from ir_sim_driver.motion.tool_point import ToolPoint
 
 TOOL_SPEED = 0.25
 """Largest speed of the tool in T1 [m/s]."""

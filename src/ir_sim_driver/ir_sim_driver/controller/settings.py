@@ -10,10 +10,10 @@ from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.power import REST_MODES, Mode
 from ir_msgs_py.settings import check_settings, setting
 
-from ir_sim_driver.control import ControlSettings
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.plc import PlcSettings
-from ir_sim_driver.power_modes import TransitionSettings
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.plant.control import ControlSettings
+from ir_sim_driver.plc.inputs import PlcSettings
+from ir_sim_driver.power.power_modes import TransitionSettings
 
 DT = 0.001
 """Step of plant and controller [s]."""

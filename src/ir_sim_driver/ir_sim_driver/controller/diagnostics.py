@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from ir_msgs_py.power import Mode
 
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.notices import Level
-from ir_sim_driver.simulation import Simulation
 
 
 class Entry(NamedTuple):

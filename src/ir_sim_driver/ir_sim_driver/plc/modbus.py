@@ -16,7 +16,7 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from ir_sim_driver.errors import DriverError
-from ir_sim_driver.modbus_map import (
+from ir_sim_driver.plc.modbus_map import (
     COILS,
     DISCRETE_INPUTS,
     HEARTBEAT,

@@ -17,23 +17,23 @@ from ir_msgs_py.power import Mode
 from ir_msgs_py.status import StatusCode
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import Backend
-from ir_sim_driver.emergency import EmergencyStop
+from ir_sim_driver.controller.emergency import EmergencyStop
+from ir_sim_driver.controller.pause import Pauses
+from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.executor import Executor
-from ir_sim_driver.goal import ErrorCode, Outcome, TrajectoryGoal
-from ir_sim_driver.loads import Carried
-from ir_sim_driver.manual_speed import manual_scaling
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.executor import Executor
+from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.motion.manual_speed import manual_scaling
+from ir_sim_driver.motion.tool_point import ToolPoint
+from ir_sim_driver.motion.trajectory_checks import check_goal, check_trajectory, checked_route
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.pause import Pauses
-from ir_sim_driver.plc import Plc
-from ir_sim_driver.power_meter import BasePower, PowerMeter
-from ir_sim_driver.power_modes import OFF_THE_NETWORK, PowerModes, Wish
-from ir_sim_driver.simulation_settings import SimulationSettings
-from ir_sim_driver.tool_point import ToolPoint
-from ir_sim_driver.trajectory_checks import check_goal, check_trajectory, checked_route
-from ir_sim_driver.watchdog import Watchdog
+from ir_sim_driver.plant.backend import Backend
+from ir_sim_driver.plant.loads import Carried
+from ir_sim_driver.plant.power_meter import BasePower, PowerMeter
+from ir_sim_driver.plc.inputs import Plc
+from ir_sim_driver.plc.watchdog import Watchdog
+from ir_sim_driver.power.power_modes import OFF_THE_NETWORK, PowerModes, Wish
 
 METER_STEPS = 250  # at the latest: arrays of many steps cost what arrays of few do
 _HOME = 0.01  # rad

@@ -11,8 +11,8 @@ import numpy as np
 
 from ir_sim_driver.arrays import Array
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.goal import ErrorCode
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ErrorCode
 
 _CHUNK = 4096
 _SAMPLES_MAX = 400_000

@@ -16,7 +16,7 @@ from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
 from ir_msgs_py.power import Mode
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import Work
+from ir_sim_driver.plant.backend import Work
 
 
 class BasePower:

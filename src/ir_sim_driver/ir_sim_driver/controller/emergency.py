@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.backend import Backend
-from ir_sim_driver.executor import Executor
+from ir_sim_driver.motion.executor import Executor
+from ir_sim_driver.motion.path import Path
+from ir_sim_driver.motion.tool_point import ToolPoint
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.path import Path
-from ir_sim_driver.tool_point import ToolPoint
+from ir_sim_driver.plant.backend import Backend
 
 _AHEAD = 2.0  # s of path that a stop can cover at most
 _SAMPLES = 400

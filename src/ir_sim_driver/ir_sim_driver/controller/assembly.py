@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from ir_description import PowerData, load_cell, load_power_data, robot_urdf
-from ir_sim_driver.backend import Backend
+from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.ideal_backend import IdealBackend
-from ir_sim_driver.loads import carried
-from ir_sim_driver.pybullet_backend import PyBulletBackend
-from ir_sim_driver.simulation import Simulation
-from ir_sim_driver.simulation_settings import SimulationSettings
+from ir_sim_driver.plant.backend import Backend
+from ir_sim_driver.plant.ideal_backend import IdealBackend
+from ir_sim_driver.plant.loads import carried
+from ir_sim_driver.plant.pybullet_backend import PyBulletBackend
 
 BACKENDS = ("pybullet", "ideal")
 CELL_TOOL = "cell"

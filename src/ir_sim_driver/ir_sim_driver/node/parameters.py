@@ -10,13 +10,13 @@ from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.transitions import PREFIX
 from rclpy.node import Node
 
-from ir_sim_driver.control import ControlSettings
+from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.plc import PlcSettings
-from ir_sim_driver.power_modes import TransitionSettings
-from ir_sim_driver.simulation_settings import ControllerSettings, SimulationSettings
-from ir_sim_driver.wake_on_lan import mac_bytes
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.plant.control import ControlSettings
+from ir_sim_driver.plc.inputs import PlcSettings
+from ir_sim_driver.plc.wake_on_lan import mac_bytes
+from ir_sim_driver.power.power_modes import TransitionSettings
 
 
 @dataclass(frozen=True)

@@ -34,28 +34,28 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_description import DescriptionError, robot_urdf
 from ir_msgs_py import names
-from ir_sim_driver.assembly import make_simulation
-from ir_sim_driver.diagnostics import Entry, report
-from ir_sim_driver.driver import Driver, Frame
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.diagnostics import Entry, report
+from ir_sim_driver.controller.driver import Driver, Frame
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import DriverError
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.goal import ErrorCode, Outcome
-from ir_sim_driver.messages import (
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ErrorCode, Outcome
+from ir_sim_driver.node.messages import (
     fill_controller_state,
     fill_joint_state,
     fill_points,
     goal_from_action,
     goal_from_trajectory,
 )
+from ir_sim_driver.node.parameters import DriverParameters, NodeSettings
+from ir_sim_driver.node.real_time import GridThread, ScaledClock
+from ir_sim_driver.node.services import Services
+from ir_sim_driver.node.shapes import Shape, shapes_of
 from ir_sim_driver.notices import Level
-from ir_sim_driver.parameters import DriverParameters, NodeSettings
-from ir_sim_driver.plc import TOPIC
-from ir_sim_driver.plc_link import PlcLink
-from ir_sim_driver.real_time import GridThread, ScaledClock
-from ir_sim_driver.services import Services
-from ir_sim_driver.shapes import Shape, shapes_of
-from ir_sim_driver.simulation import Simulation
-from ir_sim_driver.wake_on_lan import WakeListener
+from ir_sim_driver.plc.inputs import TOPIC
+from ir_sim_driver.plc.plc_link import PlcLink
+from ir_sim_driver.plc.wake_on_lan import WakeListener
 
 try:  # where a ROS installation has it
     from control_msgs.action import FollowJointTrajectory
@@ -63,7 +63,7 @@ except ImportError:
     FollowJointTrajectory = None
 
 if TYPE_CHECKING:
-    from ir_sim_driver.modbus import ModbusServer
+    from ir_sim_driver.plc.modbus import ModbusServer
 
 _NS = 1_000_000_000
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -177,7 +177,9 @@ class SimDriver(Node):
 
     def _serve_modbus(self, options: NodeSettings) -> ModbusServer | None:
         try:
-            from ir_sim_driver.modbus import ModbusServer  # only where it is wanted: pymodbus may be missing
+            from ir_sim_driver.plc.modbus import (
+                ModbusServer,  # only where it is wanted: pymodbus may be missing
+            )
 
             link = PlcLink(self._driver, options.modbus_watchdog)
             return ModbusServer(options.modbus_host, options.modbus_port, link)
@@ -387,7 +389,3 @@ def main() -> int:
     """Spin the driver until it is told to stop."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
     return run_node(names.SIM_DRIVER, SimDriver, refusals=(DriverError, DescriptionError, MsgsError))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

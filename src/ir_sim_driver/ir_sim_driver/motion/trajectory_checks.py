@@ -10,11 +10,11 @@ from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.goal import ErrorCode, JointTolerance, TrajectoryGoal
-from ir_sim_driver.lead_in import Route, route_onto
-from ir_sim_driver.limit_checks import check_jumps, check_limits
-from ir_sim_driver.path import Motion
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal
+from ir_sim_driver.motion.lead_in import Route, route_onto
+from ir_sim_driver.motion.limit_checks import check_jumps, check_limits
+from ir_sim_driver.motion.path import Motion
 
 _REST = 1e-6  # rad/s that still counts as standing
 _NS = 1e-9

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ir_sim_driver.arrays import Array
-from ir_sim_driver.path import Motion
+from ir_sim_driver.motion.path import Motion
 
 _TINY = 1e-12
 

@@ -16,8 +16,8 @@ from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.status import StatusCode
 
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.plc import Plc
-from ir_sim_driver.power_modes import PowerModes, Rest
+from ir_sim_driver.plc.inputs import Plc
+from ir_sim_driver.power.power_modes import PowerModes, Rest
 
 PAUSE_MAX = 604_800.0  # s: a week
 _MAY_PAUSE = (Mode.STAND_ON_MOTORS, Mode.MOVING, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES)

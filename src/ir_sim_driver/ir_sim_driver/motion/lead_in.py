@@ -15,9 +15,9 @@ from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_sim_driver.arrays import Array
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.execution_settings import ExecutionSettings
-from ir_sim_driver.goal import ErrorCode
-from ir_sim_driver.path import Motion, Path, quintic
+from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ErrorCode
+from ir_sim_driver.motion.path import Motion, Path, quintic
 
 _GENTLE = 0.25  # share of the acceleration limit that closing the last difference may use
 _PEAK = 10.0 / math.sqrt(3.0)  # largest acceleration of a unit quintic step of unit duration
