@@ -1,0 +1,26 @@
+"""A whole program: the cell's stations in order, with every movement, pause and load."""
+
+import time
+
+import numpy as np
+
+from ir_planner import Planner, PlanOptions
+
+
+def main() -> None:
+    planner = Planner(time.monotonic)
+    cell = planner.set_cell("", "demo")
+    plan = planner.plan_program((), 0.0, PlanOptions(), np.array(cell.park))
+    if not plan.status.ok:
+        raise SystemExit(plan.status.message)
+    for step in plan.movements:
+        places = f"{step.from_station or 'start'} -> {step.to_station}"
+        print(
+            f"{step.kind:14} {places:30} {step.power_mode or step.load:16} "
+            f"{step.duration:7.2f} s {step.report.energy:9.0f} J"
+        )
+    print(f"program {plan.program_id}: {plan.report.duration:.1f} s, {plan.report.energy / 1000.0:.1f} kJ")
+
+
+if __name__ == "__main__":
+    main()
