@@ -1,0 +1,191 @@
+"""The planner's calls that a comparison makes, each answered as a flat mapping: name -> number or text.
+
+An answer holds statuses, ids and every figure of the reports. Texts of statuses, times of stages and other
+wall-clock figures are no part of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import cache
+from typing import Any
+
+import numpy as np
+from _compare_face import name_of, planner_of
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.trajectory import JointTrajectory
+
+Answer = dict[str, Any]
+S_M = 0.02  # m
+SHARE_OF_ENDS = 0.8  # of the clearance at start and goal, where that is smaller
+CEILING = 120.0  # s: work ends a request, never the clock
+planner = cache(planner_of)
+
+
+def options(**changed: Any) -> PlanOptions:
+    """Default options under a ceiling that is never reached."""
+    return PlanOptions(**{"planning_time": CEILING, **changed})
+
+
+def numbers_of(report: TrajectoryReport, prefix: str = "") -> Answer:
+    """Every figure of a report."""
+    found: Answer = {}
+    for field in fields(report):
+        value = getattr(report, field.name)
+        if isinstance(value, (bool, int, float)):
+            found[prefix + field.name] = value
+        elif isinstance(value, np.ndarray):
+            found[prefix + field.name] = value.tolist()
+    if report.closest is not None:
+        pair = report.closest
+        found[prefix + "closest"] = f"{pair.kind} {pair.body_a} {pair.body_b}"
+        found[prefix + "closest_distance"] = pair.distance
+    return found
+
+
+def identity(trajectory: JointTrajectory | None) -> str:
+    return trajectory.trajectory_id if trajectory is not None else ""
+
+
+def info_of(info: Any) -> Answer:
+    """Work and seed; the rejected candidates by count alone, because their reasons are texts."""
+    return {
+        "planner_id": info.planner_id,
+        "seed": info.seed,
+        "work": info.iterations,
+        "truncated": info.truncated,
+        "rejected": sorted(one.count for one in info.rejected),
+    }
+
+
+def movement_of(plan: Any) -> Answer:
+    return {
+        "status": int(plan.status.code),
+        "id": identity(plan.trajectory),
+        **info_of(plan.info),
+        **numbers_of(plan.report),
+    }
+
+
+def program(cell: str, stations: tuple[str, ...], cycle_time: float, **changed: Any) -> Answer:
+    asked = planner(cell)
+    home = np.array(asked.cell.machine_home)
+    plan = asked.plan_program(stations, cycle_time, options(**changed), home)
+    found = {"status": int(plan.status.code), "id": plan.program_id, **info_of(plan.info)}
+    for k, movement in enumerate(plan.movements):
+        found[f"{k} id"] = movement.trajectory_id
+        found[f"{k} duration"] = movement.duration
+        found |= numbers_of(movement.report, f"{k} ")
+    return found | numbers_of(plan.report)
+
+
+@cache
+def tasks_of(cell: str) -> list[tuple[str, Any, Any, float]]:
+    """Name, start (n,), goal (n,) and margin [m] of every task, there and back."""
+    asked = planner(cell)
+    found = []
+    for task in asked.cell.tasks:
+        start, goal = (np.array(q, dtype=np.float64) for q in (task.start, task.goal))
+        ends = min(asked.check_state(q, 0.0, 1, "", "").min_distance for q in (start, goal))
+        margin = min(S_M, SHARE_OF_ENDS * ends)
+        found += [(task.name, start, goal, margin), (f"{task.name} back", goal, start, margin)]
+    return found
+
+
+def moved(cell: str, start: Any, goal: Any, margin: float, **changed: Any) -> Answer:
+    asked = options(safety_distance=margin, **changed)
+    return movement_of(planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked))
+
+
+def to_station(cell: str) -> Answer:
+    asked = planner(cell)
+    goal = name_of("parse_goal")(asked.cell.stations[-1].name, asked.cell)
+    return movement_of(asked.plan_regional(np.array(asked.cell.machine_home), goal, options()))
+
+
+def service(cell: str, station: str, direction: str) -> Answer:
+    asked = planner(cell)
+    home = np.array(asked.cell.machine_home)
+    plan = asked.plan_service(station, direction, None, home, 3, options())
+    found = {"status": int(plan.status.code), **info_of(plan.info)}
+    for k, candidate in enumerate(plan.candidates):
+        found[f"{k} id"] = identity(candidate.trajectory)
+        found |= numbers_of(candidate.report, f"{k} ")
+    return found
+
+
+def thinned(planned: Any, count: int) -> JointTrajectory:
+    """Every N-th point of a planned trajectory with its times, and straight lines between."""
+    last = len(planned.times_ns) - 1
+    kept = np.unique(np.linspace(0, last, count).astype(int))
+    return JointTrajectory.from_seconds(
+        planned.joint_names, planned.times[kept] * 3.0, planned.positions[kept]
+    )
+
+
+@cache
+def planned(cell: str, k: int) -> JointTrajectory:
+    _, start, goal, margin = tasks_of(cell)[k]
+    asked = options(safety_distance=margin)
+    found = planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked).trajectory
+    assert isinstance(found, JointTrajectory)
+    return found
+
+
+def optimized(cell: str, k: int, points: int, **changed: Any) -> Answer:
+    asked = options(safety_distance=tasks_of(cell)[k][3], **changed)
+    plan = planner(cell).optimize_trajectory(thinned(planned(cell, k), points), asked)
+    found = {"status": int(plan.status.code), "id": identity(plan.trajectory), **info_of(plan.info)}
+    found["front"] = [point.trajectory.trajectory_id for point in plan.front]
+    return found | numbers_of(plan.before, "before ") | numbers_of(plan.after, "after ")
+
+
+def through(cell: str, k: int, points: int, timed: bool, **changed: Any) -> Answer:
+    given = thinned(planned(cell, k), points)
+    reference = name_of("Reference")(given.positions, given.times if timed else None)
+    asked = options(safety_distance=tasks_of(cell)[k][3], **changed)
+    return movement_of(planner(cell).plan_trajectory(reference, asked))
+
+
+def evaluated(cell: str, k: int) -> Answer:
+    found = planner(cell).evaluate(planned(cell, k), tasks_of(cell)[k][3], "", "")
+    return {
+        "status": int(found.verification.status.code),
+        **numbers_of(found.report),
+        "distances": float(np.sum(found.clearance.distances)),
+    }
+
+
+def ik(cell: str, station: str, method: str) -> Answer:
+    asked = planner(cell)
+    goal = name_of("parse_goal")(station, asked.cell)
+    near = np.array(asked.cell.machine_home)
+    plan = asked.compute_ik(goal, method, S_M, near, "", 32, 3)
+    found = {"status": int(plan.status.code), "rejected": sorted(one.count for one in plan.info.rejected)}
+    found["branches"] = [solution.branch for solution in plan.solutions]
+    found["q"] = [np.asarray(solution.q).tolist() for solution in plan.solutions]
+    found["clearances"] = [solution.clearance for solution in plan.solutions]
+    return found
+
+
+def standby(cell: str, pause: float) -> Answer:
+    found = planner(cell).standby(pause, None, "")
+    return {
+        "mode": found.chosen.name,
+        "wake_at": found.wake_at,
+        "energy": found.energy,
+        "saving": found.saving,
+        "energies": [float(energy) for energy in found.energies],
+        "break_even": [float(mode.break_even) for mode in found.alternatives],
+    }
+
+
+def state(cell: str, k: int) -> Answer:
+    found = planner(cell).check_state(tasks_of(cell)[k][1], S_M, 20, "", "")
+    return {
+        "valid": found.valid,
+        "min_distance": found.min_distance,
+        "pairs": [f"{pair.body_a} {pair.body_b}" for pair in found.pairs],
+        "distances": [pair.distance for pair in found.pairs],
+    }

@@ -1,0 +1,142 @@
+"""Do two checkouts give the same answers, and is the second one as fast as the first?
+
+    python benchmarks/compare.py --before CHECKOUT [--after CHECKOUT] [--only TEXT]... [--rounds N]
+                                 [--script NAME]... [--quick] [--json FILE]
+
+A fixed list of requests is answered by the planner's core of each checkout, both built, each in a process of
+its own. Answers: status, trajectory ids, program id and every figure of the reports, bit by bit; each
+difference is listed. Speed: the same request before, after, before, after, N rounds, never at once; the
+ratio after : before of the least processor times of a request, and the median of it over the requests of a
+group. --script also runs a benchmark of each checkout in turns and compares its times of the same name.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from _compare_scripts import script_rows
+from _compare_sides import Side, both_built, differences
+from _results import Claim, at_most, commit, print_claims, write_json
+
+HERE = Path(__file__).resolve().parents[1]
+RATIO = 1.05
+SHOWN = 12  # differences per request
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--before", type=Path, required=True, help="a checkout with a built core")
+    parser.add_argument("--after", type=Path, default=HERE, help="another one; default: this one")
+    parser.add_argument("--only", action="append", help="requests whose group or name contains this")
+    parser.add_argument("--rounds", type=int, default=3, help="timed rounds; 0: the answers alone")
+    parser.add_argument(
+        "--script", action="append", default=[], help="a benchmark to run in both, as kernels"
+    )
+    parser.add_argument("--quick", action="store_true", help="every third request, one timed round")
+    parser.add_argument("--json", type=Path, help="also write the results here")
+    given = parser.parse_args()
+    missing = both_built(given.before, given.after)
+    if missing:
+        parser.error(missing)
+    return given
+
+
+def chosen(names: list[list[str]], given: argparse.Namespace) -> list[int]:
+    """Numbers of the requests that are asked."""
+    only = given.only or [""]
+    found = [k for k, words in enumerate(names) if any(text in word for text in only for word in words)]
+    return found[::3] if given.quick else found
+
+
+def row_of(k: int, sides: tuple[Side, Side], rounds: int) -> dict[str, Any]:
+    """A request answered by both, its differences, and the ratio of its times."""
+    first = [side.ask(k) for side in sides]
+    found = differences(first[0]["answer"], first[1]["answer"])
+    least = [float("inf")] * 2
+    for _ in range(rounds):
+        for place, side in enumerate(sides):
+            least[place] = min(least[place], side.ask(k)["cpu_s"])
+    return {
+        "group": first[0]["group"],
+        "name": first[0]["name"],
+        "status": first[1]["answer"].get("status", ""),
+        "id": first[1]["answer"].get("id", ""),
+        "identical": not found,
+        "differences": found,
+        **({"before_ms": 1e3 * least[0], "after_ms": 1e3 * least[1]} if rounds else {}),
+    }
+
+
+def show(row: dict[str, Any]) -> None:
+    """One line per request, one more per difference."""
+    times = f"{row['before_ms']:9.2f} {row['after_ms']:9.2f} ms" if "before_ms" in row else ""
+    verdict = "identical" if row["identical"] else "DIFFERENT"
+    print(f"{row['name']:48s} {row['status']!s:>6s} {row['id']:16s} {verdict} {times}", flush=True)
+    for text in row["differences"][:SHOWN]:
+        print(f"    {text}")
+    if len(row["differences"]) > SHOWN:
+        print(f"    and {len(row['differences']) - SHOWN} more")
+
+
+def groups_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Median ratio of the times per group."""
+    found = []
+    for group in dict.fromkeys(row["group"] for row in rows if "before_ms" in row):
+        times = np.array([[row["before_ms"], row["after_ms"]] for row in rows if row["group"] == group])
+        ratio = float(np.median(times[:, 1] / times[:, 0]))
+        sums = times.sum(axis=0)
+        found.append(
+            {
+                "group": group,
+                "requests": len(times),
+                "before_ms": sums[0],
+                "after_ms": sums[1],
+                "ratio": ratio,
+            }
+        )
+    return found
+
+
+def claims_of(rows: list[dict[str, Any]], groups: list[dict[str, Any]]) -> list[Claim]:
+    """Identity, and the median ratio of each group and of all."""
+    different = sum(not row["identical"] for row in rows)
+    claims = [at_most(f"all answers identical: different ones of {len(rows)}", different, "answers", 0)]
+    claims += [at_most(f"median ratio {group['group']}", group["ratio"], "1", RATIO) for group in groups]
+    ratios = [row["after_ms"] / row["before_ms"] for row in rows if "before_ms" in row]
+    if ratios:
+        claims.append(at_most("median ratio of all requests", float(np.median(ratios)), "1", RATIO))
+    return claims
+
+
+def main() -> None:
+    """Ask both, print, write."""
+    given = arguments()
+    rounds = min(given.rounds, 1) if given.quick else given.rounds
+    with Side(given.before) as before, Side(given.after) as after:
+        if before.requests != after.requests:
+            raise SystemExit("the checkouts have different cells or stations: their requests don't pair")
+        rows = []
+        for k in chosen(after.requests, given):
+            rows.append(row_of(k, (before, after), rounds))
+            show(rows[-1])
+    groups = groups_of(rows)
+    claims = claims_of(rows, groups)
+    for name in given.script:
+        more = script_rows(name, given.before, given.after, max(rounds, 1))
+        groups += more
+        if more:
+            ratio = float(np.median([row["ratio"] for row in more]))
+            claims.append(at_most(f"median ratio of the times of benchmark {name}", ratio, "1", RATIO))
+    print_claims(claims)
+    commits = {"before": commit(given.before), "after": commit(given.after)}
+    write_json(given.json, [*rows, *groups], claims, compared=commits)
+
+
+if __name__ == "__main__":
+    main()
