@@ -6,18 +6,52 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ir_planner.curves.splines import (
-    end_state,
-    first_segment,
-    last_segment,
-    middle_segment,
-    spline_through,
-    to_ppoly,
-    virtual_knots,
-)
+from ir_planner.curves.arc_length import evenly_spaced
+from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
+from numpy.typing import NDArray
 
+FloatArray = NDArray[np.float64]
 number = st.floats(-3.0, 3.0)
 duration = st.floats(0.05, 4.0)
+
+
+# -- the segments as the equation gives them: the reference of spline_through, which is what runs
+
+
+def first_segment(q0: float, q1: float, v0: float, a0: float, t1: float) -> FloatArray:
+    """Coefficients (4,) in u, lowest first, of the cubic from q0 with speed v0 and acceleration a0 to q1 in
+    t1 s.
+    """
+    delta = q1 - q0
+    return np.array([q0, v0 * t1, a0 * t1**2 / 2, delta - v0 * t1 - a0 * t1**2 / 2])
+
+
+def middle_segment(q0: float, q1: float, v0: float, a0: float, t: float) -> FloatArray:
+    """Coefficients (4,) of a middle cubic: it takes over speed v0 and acceleration a0 of the segment
+    before.
+    """
+    return first_segment(q0, q1, v0, a0, t)
+
+
+def last_segment(q0: float, qf: float, vf: float, af: float, tn: float) -> FloatArray:
+    """Coefficients (4,) of the cubic from q0 to qf, where it ends with speed vf and acceleration af after
+    tn s.
+    """
+    delta = qf - q0
+    return np.array(
+        [
+            q0,
+            3 * delta - 2 * vf * tn + af * tn**2 / 2,
+            -3 * delta + 3 * vf * tn - af * tn**2,
+            delta - vf * tn + af * tn**2 / 2,
+        ]
+    )
+
+
+def end_state(coefficients: FloatArray, t: float) -> tuple[float, float, float]:
+    """Position, speed and acceleration at the end (u = 1) of a segment that lasts t s."""
+    c = coefficients
+    return float(c.sum()), float((c[1] + 2 * c[2] + 3 * c[3]) / t), float((2 * c[2] + 6 * c[3]) / t**2)
 
 
 @given(number, number, number, number, duration)
@@ -77,6 +111,15 @@ def test_many_points_are_passed_at_rest_at_both_ends_and_c2(count: int, seed: in
     inner = spline.times[1:-1]
     for order in (0, 1, 2):
         assert curve(inner - 1e-12, order) == pytest.approx(curve(inner + 1e-12, order), abs=1e-7)
+
+
+@given(st.integers(2, 12), st.integers(2, 40), st.integers(0, 10_000))
+def test_evenly_spaced_points_lie_on_the_path_at_even_lengths(corners: int, count: int, seed: int) -> None:
+    path = np.random.default_rng(seed).uniform(-1.0, 1.0, (corners, 3))
+    points = evenly_spaced(path, count)
+    assert (points[[0, -1]] == path[[0, -1]]).all()
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= length / (count - 1) + 1e-9
 
 
 def test_times_that_do_not_increase_are_refused() -> None:

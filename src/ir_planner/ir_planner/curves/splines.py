@@ -2,7 +2,7 @@
 
 Each segment runs in its own normalised time u in [0, 1]. The first and the last segment carry the
 conditions at the ends, the middle ones join with continuous q, qd and qdd. Giving q, qd and qdd at both
-ends leaves no room for two of the inner positions: the second and the second last knot are virtual, their
+ends leaves no freedom for two of the inner positions: the second and the second last knot are virtual, their
 positions follow. (As printed the linear coefficient of the last segment ends in a_f t_n / 2; only with a_f
 t_n^2 / 2 do the end conditions hold.)
 """
@@ -25,42 +25,6 @@ class JointSpline:
     positions: FloatArray
     velocities: FloatArray
     accelerations: FloatArray
-
-
-def first_segment(q0: float, q1: float, v0: float, a0: float, t1: float) -> FloatArray:
-    """Coefficients (4,) in u, lowest first, of the cubic from q0 with speed v0 and acceleration a0 to q1 in
-    t1 s.
-    """
-    delta = q1 - q0
-    return np.array([q0, v0 * t1, a0 * t1**2 / 2, delta - v0 * t1 - a0 * t1**2 / 2])
-
-
-def middle_segment(q0: float, q1: float, v0: float, a0: float, t: float) -> FloatArray:
-    """Coefficients (4,) of a middle cubic: it takes over speed v0 and acceleration a0 of the segment
-    before.
-    """
-    return first_segment(q0, q1, v0, a0, t)
-
-
-def last_segment(q0: float, qf: float, vf: float, af: float, tn: float) -> FloatArray:
-    """Coefficients (4,) of the cubic from q0 to qf, where it ends with speed vf and acceleration af after
-    tn s.
-    """
-    delta = qf - q0
-    return np.array(
-        [
-            q0,
-            3 * delta - 2 * vf * tn + af * tn**2 / 2,
-            -3 * delta + 3 * vf * tn - af * tn**2,
-            delta - vf * tn + af * tn**2 / 2,
-        ]
-    )
-
-
-def end_state(coefficients: FloatArray, t: float) -> tuple[float, float, float]:
-    """Position, speed and acceleration at the end (u = 1) of a segment that lasts t s."""
-    c = coefficients
-    return float(c.sum()), float((c[1] + 2 * c[2] + 3 * c[3]) / t), float((2 * c[2] + 6 * c[3]) / t**2)
 
 
 def virtual_knots(point_times: FloatArray) -> FloatArray:

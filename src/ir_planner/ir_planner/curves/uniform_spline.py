@@ -11,6 +11,8 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 
+from ir_planner.curves.arc_length import at_shares
+
 
 @dataclass(frozen=True, eq=False)
 class Tops:
@@ -90,8 +92,8 @@ class UniformSpline:
 
 
 def along_motion(trajectory: JointTrajectory, count: int, duration: float) -> UniformSpline:
-    """Spline with `count` control points between its ends along a trajectory, at its pace but for the
-    duration [s].
+    """Spline with `count` control points between its ends along a trajectory, with its speed profile but
+    for the duration [s].
     """
     begin = float(trajectory.times[0])
     q = trajectory.sample(begin + np.linspace(0.0, 1.0, count + 4) * (trajectory.duration - begin)).q
@@ -105,10 +107,8 @@ def along_motion(trajectory: JointTrajectory, count: int, duration: float) -> Un
 
 def along_path(path: FloatArray, count: int, duration: float) -> UniformSpline:
     """Spline with `count` control points between its ends along a path (M, n), slow at both ends of it."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     share = np.arange(1, count + 1) / (count + 1)
-    at = share * share * (3.0 - 2.0 * share) * way[-1]
-    inner = np.stack([np.interp(at, way, path[:, j]) for j in range(path.shape[1])], axis=1)
+    inner = at_shares(path, share * share * (3.0 - 2.0 * share))
     control = np.concatenate([np.repeat(path[:1], 3, axis=0), inner, np.repeat(path[-1:], 3, axis=0)])
     return UniformSpline(control, duration / (count + 3))
 

@@ -9,7 +9,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_planner.checks import Evaluation, evaluate_trajectory
-from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
+from ir_planner.curves import UniformSpline, along_motion, along_path, evenly_spaced, fewest_seconds
 from ir_planner.optimize.refinement import THOROUGH, Draft, Refinement
 from ir_planner.request import Journal
 from ir_planner.scene import PlanningScene
@@ -71,16 +71,7 @@ def path_of(trajectory: JointTrajectory, scene: PlanningScene) -> FloatArray:
     robot = scene.cell.robot
     dense = np.clip(np.concatenate([trajectory.positions[:1], dense]), robot.position_min, robot.position_max)
     dense[-1] = trajectory.positions[-1]
-    return at_even_distances(dense, _ALONG)
-
-
-def at_even_distances(path: FloatArray, count: int) -> FloatArray:
-    """`count` points along a path (M, n), its ends included."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    at = np.linspace(0.0, way[-1], count)
-    points = np.stack([np.interp(at, way, path[:, j]) for j in range(path.shape[1])], axis=1)
-    points[0], points[-1] = path[0], path[-1]
-    return points
+    return evenly_spaced(dense, _ALONG)
 
 
 class Descents:

@@ -12,6 +12,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 
 from ir_planner.checks import FreeSpace, evaluate_trajectory
+from ir_planner.curves import at_shares
 from ir_planner.errors import TimingError
 from ir_planner.optimize.refinement import QUICK, THOROUGH, Draft, Effort, Refined, Refinement
 from ir_planner.request import Journal
@@ -124,8 +125,5 @@ def _alike(a: Draft, b: Draft) -> bool:
 
 
 def _places(draft: Draft) -> FloatArray:
-    """Configurations (9, n) along a draft, by the way it has gone."""
-    points = draft.spline.control
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    at = _PLACES * way[-1]
-    return np.stack([np.interp(at, way, points[:, j]) for j in range(points.shape[1])], axis=1)
+    """Configurations (9, n) along a draft, at even shares of its length."""
+    return at_shares(draft.spline.control, _PLACES)

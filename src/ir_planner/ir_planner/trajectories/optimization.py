@@ -16,9 +16,9 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
-from ir_planner.curves import UniformSpline
+from ir_planner.curves import UniformSpline, evenly_spaced
 from ir_planner.errors import RequestError
-from ir_planner.optimize import Descents, Measured, Task, at_even_distances, path_of
+from ir_planner.optimize import Descents, Measured, Task, path_of
 from ir_planner.regional import search_regional
 from ir_planner.request import DURATION_MAX, Journal, Work, bounded, within_limits
 from ir_planner.scene import STILL, PlanningScene
@@ -158,7 +158,7 @@ class _Optimization:
 
     def _shortcut(self) -> list[UniformSpline]:
         """A start along the path with corners left out; none where its straight steps aren't free."""
-        corners = at_even_distances(self.path, _CORNERS)
+        corners = evenly_spaced(self.path, _CORNERS)
         if not self.space.edges_free(corners[:-1], corners[1:]).all():
             return []
         return [self.descents.start_along(fewest_corners(corners, self.space, self.scene.weights))]
