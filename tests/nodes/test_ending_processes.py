@@ -25,9 +25,9 @@ INT, TERM = signal.SIGINT, signal.SIGTERM
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    from ir_recorder.qos import QosOffer
-    from ir_recorder.session import RecordingSession
-    from ir_recorder.writer import RecordingWriter
+    from ir_recorder.format.qos import QosOffer
+    from ir_recorder.write.session import RecordingSession
+    from ir_recorder.write.writer import RecordingWriter
     from rclpy.serialization import serialize_message
     from std_msgs.msg import String
 
@@ -68,6 +68,6 @@ def test_a_node_that_is_told_to_end_ends_well(name, signals, recording, tmp_path
         assert process.stderr is not None
         process.stderr.close()
     if name == names.RECORDER:
-        from ir_recorder.raw import read_raw
+        from ir_recorder.read.raw import read_raw
 
         assert read_raw(file).problems == ()

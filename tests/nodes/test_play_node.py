@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ir_recorder.format.qos import QosOffer
 from ir_recorder.play.node import PlayNode
 from ir_recorder.play.schedule import PlaySettings
-from ir_recorder.qos import QosOffer
-from ir_recorder.raw import read_raw
-from ir_recorder.session import RecordingSession
-from ir_recorder.writer import RecordingWriter
+from ir_recorder.read.raw import read_raw
+from ir_recorder.write.session import RecordingSession
+from ir_recorder.write.writer import RecordingWriter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock

@@ -14,9 +14,9 @@ from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import PathError, WriteError
 from ir_recorder.node import RecorderNode
-from ir_recorder.raw import read_raw
+from ir_recorder.read.raw import read_raw
 from ir_recorder.settings import RecorderSettings
-from ir_recorder.writer import RecordingWriter
+from ir_recorder.write.writer import RecordingWriter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState

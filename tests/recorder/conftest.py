@@ -13,10 +13,10 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from ir_msgs.msg import ControllerState, PlannedMovement, PlcOutputs, PowerState, ProgramState
 from ir_msgs_py.power import Mode
-from ir_recorder.qos import QosOffer
-from ir_recorder.schemas import SchemaLibrary
-from ir_recorder.session import CellFiles, RecordingSession
-from ir_recorder.writer import RecordingWriter
+from ir_recorder.format.qos import QosOffer
+from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.write.session import CellFiles, RecordingSession
+from ir_recorder.write.writer import RecordingWriter
 from mcap_ros2._dynamic import serialize_dynamic
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ir_recorder.definition import definitions_of
 from ir_recorder.errors import PathError, SchemaError, WriteError
-from ir_recorder.qos import QosOffer, offers_from_yaml, offers_to_yaml, request_for
-from ir_recorder.raw import read_raw
-from ir_recorder.schemas import SchemaLibrary
-from ir_recorder.session import CellFiles, RecordingSession
-from ir_recorder.topics import TopicSelection, single_type
-from ir_recorder.writer import RecordingWriter
+from ir_recorder.format.definition import definitions_of
+from ir_recorder.format.qos import QosOffer, offers_from_yaml, offers_to_yaml, request_for
+from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.listen.topics import TopicSelection, single_type
+from ir_recorder.read.raw import read_raw
+from ir_recorder.write.session import CellFiles, RecordingSession
+from ir_recorder.write.writer import RecordingWriter
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message

@@ -16,7 +16,7 @@ from ir_recorder.analysis.clearance import collision_model
 from ir_recorder.analysis.grid import check_grid
 from ir_recorder.analysis.loads import LoadTimeline, after, load_timeline
 from ir_recorder.analysis.meter import Meter
-from ir_recorder.recording import TextEvent
+from ir_recorder.read.recording import TextEvent
 
 from ir_recorder import Analysis, Tolerances, analyse, findings, read_recording
 
@@ -51,7 +51,7 @@ def test_steps_know_when_they_moved_and_what_they_took(analysis: Analysis) -> No
 def test_energy_is_base_and_axes_and_burnt_and_what_the_capacitor_took(analysis: Analysis) -> None:
     capacity = 106.0  # J, data of the drive
     for result in analysis.movements:
-        rest = result.energy - result.base_energy - result.joint_energy.sum() - result.burnt_energy
+        rest = result.energy - result.base_energy - result.joint_energy.sum() - result.dissipated_energy
         assert abs(rest) <= capacity + 1.0
 
 

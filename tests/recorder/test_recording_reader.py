@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ir_msgs.msg import PlcInputs
-from ir_recorder.cdr import Columns
 from ir_recorder.errors import ReadError
-from ir_recorder.qos import QosOffer
-from ir_recorder.raw import read_raw
-from ir_recorder.reader import read_recording
-from ir_recorder.schemas import SchemaLibrary
-from ir_recorder.session import RecordingSession
-from ir_recorder.writer import RecordingWriter
+from ir_recorder.format.qos import QosOffer
+from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.read.cdr import Columns
+from ir_recorder.read.raw import read_raw
+from ir_recorder.read.reader import read_recording
+from ir_recorder.write.session import RecordingSession
+from ir_recorder.write.writer import RecordingWriter
 from mcap.reader import make_reader
 from mcap.records import Schema
 from mcap.writer import Writer
@@ -156,7 +156,7 @@ def test_messages_that_do_not_fit_their_definition_are_told(tmp_path: Path) -> N
 
 def test_reading_needs_no_ros() -> None:
     code = (
-        "import sys, ir_recorder, ir_recorder.report, ir_recorder.report_main, ir_recorder.picture;"
+        "import sys, ir_recorder, ir_recorder.report, ir_recorder.report_main, ir_recorder.report.picture;"
         "print([m for m in sys.modules if m.split('.')[0] in ('rclpy', 'ir_msgs', 'rosbags', 'matplotlib')])"
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ir_description.body import Body
-from ir_recorder.picture import write_picture
 from ir_recorder.report import report_html, write_report
+from ir_recorder.report.picture import write_picture
 from ir_recorder.report.series import envelope, quantised
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report_main import main

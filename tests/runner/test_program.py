@@ -72,7 +72,7 @@ class World:
         if refusal is not None:
             return refusal, ()
         match request:
-            case ask.Tell(index, event, note):
+            case ask.Announce(index, event, note):
                 self.log.append(f"{index} {event}" + (f": {note}" if note else ""))
             case ask.Drive(trajectory):
                 self.log.append("drive")

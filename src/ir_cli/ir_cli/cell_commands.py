@@ -18,7 +18,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add cell check and cell list."""
     cell = commands.add_parser("cell", help="check cell files, list the bundled cells")
     verbs = cell.add_subparsers(dest="verb", required=True)
-    check = verbs.add_parser("check", help="read a cell file; say what is wrong with it, and where")
+    check = verbs.add_parser("check", help="read a cell file; list what is wrong with it, and where")
     check.add_argument("file", help="a path, or the name of a bundled cell")
     check.set_defaults(run=run_check)
     listing = verbs.add_parser("list", help="names of the bundled cells")

@@ -42,7 +42,7 @@ def _yaml(value: object) -> str:
 
 
 def ending(code: int) -> str:
-    """How a process with this return code ended, as people say it."""
+    """How a process with this return code ended, in words."""
     if code >= 0:
         return f"ended with exit code {code}"
     try:

@@ -38,7 +38,7 @@ def check_program(movements: Sequence[PlannedMovement]) -> None:
 
 
 def load_after(movement: PlannedMovement) -> str:
-    """Return the load text when the step has ended; "" where the step says nothing about it."""
+    """Return the load text when the step has ended; "" where the step leaves it open."""
     if not (movement.attach or movement.detach):
         return movement.load
     if not movement.load:

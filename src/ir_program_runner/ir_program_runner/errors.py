@@ -1,8 +1,8 @@
 """What can go wrong with a program, as one tree.
 
 RunnerError
-├── ProgramError         a program that must not be started; knows its status code
-├── StepFailedError      a step that went wrong while it ran; knows its status
+├── ProgramError         a program that must not be started; carries its status code
+├── StepFailedError      a step that went wrong while it ran; carries its status
 └── CanceledError        thrown into a running program: stop, and leave no bit behind
 """
 
@@ -32,4 +32,4 @@ class StepFailedError(RunnerError):
 
 
 class CanceledError(RunnerError):
-    """Somebody canceled the program; the message says how it stopped."""
+    """Somebody canceled the program; the message describes how it stopped."""

@@ -26,10 +26,10 @@ class DriverPort(Protocol):
 
     @property
     def silent(self) -> bool:
-        """Whether the meter has not been heard for too long."""
+        """Whether no reading of the meter has come for too long."""
 
     def state(self) -> Status:
-        """Say whether the driver can be talked to."""
+        """SUCCESS where the driver can be reached."""
 
     async def set_plc_input(self, name: str, value: bool) -> Status:
         """Set one level."""
@@ -38,7 +38,7 @@ class DriverPort(Protocol):
         """Carry exactly this load text."""
 
     async def query_modes(self) -> tuple[Status, tuple[PowerMode, ...]]:
-        """Tell the modes with their times."""
+        """The modes with their times."""
 
     async def drive(self, trajectory: JointTrajectory, stop: Callable[[], bool]) -> Status:
         """Execute a trajectory; stop along the path when `stop` is true."""
@@ -59,8 +59,8 @@ class Ports:
     fault: Callable[[], str]
     canceled: Callable[[], bool]
     begin: Callable[[int], None]
-    tell: Callable[[ask.Tell], None]
-    tell_phase: Callable[[str], None]
+    announce: Callable[[ask.Announce], None]
+    announce_phase: Callable[[str], None]
     set_signal: Callable[[Signal], None]
     send_wake_packet: Callable[[], Status]
 
@@ -107,10 +107,10 @@ class Fulfilment:
         match request:
             case ask.Begin(index):
                 ports.begin(index)
-            case ask.Tell():
-                ports.tell(request)
+            case ask.Announce():
+                ports.announce(request)
             case ask.Phase(text):
-                ports.tell_phase(text)
+                ports.announce_phase(text)
             case ask.SetSignal(signal):
                 ports.set_signal(signal)
             case ask.SendWakePacket():
@@ -130,7 +130,7 @@ class Fulfilment:
         return Status.success()
 
     async def _wait(self, condition: Callable[[], bool], timeout: float) -> Status:
-        """Wait for the condition, but no longer than the driver is heard, nobody cancels and time goes on."""
+        """Wait for the condition; ends early on a cancel, a silent driver or a clock that jumps."""
         ports = self._ports
         deadline = ports.now() + timeout
 

@@ -1,4 +1,4 @@
-"""The node `ir_program_runner`: fetches a program, fulfils its requests one by one, and tells where it is."""
+"""The node `ir_program_runner`: fetches a program, fulfils its requests and publishes its progress."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from ir_program_runner.machines import Machines
 from ir_program_runner.parameters import declare_parameters
 from ir_program_runner.program import Program, ProgramResult
 from ir_program_runner.progress import Progress
-from ir_program_runner.requests import Tell
+from ir_program_runner.requests import Announce
 from ir_program_runner.wake_on_lan import magic_packet, send_packet
 
 _KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -117,7 +117,7 @@ class ProgramRunnerNode(Node):
         self._progress = progress = Progress(goal.request.program_id, (), self._now())
         try:
             status, movements = await self._fetch(goal.request)
-            # a driver or a /clock that has just been started gets the time to be heard
+            # a driver or a /clock that has just been started gets the time to be discovered
             patience = self._settings.links.value.response_timeout
             await self._waiting.until(lambda: not self._driver.silent and self._now() > 0.0, patience)
             progress.started = self._now()
@@ -133,7 +133,7 @@ class ProgramRunnerNode(Node):
         return self._end(goal, result, self._now() - progress.started, self._driver.energy - energy)
 
     async def _run_steps(self, goal: Any, program: Program) -> ProgramResult:
-        feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._tell_feedback(goal))
+        feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._publish_feedback(goal))
         try:
             return await Fulfilment(self._ports(goal)).run(program)
         finally:
@@ -169,8 +169,8 @@ class ProgramRunnerNode(Node):
             fault=lambda: self._jump,
             canceled=lambda: bool(goal.is_cancel_requested),
             begin=self._begin,
-            tell=self._tell,
-            tell_phase=lambda text: self._tell_phase(goal, text),
+            announce=self._announce,
+            announce_phase=lambda text: self._announce_phase(goal, text),
             set_signal=self._set_signal,
             send_wake_packet=self._send_wake_packet,
         )
@@ -215,28 +215,28 @@ class ProgramRunnerNode(Node):
         assert self._progress is not None
         self._progress.begin(index)
 
-    def _tell(self, tell: Tell) -> None:
+    def _announce(self, step: Announce) -> None:
         progress = self._progress
         assert progress is not None
-        if tell.event is Event.STARTED:
+        if step.event is Event.STARTED:
             progress.step_started = self._now()
         state = ProgramState(
             stamp_ns=self.get_clock().now().nanoseconds,
             program_id=progress.program_id,
-            index=tell.index,
+            index=step.index,
             total=progress.total,
-            event=tell.event,
-            movement=progress.movements[tell.index],
-            note=tell.note,
+            event=step.event,
+            movement=progress.movements[step.index],
+            note=step.note,
         )
         self._program_state.publish(program_state_to_msg(state))
 
-    def _tell_phase(self, goal: Any, text: str) -> None:
+    def _announce_phase(self, goal: Any, text: str) -> None:
         assert self._progress is not None
         self._progress.phase = text
-        self._tell_feedback(goal)
+        self._publish_feedback(goal)
 
-    def _tell_feedback(self, goal: Any) -> None:
+    def _publish_feedback(self, goal: Any) -> None:
         progress = self._progress
         if progress is not None and goal.is_active:
             goal.publish_feedback(
@@ -263,7 +263,7 @@ class ProgramRunnerNode(Node):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the node until it is told to end."""
+    """Run the node until it is ended."""
     refusals = (ParameterError, DescriptionError, ValueError)
     return run_node(names.PROGRAM_RUNNER, ProgramRunnerNode, arguments, refusals=refusals)
 

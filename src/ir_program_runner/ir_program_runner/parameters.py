@@ -14,7 +14,7 @@ from ir_program_runner.settings import LinkSettings, ProgramSettings
 
 @dataclass(frozen=True)
 class RunnerParameters:
-    """What the node is set to; transitions count where the driver doesn't tell them."""
+    """What the node is set to; transitions count where the driver doesn't report them."""
 
     program: Parameters[ProgramSettings]
     transitions: Parameters[TransitionTimes]

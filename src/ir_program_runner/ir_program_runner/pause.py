@@ -1,7 +1,7 @@
 """A pause in a power mode: go to rest, wake in time, be ready when the pause ends.
 
 AB switches the drive bus off, HIB hibernates, DRIVES_OFF closes the brakes. While it hibernates the
-controller hears nothing but a Wake-on-LAN packet; the HIB bit is cleared when it is back.
+controller reacts to nothing but a Wake-on-LAN packet; the HIB bit is cleared when it is back.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ READY = (Mode.STAND_ON_MOTORS, Mode.MOVING)
 _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION)
 _AWAKE = (Mode.FROM_HIBERNATION, *READY, Mode.STAND_ON_BRAKES)
 _ROUNDING = 1e-6  # s; a plan may use the shortest pause exactly
-_LATE = 0.1  # s that nobody is told about
+_LATE = 0.1  # s; a shorter delay is not reported
 _BIT = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib", Mode.STAND_ON_BRAKES: "drives_off"}
 
 
@@ -119,7 +119,7 @@ class Pause:
 
     def _wake_by_packets(self, outcome: Outcome, limit: float) -> Requests:
         """Send packets until the controller starts; one may get lost, or come before it sleeps."""
-        if outcome.mode not in _ASLEEP:  # never fell asleep: take the wish back instead
+        if outcome.mode not in _ASLEEP:  # never hibernated: clear the bit instead
             return need((yield SetPlcInput(self._bit, False)))
         self.restarted = True
         while outcome.mode in _ASLEEP and outcome.now < limit:
@@ -130,10 +130,10 @@ class Pause:
         return outcome
 
     def _clear(self) -> Generator[Request, Outcome, None]:
-        """After a cancel or a fault: take the wish to rest back, without waiting for the robot.
+        """After a cancel or a fault: clear the bit of the pause, without waiting for the robot.
 
         A controller that hibernates is woken; its HIB bit counts no more then and is cleared when a
-        program starts. One that is still on its way into hibernation sleeps until somebody wakes it.
+        program starts. One that is still entering hibernation sleeps until a packet wakes it.
         """
         outcome = yield Phase("pause: leaving")
         if self._mode is Mode.HIBERNATION and outcome.mode is Mode.HIBERNATION:

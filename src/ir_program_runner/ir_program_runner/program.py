@@ -1,7 +1,7 @@
 """A program as a generator over its steps: it yields requests and is sent outcomes.
 
 One step: wait for its signals, carry its load, move or pause, attach or detach, set its signals. Nothing
-here knows ROS or a clock, so a fake world runs a day's program in milliseconds.
+here knows ROS or a clock, so a test runs a day's program in milliseconds.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from ir_program_runner.checks import load_after, step_name
 from ir_program_runner.errors import CanceledError, StepFailedError
 from ir_program_runner.pause import Pause
 from ir_program_runner.requests import (
+    Announce,
     Begin,
     Drive,
     Outcome,
@@ -28,7 +29,6 @@ from ir_program_runner.requests import (
     SetLoad,
     SetPlcInput,
     SetSignal,
-    Tell,
     WaitForMode,
     WaitForSignals,
     WaitUntil,
@@ -51,7 +51,7 @@ class ProgramResult:
 
 class Program:
     """One run of a checked program. `run()` is the generator. times: of the power modes, where the driver
-    doesn't tell them.
+    doesn't report them.
 
     CanceledError may be thrown into it once, at a request that is INTERRUPTIBLE.
     """
@@ -65,7 +65,7 @@ class Program:
         self._movements = tuple(movements)
         self._settings = settings
         self._times = times or TransitionTimes()
-        self._carried = ""  # what the driver was last told; "" = not known
+        self._carried = ""  # load text last sent to the driver; "" = not known
 
     def run(self) -> Generator[Request, Outcome, ProgramResult]:
         """Run all steps; ends early with the status of the step that failed, or PREEMPTED."""
@@ -81,12 +81,12 @@ class Program:
             try:
                 note = yield from self._step(index, movement)
             except StepFailedError as failure:
-                yield Tell(index, Event.FAILED, failure.status.message)
+                yield Announce(index, Event.FAILED, failure.status.message)
                 return ProgramResult(Status(failure.status.code, f"{where}: {failure.status.message}"), index)
             except CanceledError as canceled:
-                yield Tell(index, Event.CANCELED, str(canceled))
+                yield Announce(index, Event.CANCELED, str(canceled))
                 return ProgramResult(Status(StatusCode.PREEMPTED, f"canceled in {where}"), index)
-            yield Tell(index, Event.ENDED, note)
+            yield Announce(index, Event.ENDED, note)
         return ProgramResult(Status.success(), total)
 
     def _start(self) -> Steps:
@@ -109,7 +109,7 @@ class Program:
         if movement.wait_for:
             yield from self._wait_for_signals(movement.wait_for)
         yield from self._carry(movement.load)
-        yield Tell(index, Event.STARTED)
+        yield Announce(index, Event.STARTED)
         if movement.is_pause:
             pause = Pause(movement, self._settings, self._times)
             note = yield from pause.run()

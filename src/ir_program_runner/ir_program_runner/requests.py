@@ -1,4 +1,4 @@
-"""What a program asks of the world, one request at a time, and what the world says to it.
+"""What a program asks of the world, one request at a time, and what the world answers.
 
 The program never waits, sends or looks at a clock itself: it yields a request and is sent an Outcome.
 """
@@ -24,8 +24,8 @@ class Begin:
 
 
 @dataclass(frozen=True)
-class Tell:
-    """Tell everybody that step `index` started, ended, failed or was canceled."""
+class Announce:
+    """Announce that step `index` started, ended, failed or was canceled."""
 
     index: int
     event: Event
@@ -34,7 +34,7 @@ class Tell:
 
 @dataclass(frozen=True)
 class Phase:
-    """Tell whoever follows the program what it does now."""
+    """Announce what the program does now."""
 
     text: str
 
@@ -103,7 +103,7 @@ class SendWakePacket:
 
 Request = (
     Begin
-    | Tell
+    | Announce
     | Phase
     | WaitForSignals
     | SetSignal

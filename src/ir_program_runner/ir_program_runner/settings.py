@@ -18,10 +18,14 @@ class ProgramSettings:
         600.0, "Longest wait for the signals of a step.", unit="s", minimum=0.0, maximum=24 * _HOUR
     )
     ready_timeout: float = setting(
-        10.0, "How much later than told the robot may be ready.", unit="s", minimum=0.0, maximum=_HOUR
+        10.0, "How much later than planned the robot may be ready.", unit="s", minimum=0.0, maximum=_HOUR
     )
     enter_timeout: float = setting(
-        5.0, "How much later than told a power mode may be reached.", unit="s", minimum=0.0, maximum=_HOUR
+        5.0,
+        "How much later than planned a power mode may be reached.",
+        unit="s",
+        minimum=0.0,
+        maximum=_HOUR,
     )
     load_timeout: float = setting(
         2.0, "How long a load is offered to a robot that still settles.", unit="s", minimum=0.0, maximum=60.0

@@ -21,15 +21,15 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
 from ir_msgs_py import names
-from ir_recorder.cell_files import cell_files
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
+from ir_recorder.format.qos import QosOffer
 from ir_recorder.listen.node import Listener
+from ir_recorder.listen.topics import TopicSelection, single_type
 from ir_recorder.parameters import declared_settings
-from ir_recorder.qos import QosOffer
-from ir_recorder.session import CellFiles, RecordingSession
 from ir_recorder.settings import RecorderSettings
-from ir_recorder.topics import TopicSelection, single_type
-from ir_recorder.writer import RecordingWriter
+from ir_recorder.write.cell_files import cell_files
+from ir_recorder.write.session import CellFiles, RecordingSession
+from ir_recorder.write.writer import RecordingWriter
 
 POLL_PERIOD = 0.02  # s
 OpenWriter = Callable[[str, bool], RecordingWriter]
@@ -77,7 +77,7 @@ class RecorderNode(Node):
 
     @property
     def unmet(self) -> tuple[str, ...]:
-        """Wanted topics and patterns of the running recording that nobody has published yet."""
+        """Wanted topics and patterns of the running recording without a publisher so far."""
         if self._session is None:
             return ()
         return self._selection.unmet((*self._listener, *self._passed_over))
@@ -251,7 +251,7 @@ class RecorderNode(Node):
 
 
 def _without_publisher(topics: Sequence[str], when: str) -> str:
-    """The end of a sentence: which wanted topics nobody publishes."""
+    """The end of a sentence: the wanted topics without a publisher."""
     return f"; no publisher {when} of {', '.join(topics)}" if topics else ""
 
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 from ir_recorder.analysis import analyse, findings
 from ir_recorder.errors import RecorderError
-from ir_recorder.picture import write_picture
-from ir_recorder.reader import read_recording
+from ir_recorder.read.reader import read_recording
 from ir_recorder.report import write_report
+from ir_recorder.report.picture import write_picture
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Writes the page and says where; RecorderError when the file can't be read or the page not be
+    """Writes the page and prints its path; RecorderError when the file can't be read or the page not be
     written.
     """
     analysis = analyse(read_recording(options.file))

@@ -11,9 +11,7 @@ from ir_recorder.errors import RecorderError
 
 @dataclass(frozen=True)
 class RecorderSettings:
-    """What the recorder node may be told. An empty text in a list counts as nothing: ROS has no empty
-    lists.
-    """
+    """Settings of the recorder node. An empty text in a list counts as nothing: ROS has no empty lists."""
 
     path: str = setting("", "File to record into from the start; empty: wait for ~/start.", read_only=True)
     overwrite: bool = setting(False, "Replace an existing file.", read_only=True)

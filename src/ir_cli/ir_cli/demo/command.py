@@ -1,4 +1,4 @@
-"""`ir demo`: its arguments, and the exit code that says whether everything held."""
+"""`ir demo`: its arguments, and its exit code: 0 when every check held."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the recording says of the demonstration: movements, checks, the report and the picture."""
+"""Results of the demonstration by its recording: movements, checks, the report and the picture."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from ir_recorder.picture import write_picture
 from ir_recorder.report import write_report
+from ir_recorder.report.picture import write_picture
 
 from ir_cli.terminal import table
 from ir_recorder import Analysis, Finding, Tolerances, analyse, findings, read_recording

@@ -1,7 +1,8 @@
 """The demonstration: four nodes, one cell, from the cell file to the report.
 
-Pauses of the program and the transitions of hibernation and Bus Power Off are shortened, so that a person
-need not wait half an hour; the recording carries the facts and the report says so. The clock is never scaled.
+Pauses of the program and the transitions of hibernation and Bus Power Off are shortened, so that it
+takes a minute instead of half an hour; the recording carries the facts and the report shows them. The clock is
+never scaled.
 """
 
 from __future__ import annotations
@@ -99,10 +100,11 @@ class Demonstration:
             progress=lambda at: self._progress.update(f"{at.phase} {at.done}/{at.total}"),
         )
         report = plan.report
+        proof = "certified" if report.certified else "NOT certified"
         self._progress.end(
             f"{len(plan.movements)} steps, {report.duration:.1f} s, {report.energy / 1000.0:.1f} kJ, "
             f"clearance {report.min_clearance * 1000.0:.0f} mm, "
-            f"{'proved' if report.certified else 'NOT proved'} ({plan.info.planning_time:.2f} s of planning)"
+            f"{proof} ({plan.info.planning_time:.2f} s of planning)"
         )
         return plan
 
@@ -127,7 +129,7 @@ class Demonstration:
 
 
 def free_udp_port() -> int:
-    """Port that nobody listens on now: another cell may run on this machine."""
+    """A port that is free now: another cell may run on this machine."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

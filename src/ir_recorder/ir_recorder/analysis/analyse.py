@@ -21,13 +21,13 @@ from ir_recorder.analysis.plateaus import table_2_plateaus
 from ir_recorder.analysis.results import Analysis, StepResult
 from ir_recorder.analysis.shares import mode_shares, station_uses
 from ir_recorder.analysis.steps import ExecutedStep, executed_steps
-from ir_recorder.recording import Recording
+from ir_recorder.read.recording import Recording
 
 NAN = float("nan")
 
 
 def analyse(recording: Recording) -> Analysis:
-    """Everything that can be said about a recording; missing topics leave gaps and a sentence."""
+    """All results that a recording allows; missing topics leave gaps and a sentence."""
     return _Analyser(recording).analysis()
 
 
@@ -93,7 +93,7 @@ class _Analyser:
                     energy=meter.energy(start, end) if meter else NAN,
                     joint_energy=meter.joints(start, end) if meter else np.full(len(JOINT_NAMES), NAN),
                     base_energy=meter.base(start, end) if meter else NAN,
-                    burnt_energy=meter.burnt(start, end) if meter else NAN,
+                    dissipated_energy=meter.dissipated(start, end) if meter else NAN,
                     peak_power=meter.peak(start, end) if meter else NAN,
                     indirect_energy=indirect.energy(start, end, loads) if indirect and moved else NAN,
                     tool_deviation=self._deviation(step),

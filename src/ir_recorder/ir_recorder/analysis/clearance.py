@@ -1,7 +1,7 @@
 """Executed clearance: exact distances along the recorded joint states, with the loads the program carried.
 
-Pairs that a station allows to touch don't count against the safety distance on the way to and from it; they
-are held against their own.
+Pairs that a station allows to touch don't count against the safety distance on movements to and from it:
+they keep their own.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from ir_description import Cell
 from ir_kernels import Chain, CollisionModel
 from ir_recorder.analysis.loads import normal
 from ir_recorder.analysis.steps import ExecutedStep
-from ir_recorder.cdr import Numbers
-from ir_recorder.recording import JointSeries
+from ir_recorder.read.cdr import Numbers
+from ir_recorder.read.recording import JointSeries
 
 COARSE = 0.02  # s between samples of the profile; around the least distance every joint state is taken
 _NONE = -1

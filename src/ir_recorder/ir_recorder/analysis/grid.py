@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from ir_msgs_py.power import Mode
 
-from ir_recorder.recording import JointSeries, PowerSeries
+from ir_recorder.read.recording import JointSeries, PowerSeries
 
 PERIOD_NS = 2_000_000
 _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION, Mode.FROM_HIBERNATION)

@@ -1,7 +1,7 @@
 """Indirect measurement (section VI of the paper): mains energy rebuilt from recorded motion and torque.
 
 Axis power from joint speed and motor torque, one DC bus for all axes, and the base load that mode and tool
-have by the data: what a plant without a power meter can know.
+have by the data: what can be measured without a power meter.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from ir_description import Load, PowerData, RobotModel
 from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
-from ir_recorder.recording import JointSeries
+from ir_recorder.read.recording import JointSeries
 
 MOTORS_ON = "STAND_ON_MOTORS"
 

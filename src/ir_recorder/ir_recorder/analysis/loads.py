@@ -9,7 +9,7 @@ import numpy as np
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 
 from ir_recorder.analysis.steps import STARTED
-from ir_recorder.recording import PowerSeries, Recording
+from ir_recorder.read.recording import PowerSeries, Recording
 
 STALE = 1.5  # s: how old the load in the diagnostics may be
 TOOL_STEP = 3.0  # W of base load: less than any tool that draws power
@@ -43,10 +43,10 @@ class LoadTimeline:
 
 
 def load_timeline(recording: Recording) -> LoadTimeline:
-    """What the recording tells of the load.
+    """The load over time.
 
-    While a program runs its steps say it, to the moment; before and after, the driver's diagnostics do,
-    once a second, and a step of the base load in between tells when a tool came or went.
+    While a program runs its steps give it exactly; before and after, the driver's diagnostics do once a
+    second, and a step of the base load in between marks when a tool was attached or detached.
     """
     steps = []
     for event in recording.events:
@@ -55,20 +55,20 @@ def load_timeline(recording: Recording) -> LoadTimeline:
             steps.append((event.time, load))
         elif event.event == "ended" and event.movement.load:
             steps.append((event.time, after(load, event.movement.attach, event.movement.detach)))
-    told = [(event.time, normal(event.text)) for event in recording.loads]
+    reported = [(event.time, normal(event.text)) for event in recording.loads]
     if steps:
         first, last = steps[0][0], steps[-1][0] + STALE
-        told = [observation for observation in told if not first <= observation[0] <= last]
+        reported = [observation for observation in reported if not first <= observation[0] <= last]
     if recording.power is not None:
-        told = _sharpened(told, recording.power)
-    return LoadTimeline((*told, *steps))
+        reported = _sharpened(reported, recording.power)
+    return LoadTimeline((*reported, *steps))
 
 
-def _sharpened(told: list[tuple[float, str]], power: PowerSeries) -> list[tuple[float, str]]:
-    """Replaces what was told around a change by the readings before and after the step of the base load."""
+def _sharpened(reported: list[tuple[float, str]], power: PowerSeries) -> list[tuple[float, str]]:
+    """Replaces the reports around a change by the readings before and after the step of the base load."""
     jumps = np.flatnonzero((np.abs(np.diff(power.base_power)) > TOOL_STEP) & (np.diff(power.mode) == 0))
     result: list[tuple[float, str]] = []
-    for time, load in told:
+    for time, load in reported:
         if result and result[-1][1] != load:
             start = result[-1][0] - STALE
             own = [k for k in jumps if start < power.time[k] and power.time[k + 1] <= time]

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_recorder.cdr import Numbers
-from ir_recorder.recording import PowerSeries
+from ir_recorder.read.cdr import Numbers
+from ir_recorder.read.recording import PowerSeries
 
 
 class Meter:
@@ -23,7 +23,7 @@ class Meter:
         self._energy = power.energy - power.energy[:1]
         self._joints = np.cumsum(np.nan_to_num(power.joint_power) * step[:, None], axis=0)
         self._base = np.cumsum(np.nan_to_num(power.base_power) * step)
-        self._burnt = np.cumsum(np.nan_to_num(power.burnt_power) * step)
+        self._dissipated = np.cumsum(np.nan_to_num(power.burnt_power) * step)
 
     def energy(self, start: float, end: float) -> float:
         """J at the mains."""
@@ -33,9 +33,9 @@ class Meter:
         """J of controller, drives and tool."""
         return self._between(self._base, start, end)
 
-    def burnt(self, start: float, end: float) -> float:
-        """J in the brake resistor."""
-        return self._between(self._burnt, start, end)
+    def dissipated(self, start: float, end: float) -> float:
+        """J dissipated in the brake resistor."""
+        return self._between(self._dissipated, start, end)
 
     def joints(self, start: float, end: float) -> Numbers:
         """J per joint (n,) at the DC bus, signed."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ir_description import Cell, PowerData
 from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.meter import Meter
-from ir_recorder.cdr import Numbers
-from ir_recorder.recording import PowerSeries, Recording
+from ir_recorder.read.cdr import Numbers
+from ir_recorder.read.recording import PowerSeries, Recording
 
 AT_HOME = 0.005  # rad: gravity torque changes by less than 0.1 % within it
 STILL = 0.002  # rad/s
@@ -28,8 +28,8 @@ SAME_MASS = 0.5  # kg
 
 @dataclass(frozen=True)
 class Plateau:
-    """Power [W] in a mode with a payload [kg] of Table II, over `seconds` in total, and what the table
-    says.
+    """Power [W] in a mode with a payload [kg] of Table II, over `seconds` in total, and the value of
+    the table.
     """
 
     mode: str

@@ -10,15 +10,15 @@ from ir_recorder.analysis.grid import GridCheck
 from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.plateaus import Plateau
 from ir_recorder.analysis.steps import ExecutedStep
-from ir_recorder.cdr import Numbers
-from ir_recorder.recording import Recording
+from ir_recorder.read.cdr import Numbers
+from ir_recorder.read.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
     """A step with what it took, measured at the mains meter.
 
-    energy, base_energy, burnt_energy [J]; joint_energy (n,) [J] at the DC bus; peak_power [W];
+    energy, base_energy, dissipated_energy [J]; joint_energy (n,) [J] at the DC bus; peak_power [W];
     indirect_energy [J]: from recorded motion and torque; tool_deviation [m]: largest between commanded and
     simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
     """
@@ -27,7 +27,7 @@ class StepResult:
     energy: float
     joint_energy: Numbers
     base_energy: float
-    burnt_energy: float
+    dissipated_energy: float
     peak_power: float
     indirect_energy: float
     tool_deviation: float
@@ -55,8 +55,8 @@ class Share:
 
 @dataclass(frozen=True)
 class StationUse:
-    """Time [s] and energy [J] that belong to a station: resting there, going in and out, and the way to
-    it.
+    """Time [s] and energy [J] that belong to a station: pauses, service movements, and the
+    movements to it.
     """
 
     station: str
@@ -77,7 +77,7 @@ class StationUse:
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """All results; parts whose topics are missing are empty or NaN, `problems` says which and why.
+    """All results; parts whose topics are missing are empty or NaN, `problems` names which and why.
 
     seconds, energy [J], mean_power, peak_power [W]: of the whole recording, at the mains meter.
     """

@@ -9,7 +9,7 @@ from ir_msgs_py.power import Mode
 from ir_msgs_py.report import MovementKind
 
 from ir_recorder.analysis.results import Share, StationUse, StepResult
-from ir_recorder.recording import PowerSeries
+from ir_recorder.read.recording import PowerSeries
 
 
 def mode_name(number: int) -> str:
@@ -21,7 +21,7 @@ def mode_name(number: int) -> str:
 
 
 def mode_shares(power: PowerSeries) -> tuple[Share, ...]:
-    """Seconds and joules of each mode; a reading belongs to the mode it tells."""
+    """Seconds and joules of each mode; a reading belongs to the mode it reports."""
     seconds = np.diff(power.time, prepend=power.time[:1])
     joules = np.diff(power.energy, prepend=power.energy[:1])
     shares = []
@@ -32,8 +32,8 @@ def mode_shares(power: PowerSeries) -> tuple[Share, ...]:
 
 
 def station_uses(results: Sequence[StepResult]) -> tuple[StationUse, ...]:
-    """Every step belongs to the station it is for: service movements and pauses to theirs, a way to where
-    it ends.
+    """Every step belongs to one station: service movements and pauses to theirs, a regional movement to
+    the one where it ends.
     """
     kinds: dict[str, dict[str, list[StepResult]]] = {}
     for result in results:

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ir_msgs_py.report import MovementKind, PlannedMovement
 
-from ir_recorder.cdr import Numbers
-from ir_recorder.recording import ControllerSeries, ProgramEvent, Recording
+from ir_recorder.read.cdr import Numbers
+from ir_recorder.read.recording import ControllerSeries, ProgramEvent, Recording
 
 STARTED = "started"
 OPEN = "open"  # no end was recorded
-_FEWEST = 3  # states of the executor that tell when a trajectory began and ended
+_FEWEST = 3  # states of the executor: fewer give no speed to extrapolate its start and end with
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ class ExecutedStep:
             mode = f" ({movement.power_mode})" if movement.power_mode else ""
             return f"pause{where}{mode}"
         if movement.from_station == movement.to_station != "":
-            way = {MovementKind.SERVICE_ENTRY: "into", MovementKind.SERVICE_EXIT: "out of"}
-            return f"{way.get(MovementKind(movement.kind), 'at')} {movement.to_station}"
+            direction = {MovementKind.SERVICE_ENTRY: "into", MovementKind.SERVICE_EXIT: "out of"}
+            return f"{direction.get(MovementKind(movement.kind), 'at')} {movement.to_station}"
         return f"{movement.from_station or 'start'} → {movement.to_station or 'goal'}"
 
 

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from ir_recorder.errors import SchemaError
-from ir_recorder.qos import QosOffer, request_for
+from ir_recorder.format.qos import QosOffer, request_for
 
 _LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
 
@@ -84,7 +84,7 @@ class Listener:
         subscription = self._node.create_subscription(
             _message_type(type_name),
             topic,
-            _nobody,
+            _unused,
             profile,
             raw=True,
             callback_group=self._group,
@@ -124,7 +124,7 @@ class Listener:
             self._numbers[topic] = number
 
 
-def _nobody(data: bytes) -> None:
+def _unused(data: bytes) -> None:
     """Messages are taken by `Listener.take`."""
 
 

@@ -20,10 +20,10 @@ from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 
 from ir_recorder.errors import RecorderError
+from ir_recorder.format.qos import offers_from_yaml
 from ir_recorder.play.player import Player
 from ir_recorder.play.schedule import DueMessage, PlaySettings
-from ir_recorder.qos import offers_from_yaml
-from ir_recorder.raw import RawRecording, read_raw
+from ir_recorder.read.raw import RawRecording, read_raw
 
 DEPTH = 1000
 

@@ -46,7 +46,7 @@ def _pieces(result: StepResult) -> list[tuple[str, str, float]]:
     """(class, what, joules) of one bar."""
     own = [("base", "controller, drives and tool", result.base_energy)]
     own += [(f"a{j + 1}", f"axis A{j + 1}", float(value)) for j, value in enumerate(result.joint_energy)]
-    own.append(("burnt", "brake resistor", result.burnt_energy))
+    own.append(("dissipated", "brake resistor", result.dissipated_energy))
     return [piece for piece in own if np.isfinite(piece[2])]
 
 

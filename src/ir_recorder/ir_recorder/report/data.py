@@ -10,7 +10,7 @@ import numpy as np
 
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.shares import mode_name
-from ir_recorder.recording import BitSeries
+from ir_recorder.read.recording import BitSeries
 from ir_recorder.report.scene import scene
 from ir_recorder.report.series import envelope, floats
 from ir_recorder.report.words import mode_words

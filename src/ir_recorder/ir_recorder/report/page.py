@@ -12,6 +12,7 @@ from pathlib import Path
 from ir_description import load_power_data
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.errors import PathError
+from ir_recorder.format.contents import OWN_FACTS
 from ir_recorder.report.bars import joule_bars
 from ir_recorder.report.data import page_data
 from ir_recorder.report.tables import (
@@ -24,7 +25,6 @@ from ir_recorder.report.tables import (
     table_2,
 )
 from ir_recorder.report.words import joules, millimetres, number, percent, seconds, text, watts
-from ir_recorder.session import OWN_FACTS
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
 SCRIPTS = ("charts.js", "renderer.js", "motion.js", "app.js")

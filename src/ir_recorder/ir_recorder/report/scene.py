@@ -10,7 +10,7 @@ from ir_description.program import PartPlaces
 from ir_description import Cell
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import places_after
-from ir_recorder.cdr import Numbers
+from ir_recorder.read.cdr import Numbers
 from ir_recorder.report.series import floats, indices, quantised
 from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh
 

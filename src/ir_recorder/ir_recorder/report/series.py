@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ir_recorder.cdr import Numbers
+from ir_recorder.read.cdr import Numbers
 
 
 @dataclass(frozen=True, eq=False)

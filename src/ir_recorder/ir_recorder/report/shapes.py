@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from ir_description import Capsule
-from ir_recorder.cdr import Numbers
+from ir_recorder.read.cdr import Numbers
 
 SEGMENTS = 28
 RINGS = 7

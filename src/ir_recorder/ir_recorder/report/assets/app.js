@@ -49,9 +49,9 @@
 
   /* what is written over the picture */
   const rows = () => {
-    const now = timeline.now, said = motion ? motion.describe() : { load: "", nearest: "" };
+    const now = timeline.now, shown = motion ? motion.describe() : { load: "", nearest: "" };
     return [["time", `${now.toFixed(2)} s`], ["power", Number.isFinite(power.at(now)) ? `${Math.round(power.at(now))} W` : ""],
-      ["mode", power.inLane("mode", now)], ["step", power.inLane("program", now)], ["load", said.load], ["nearest", said.nearest]];
+      ["mode", power.inLane("mode", now)], ["step", power.inLane("program", now)], ["load", shown.load], ["nearest", shown.nearest]];
   };
   timeline.onChange(() => {
     find("seek").value = timeline.now;

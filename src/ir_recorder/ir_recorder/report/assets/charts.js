@@ -31,14 +31,14 @@ class Timeline {
     this.listeners = [];
   }
   onChange(listener) { this.listeners.push(listener); }
-  seek(time) { this.now = Math.min(Math.max(time, 0), this.end); this.tell(); }
+  seek(time) { this.now = Math.min(Math.max(time, 0), this.end); this.notify(); }
   zoom(from, to) {
     const least = Math.min(0.05, this.end);
     this.from = Math.max(0, Math.min(from, to - least));
     this.to = Math.min(this.end, Math.max(to, this.from + least));
-    this.tell();
+    this.notify();
   }
-  tell() { for (const listener of this.listeners) listener(); }
+  notify() { for (const listener of this.listeners) listener(); }
 }
 
 const MODE_STYLE = /^m-/;

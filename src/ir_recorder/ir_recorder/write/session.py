@@ -6,13 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
-from ir_recorder.qos import QosOffer
-from ir_recorder.writer import RecordingSummary, RecordingWriter
-
-CELL_ATTACHMENT = "cell.yaml"
-URDF_ATTACHMENT = "robot.urdf"
-FACTS_RECORD = "ir_recorder"
-OWN_FACTS = ("version", "started_ns")
+from ir_recorder.format import contents
+from ir_recorder.format.qos import QosOffer
+from ir_recorder.write.writer import RecordingSummary, RecordingWriter
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,8 @@ class RecordingSession:
         self._writer = writer
         self._channels: dict[str, int] = {}
         self._attached = False
-        writer.facts(FACTS_RECORD, {"version": project_version(), "started_ns": str(time), **facts})
+        own = {contents.VERSION: project_version(), contents.STARTED: str(time)}
+        writer.facts(contents.FACTS, {**own, **facts})
 
     @property
     def path(self) -> str:
@@ -59,9 +56,9 @@ class RecordingSession:
     def attach_cell(self, files: CellFiles, time: int) -> None:
         """Puts cell and URDF beside the messages, once."""
         if not self._attached:
-            self._writer.attach(CELL_ATTACHMENT, "application/yaml", files.cell_yaml.encode(), time)
+            self._writer.attach(contents.CELL, "application/yaml", files.cell_yaml.encode(), time)
             if files.urdf:
-                self._writer.attach(URDF_ATTACHMENT, "application/xml", files.urdf.encode(), time)
+                self._writer.attach(contents.URDF, "application/xml", files.urdf.encode(), time)
             self._attached = True
 
     def finish(self) -> RecordingSummary:

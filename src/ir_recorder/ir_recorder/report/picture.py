@@ -10,9 +10,9 @@ import numpy as np
 from ir_kernels import Chain
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.shares import mode_name
-from ir_recorder.cdr import Numbers
 from ir_recorder.errors import PathError, RecorderError
-from ir_recorder.recording import PowerSeries
+from ir_recorder.read.cdr import Numbers
+from ir_recorder.read.recording import PowerSeries
 from ir_recorder.report.series import envelope
 from ir_recorder.report.words import joules, mode_words
 

@@ -17,8 +17,8 @@ from typing import BinaryIO
 from mcap.writer import CompressionType, Writer
 
 from ir_recorder.errors import PathError, WriteError
-from ir_recorder.qos import QosOffer, offers_to_yaml
-from ir_recorder.schemas import SchemaLibrary
+from ir_recorder.format.qos import QosOffer, offers_to_yaml
+from ir_recorder.format.schemas import SchemaLibrary
 
 CHUNK_SIZE = 256 * 1024  # bytes: about 1.5 s of a cell; what a power cut may cost
 REORDERED = 1_000_000_000  # ns
@@ -156,7 +156,7 @@ class _Storage:
 
 
 def checked_path(path: str | Path) -> Path:
-    """An absolute path that may become a recording; PathError says what is wrong with the name."""
+    """An absolute path that may become a recording; PathError names what is wrong with it."""
     text = str(path)
     if not text or any(ord(character) < 32 for character in text):
         raise PathError(f"path {text[:80]!r}: empty, or with control characters")

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ir_recorder.definition import SEPARATOR, fields_of
 from ir_recorder.errors import SchemaError
+from ir_recorder.format.definition import SEPARATOR, fields_of
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from ir_msgs_py.report import PlannedMovement
 from numpy.typing import NDArray
 
-from ir_recorder.cdr import Numbers
+from ir_recorder.read.cdr import Numbers
 
 
 class _ReadOnlyArrays:
@@ -105,7 +105,7 @@ class ProgramEvent:
 
 @dataclass(frozen=True)
 class TextEvent:
-    """Something said at a time: a load attached, a signal, a warning of a log."""
+    """A text with its time: an attached load, the level of a signal, a warning of a log."""
 
     time: float
     name: str
@@ -114,7 +114,7 @@ class TextEvent:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """All that could be read; a series is None where its topic is missing, `problems` says what is wrong.
+    """All that could be read; a series is None where its topic is missing, `problems` names what is wrong.
 
     start_ns: node clock of time 0. cell_yaml and urdf are "" where none is attached. facts: texts by key.
     """
@@ -138,5 +138,5 @@ class Recording:
     problems: tuple[str, ...]
 
     def fact(self, key: str) -> str:
-        """A fact of the file, "" where it isn't told."""
+        """A fact of the file, "" where it is missing."""
         return next((value for name, value in reversed(self.facts) if name == key), "")

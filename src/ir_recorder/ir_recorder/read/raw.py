@@ -64,7 +64,7 @@ class RawRecording:
         return next((a.data for a in reversed(self.attachments) if a.name == name), None)
 
     def fact(self, key: str) -> str:
-        """A fact of the metadata records, "" where it isn't told."""
+        """A fact of the metadata records, "" where it is missing."""
         return next((value for name, value in reversed(self.facts) if name == key), "")
 
 

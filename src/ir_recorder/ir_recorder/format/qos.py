@@ -26,7 +26,7 @@ class QosOffer:
 
 @dataclass(frozen=True)
 class QosRequest:
-    """What a subscription must ask for to hear all publishers of a topic."""
+    """What a subscription must ask for to receive from all publishers of a topic."""
 
     reliable: bool
     transient_local: bool

@@ -15,11 +15,12 @@ from mcap_ros2.decoder import DecoderFactory
 from numpy.typing import NDArray
 
 from ir_msgs_py import names
-from ir_recorder.cdr import Columns
-from ir_recorder.decoded import movement_from
 from ir_recorder.errors import ReadError
-from ir_recorder.raw import RawChannel, RawRecording, read_raw
-from ir_recorder.recording import (
+from ir_recorder.format import contents
+from ir_recorder.read.cdr import Columns
+from ir_recorder.read.decoded import movement_from
+from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
+from ir_recorder.read.recording import (
     BitSeries,
     ControllerSeries,
     JointSeries,
@@ -29,7 +30,6 @@ from ir_recorder.recording import (
     TextEvent,
     TopicSummary,
 )
-from ir_recorder.session import CELL_ATTACHMENT, URDF_ATTACHMENT
 
 _T = TypeVar("_T")
 _WARN = 30  # rcl_interfaces/Log
@@ -72,8 +72,8 @@ class _Reader:
             loads=tuple(self._loads()),
             signals=tuple(self._signals()),
             warnings=tuple(self._warnings()),
-            cell_yaml=self._attached(CELL_ATTACHMENT),
-            urdf=self._attached(URDF_ATTACHMENT) or self._description(),
+            cell_yaml=self._attached(contents.CELL),
+            urdf=self._attached(contents.URDF) or self._description(),
             facts=raw.facts,
             problems=tuple(self._problems),
         )
@@ -155,7 +155,7 @@ class _Reader:
         return build
 
     def _plc_inputs(self) -> BitSeries | None:
-        """What counted, whoever set it; in a recording without it what was sent on the topic."""
+        """The levels in force, whoever set them; in a recording without them those sent on the topic."""
         bits = self._bits(_IN_BITS, stamped=False)
         in_force = self._series(names.PLC_INPUTS_IN_FORCE, bits, needed=False)
         return in_force or self._series(names.PLC_INPUTS, bits, needed=False)
@@ -181,7 +181,7 @@ class _Reader:
             )
 
     def _loads(self) -> Iterator[TextEvent]:
-        """What is attached, as the driver's diagnostics say it: key "load"."""
+        """The attached load by the driver's diagnostics: key "load"."""
         for _, message in self._messages(names.DIAGNOSTICS):
             for status in message.status:
                 if names.SIM_DRIVER not in status.name:

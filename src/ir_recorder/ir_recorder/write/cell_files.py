@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ir_description import DescriptionError, cell_to_yaml, load_cell, robot_urdf
 from ir_recorder.errors import PathError
-from ir_recorder.session import CellFiles
+from ir_recorder.write.session import CellFiles
 
 
 def cell_files(name_or_path: str) -> CellFiles:
