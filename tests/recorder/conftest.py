@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +17,7 @@ from ir_msgs.msg import ControllerState, PlannedMovement, PlcOutputs, PowerState
 from ir_msgs_py.power import Mode
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.report import report_html
 from ir_recorder.write.session import CellFiles, RecordingSession
 from ir_recorder.write.writer import RecordingWriter
 from mcap_ros2._dynamic import serialize_dynamic
@@ -23,6 +26,7 @@ from sensor_msgs.msg import JointState
 
 from ir_description import cell_from_yaml, load_power_data
 from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
+from ir_recorder import Analysis, analyse, findings, read_recording
 
 CELL_YAML = """
 format: ir_cell/1
@@ -315,3 +319,26 @@ def new_run() -> Callable[[], Run]:
 @pytest.fixture(scope="session")
 def cell_yaml() -> str:
     return CELL_YAML
+
+
+@pytest.fixture(scope="session")
+def analysis(demo_file: Path) -> Analysis:
+    return analyse(read_recording(demo_file))
+
+
+@pytest.fixture(scope="session")
+def page(analysis: Analysis) -> str:
+    """The report of the whole run."""
+    return report_html(analysis, findings(analysis))
+
+
+@pytest.fixture(scope="session")
+def data_of() -> Callable[[str], dict[str, Any]]:
+    """What a page hands to its scripts."""
+
+    def read(page: str) -> dict[str, Any]:
+        found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
+        assert found is not None
+        return json.loads(found[1])
+
+    return read

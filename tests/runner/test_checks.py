@@ -1,22 +1,15 @@
-"""A program that can't end well does not start, and the parts of the runner that stand alone."""
+"""A program that can't end well does not start."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
-from ir_msgs_py.errors import InvalidValueError, ParameterError
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES
-from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner.checks import check_program, load_after
 from ir_program_runner.errors import ProgramError
-from ir_program_runner.machines import Machines
-from ir_program_runner.progress import Progress
-from ir_program_runner.settings import LinkSettings, ProgramSettings
-from ir_program_runner.wake_on_lan import magic_packet
 
 
 def move(start=0.0, end=0.0, **fields):
@@ -69,56 +62,3 @@ def test_the_load_after_a_step(load, attach, detach, after):
 def test_what_is_attached_cannot_be_attached_again():
     with pytest.raises(InvalidValueError, match="part is attached, but it is already"):
         load_after(move(load="gripper+part", attach="part"))
-
-
-def test_the_magic_packet_is_six_ff_and_the_mac_sixteen_times():
-    packet = magic_packet("02:00:00:C4:02:10")
-    assert len(packet) == 102
-    assert packet == b"\xff" * 6 + bytes([2, 0, 0, 0xC4, 2, 0x10]) * 16
-
-
-def test_settings_name_what_is_wrong():
-    with pytest.raises(ParameterError, match=r"wake_margin is -1 s: it must be 0 \.\. 3600 s"):
-        ProgramSettings(wake_margin=-1.0)
-    with pytest.raises(ValueError, match="mac is '12': it must be six hex bytes"):
-        LinkSettings(mac="12")
-
-
-@dataclass(frozen=True)
-class Described:
-    name: str
-    initial: bool = False
-    follows: str = ""
-    delay: float = 0.0
-
-
-def test_a_machine_answers_after_its_delay():
-    machines = Machines(
-        [Described("door_open", follows="open_door", delay=1.5), Described("part_there", True)]
-    )
-    assert machines.holds([Signal("part_there", True), Signal("door_open", False)])
-    machines.set(Signal("open_door", True), now=10.0)
-    assert machines.take_answers(11.4) == ()
-    assert machines.take_answers(11.5) == (Signal("door_open", True),)
-    assert machines.take_answers(99.0) == ()
-
-
-def test_a_later_order_replaces_the_answer_that_is_due():
-    machines = Machines([Described("door_open", follows="open_door", delay=1.0)])
-    machines.set(Signal("open_door", True), now=0.0)
-    machines.set(Signal("open_door", False), now=0.5)
-    assert machines.take_answers(9.0) == (Signal("door_open", False),)
-
-
-def test_a_signal_that_was_never_set_is_zero():
-    assert Machines().holds([Signal("nothing", False)])
-    assert not Machines().holds([Signal("nothing", True)])
-
-
-def test_the_rest_of_a_program_is_what_is_planned():
-    progress = Progress("id", [move(duration=2.0), PlannedMovement(kind="pause", duration=10.0)], started=0.0)
-    progress.begin(0)
-    assert progress.remaining(6.0) == 12.0
-    progress.step_started = 5.0
-    assert progress.remaining(6.0) == 11.0
-    assert progress.remaining(60.0) == 10.0

@@ -14,7 +14,9 @@ from ir_msgs_py.ros.yaml_messages import message_from_yaml, message_to_yaml
 from .errors import CommandError
 
 DISCOVERY_SECONDS = 5.0
+"""Longest wait for a name to appear in the graph; discovery on one machine takes tenths of a second."""
 LISTING_SECONDS = 1.0
+"""Wait before a list is printed, so that discovery is complete."""
 SHOWN_ELEMENTS = 128
 """Longer arrays end in "..." unless --full asks for all, as in ros2cli."""
 

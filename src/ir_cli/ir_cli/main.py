@@ -23,6 +23,7 @@ COMMAND_MODULES = {
 """Only the module that is needed is imported: `ir cell check` does not wait for rclpy."""
 
 INTERRUPTED = 130
+"""Exit code of a command that SIGINT ended, as shells use it."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -13,6 +13,7 @@ from .nodes import cell_nodes
 from .processes import NodeProcesses
 
 LOOK_SECONDS = 0.5
+"""Between two looks at the processes: a node that ended is reported within this."""
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -27,6 +27,7 @@ from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from rclpy.action import ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -42,12 +43,13 @@ from ir_program_runner.parameters import declare_parameters
 from ir_program_runner.program import Program, ProgramResult
 from ir_program_runner.progress import Progress
 from ir_program_runner.requests import Announce
+from ir_program_runner.settings import LinkSettings
 from ir_program_runner.wake_on_lan import magic_packet, send_packet
 
 _KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-_SIGNALS = QoSProfile(depth=100)
-_FEEDBACK_PERIOD = 0.2  # s
-_MACHINES_PERIOD = 0.02  # s, of the soft PLC
+_SIGNALS = QoSProfile(depth=100)  # all signals of a cell may change at once
+_FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
+_MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
 
 
 class ProgramRunnerNode(Node):
@@ -73,15 +75,7 @@ class ProgramRunnerNode(Node):
         )
         self._waiting = Waiting(self)
         self._planner = Planner(self, self._waiting, links.planner, links.response_timeout)
-        self._driver = Driver(
-            self,
-            self._waiting,
-            links.driver,
-            response_timeout=links.response_timeout,
-            silence_timeout=links.silence_timeout,
-            cancel_timeout=links.cancel_timeout,
-            on_meter=self._waiting.look,
-        )
+        self._driver = self._link_to_driver(links)
         self._jump = ""
         back = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False)
         self._jumps = self.get_clock().create_jump_callback(back, post_callback=self._clock_jumped)
@@ -101,13 +95,24 @@ class ProgramRunnerNode(Node):
 
         self.get_logger().info("ready to run programs")
 
+    def _link_to_driver(self, links: LinkSettings) -> Driver:
+        return Driver(
+            self,
+            self._waiting,
+            links.driver,
+            response_timeout=links.response_timeout,
+            silence_timeout=links.silence_timeout,
+            cancel_timeout=links.cancel_timeout,
+            on_meter=self._waiting.look,
+        )
+
     def destroy_node(self) -> None:
         """Let go of the action server before the node."""
         self._server.destroy()
         self._jumps.unregister()
         super().destroy_node()
 
-    async def _run(self, goal: Any) -> RunProgram.Result:
+    async def _run(self, goal: ServerGoalHandle) -> RunProgram.Result:
         if self._progress is not None:
             running = f"program {self._progress.program_id}".strip()
             sentence = f"{running} is running: one program at a time"
@@ -132,14 +137,14 @@ class ProgramRunnerNode(Node):
             self._progress = None
         return self._end(goal, result, self._now() - progress.started, self._driver.energy - energy)
 
-    async def _run_steps(self, goal: Any, program: Program) -> ProgramResult:
+    async def _run_steps(self, goal: ServerGoalHandle, program: Program) -> ProgramResult:
         feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._publish_feedback(goal))
         try:
             return await Fulfilment(self._ports(goal)).run(program)
         finally:
             self.destroy_timer(feedback)
 
-    async def _fetch(self, request: Any) -> tuple[Status, tuple[PlannedMovement, ...]]:
+    async def _fetch(self, request: RunProgram.Goal) -> tuple[Status, tuple[PlannedMovement, ...]]:
         """Get the steps with all points, and check them as a whole."""
         if bool(request.program_id) == bool(request.movements):
             sentence = "give either program_id or movements"
@@ -160,7 +165,7 @@ class ProgramRunnerNode(Node):
             return Status(error.code, str(error)), ()
         return status, movements
 
-    def _ports(self, goal: Any) -> Ports:
+    def _ports(self, goal: ServerGoalHandle) -> Ports:
         return Ports(
             driver=self._driver,
             machines=self._machines,
@@ -231,12 +236,12 @@ class ProgramRunnerNode(Node):
         )
         self._program_state.publish(program_state_to_msg(state))
 
-    def _announce_phase(self, goal: Any, text: str) -> None:
+    def _announce_phase(self, goal: ServerGoalHandle, text: str) -> None:
         assert self._progress is not None
         self._progress.phase = text
         self._publish_feedback(goal)
 
-    def _publish_feedback(self, goal: Any) -> None:
+    def _publish_feedback(self, goal: ServerGoalHandle) -> None:
         progress = self._progress
         if progress is not None and goal.is_active:
             goal.publish_feedback(
@@ -248,7 +253,9 @@ class ProgramRunnerNode(Node):
                 )
             )
 
-    def _end(self, goal: Any, result: ProgramResult, duration: float, energy: float) -> RunProgram.Result:
+    def _end(
+        self, goal: ServerGoalHandle, result: ProgramResult, duration: float, energy: float
+    ) -> RunProgram.Result:
         if result.status.ok:
             goal.succeed()
         elif result.status.code == StatusCode.PREEMPTED and goal.is_cancel_requested:

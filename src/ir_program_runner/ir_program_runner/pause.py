@@ -32,7 +32,7 @@ READY = (Mode.STAND_ON_MOTORS, Mode.MOVING)
 _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION)
 _AWAKE = (Mode.FROM_HIBERNATION, *READY, Mode.STAND_ON_BRAKES)
 _ROUNDING = 1e-6  # s; a plan may use the shortest pause exactly
-_LATE = 0.1  # s; a shorter delay is not reported
+_LATE = 0.1  # s; a shorter delay is not reported: readings and answers take as long
 _BIT = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib", Mode.STAND_ON_BRAKES: "drives_off"}
 
 

@@ -38,7 +38,7 @@ from ir_program_runner.settings import ProgramSettings
 
 Steps = Generator[Request, Outcome, None]
 STARTING_MODES = (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES)
-_LOAD_RETRY = 0.1  # s
+_LOAD_RETRY = 0.1  # s: a robot settles within some tenths
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """The demonstration: four nodes, one cell, from the cell file to the report.
 
 Pauses of the program and the transitions of hibernation and Bus Power Off are shortened, so that it
-takes a minute instead of half an hour; the recording carries the facts and the report shows them. The clock is
-never scaled.
+takes a minute instead of half an hour; the recording carries the facts and the report shows them. The
+clock is never scaled.
 """
 
 from __future__ import annotations
@@ -39,8 +39,9 @@ TRANSITIONS = {
 LONGEST_PAUSE = 12.0
 """Seconds; longer pauses of the program are cut to this."""
 TOUR_STAY = 1.2
-"""Seconds in each power mode at machine home."""
+"""Seconds in each power mode at machine home: a plateau of the mains meter (100 Hz) needs some tenths."""
 START_SECONDS = 30.0
+"""Longest wait for a node to offer its services: four processes that start at once on a slow machine."""
 
 
 class Demonstration:

@@ -11,7 +11,7 @@ from ir_msgs_py.power import Mode
 
 from ir_recorder.read.recording import JointSeries, PowerSeries
 
-PERIOD_NS = 2_000_000
+PERIOD_NS = 2_000_000  # /joint_states come at 500 Hz by contract
 _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION, Mode.FROM_HIBERNATION)
 
 

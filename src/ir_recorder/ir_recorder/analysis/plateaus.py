@@ -17,13 +17,12 @@ from ir_recorder.read.cdr import Numbers
 from ir_recorder.read.recording import PowerSeries, Recording
 
 AT_HOME = 0.005  # rad: gravity torque changes by less than 0.1 % within it
-STILL = 0.002  # rad/s
+STILL = 0.002  # rad/s: less than the slowest planned motion, more than the noise of a held joint
 _RESTING = [Mode[name].value for name in REST_MODES]
-SETTLING = (
-    0.1  # s left out at both ends of a plateau: the reading that straddles a change, and the drives settling
-)
-SHORTEST = 0.1  # s
-SAME_MASS = 0.5  # kg
+# s left out at both ends of a plateau: the reading that straddles a change, and the drives settling
+SETTLING = 0.1
+SHORTEST = 0.1  # s: ten readings, so that a mean has the meter's resolution
+SAME_MASS = 0.5  # kg: masses in Table II are whole kilograms
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,17 @@
-"""What a recording file holds beside its messages: schemas, quality of service, attachments."""
+"""What a recording file holds beside its messages: schemas, quality of service, names of attachments."""
+
+from ir_recorder.format.definition import Field, definitions_of
+from ir_recorder.format.qos import QosOffer, QosRequest, offers_from_yaml, offers_to_yaml, request_for
+from ir_recorder.format.schemas import MessageSchema, SchemaLibrary
+
+__all__ = [
+    "Field",
+    "MessageSchema",
+    "QosOffer",
+    "QosRequest",
+    "SchemaLibrary",
+    "definitions_of",
+    "offers_from_yaml",
+    "offers_to_yaml",
+    "request_for",
+]

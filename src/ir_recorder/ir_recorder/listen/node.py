@@ -14,6 +14,8 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.qos import QosOffer, request_for
@@ -37,15 +39,15 @@ class PolledGroup(CallbackGroup):
     behind; taking what has arrived 50 times a second takes little. The middleware notes the times of arrival.
     """
 
-    def can_execute(self, entity: Any) -> bool:
+    def can_execute(self, entity: object) -> bool:
         """Never."""
         return False
 
-    def beginning_execution(self, entity: Any) -> bool:
+    def beginning_execution(self, entity: object) -> bool:
         """Never."""
         return False
 
-    def ending_execution(self, entity: Any) -> None:
+    def ending_execution(self, entity: object) -> None:
         """Nothing began."""
 
 
@@ -56,7 +58,7 @@ class Listener:
         self._node = node
         self._depth = depth
         self._group = PolledGroup()
-        self._subscriptions: dict[str, Any] = {}
+        self._subscriptions: dict[str, Subscription] = {}
         self._numbers: dict[str, int | None] = {}  # of the last message; None where publishers mix theirs
         self.lost = 0
 
@@ -128,7 +130,7 @@ def _unused(data: bytes) -> None:
     """Messages are taken by `Listener.take`."""
 
 
-def _offer(publisher: Any) -> QosOffer:
+def _offer(publisher: TopicEndpointInfo) -> QosOffer:
     profile = publisher.qos_profile
     return QosOffer(
         reliable=profile.reliability == ReliabilityPolicy.RELIABLE,

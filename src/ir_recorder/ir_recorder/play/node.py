@@ -15,6 +15,7 @@ from typing import Any
 
 from ir_msgs_py.ros.running import run_node
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
@@ -25,7 +26,7 @@ from ir_recorder.play.player import Player
 from ir_recorder.play.schedule import DueMessage, PlaySettings
 from ir_recorder.read.raw import RawRecording, read_raw
 
-DEPTH = 1000
+DEPTH = 1000  # messages per topic: 2 s of joint states while a subscriber is busy
 
 
 class PlayNode(Node):
@@ -42,7 +43,7 @@ class PlayNode(Node):
         super().__init__("ir_play", **options)
         self._settings = settings
         self._stop = threading.Event()
-        self._feeds: dict[str, Any] = {}
+        self._feeds: dict[str, Publisher] = {}
         self._clock = self.create_publisher(Clock, "/clock", 10) if clock else None
         self._delay = delay
         self.published = 0

@@ -21,8 +21,8 @@ from ir_recorder.format.definition import Field, definitions_of, short_name
 _DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"} | {
     f"{kind}{bits}": f"<{kind[0]}{bits // 8}" for kind in ("int", "uint", "float") for bits in (16, 32, 64)
 }
-_HEADER = 4
-_LITTLE_ENDIAN = 1
+_HEADER = 4  # bytes: encapsulation kind and options
+_LITTLE_ENDIAN = 1  # kind CDR_LE
 _LENGTH = struct.Struct("<I")
 
 Numbers = NDArray[np.float64]

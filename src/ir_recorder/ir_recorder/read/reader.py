@@ -5,11 +5,13 @@ refusal.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from numpy.typing import NDArray
@@ -33,8 +35,8 @@ from ir_recorder.read.recording import (
 
 _T = TypeVar("_T")
 _WARN = 30  # rcl_interfaces/Log
-_IN_BITS = ("ab", "hib", "ks", "emergency_stop", "drives_on", "drives_off", "conf_mess", "move_enable")
-_OUT_BITS = ("ab", "bbs", "drives_ready", "alarm_stop", "in_home", "moving")
+_IN_BITS = tuple(bit.name for bit in fields(PlcInputs) if bit.type == "bool")
+_OUT_BITS = tuple(bit.name for bit in fields(PlcOutputs) if bit.type == "bool")
 
 
 def read_recording(path: str | Path) -> Recording:

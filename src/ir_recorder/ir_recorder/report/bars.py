@@ -13,13 +13,15 @@ import numpy as np
 from ir_recorder.analysis import StepResult
 from ir_recorder.report.words import joules, text
 
+# the drawing in units of the view box: as many pixels where the page has its full width
 WIDTH = 1080
-LABEL = 262
-VALUE = 120
+LABEL = 262  # fits LABEL_CHARACTERS
+LABEL_CHARACTERS = 38
+VALUE = 120  # fits "123.4 kJ" and a gap
 ROW = 34
 BAR = 21
 BACK = 6  # height of what is given back
-TOP = 26
+TOP = 26  # of the axis
 
 
 def joule_bars(results: Sequence[StepResult]) -> str:
@@ -52,7 +54,7 @@ def _pieces(result: StepResult) -> list[tuple[str, str, float]]:
 
 def _row(result: StepResult, own: list[tuple[str, str, float]], plan: float, y: float, scale: float) -> str:
     label = f"{result.step.index + 1}  {result.step.label}"
-    shown = label if len(label) <= 38 else label[:37] + "…"
+    shown = label if len(label) <= LABEL_CHARACTERS else label[: LABEL_CHARACTERS - 1] + "…"
     out = [f'<text class="label" x="{LABEL - 12}" y="{y + BAR * 0.72:.1f}">{text(shown)}</text>']
     x = float(LABEL)
     tall = BAR - BACK - 1 if any(value < 0 for _, _, value in own) else BAR

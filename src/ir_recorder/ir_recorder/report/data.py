@@ -4,29 +4,34 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from ir_recorder.analysis import Analysis
+from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.shares import mode_name
+from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import BitSeries
 from ir_recorder.report.scene import scene
-from ir_recorder.report.series import envelope, floats
+from ir_recorder.report.series import Json, envelope, floats
 from ir_recorder.report.words import mode_words
 
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
 _BITS = {"ab": "AB", "hib": "HIB", "bbs": "BBS", "drives_ready": "drives", "emergency_stop": "e-stop"}
-MOST_CLEARANCES = 6_000
+MOST_CLEARANCES = 6_000  # per movement: 2 minutes at the 50 Hz of the profile
 
 
 def page_data(analysis: Analysis, safety_distance: float) -> str:
     """Safe inside a script element."""
-    content: dict[str, Any] = {
+    content: dict[str, Json] = {
         "end": analysis.recording.duration,
         "power": _power(analysis),
         "lanes": list(_lanes(analysis)),
-        "clearance": [_clearance(result) for result in analysis.steps if result.clearance is not None],
+        "clearance": [
+            _clearance(result.step.label, result.clearance)
+            for result in analysis.steps
+            if result.clearance is not None
+        ],
         "safetyDistance": safety_distance,
         "scene": scene(analysis),
     }
@@ -41,25 +46,16 @@ def _power(analysis: Analysis) -> dict[str, str] | None:
     return {"time": floats(shape.time), "low": floats(shape.low), "high": floats(shape.high)}
 
 
-def _clearance(result: Any) -> dict[str, Any]:
-    near = result.clearance
+def _clearance(label: str, near: StepClearance) -> dict[str, Json]:
     kept = np.isfinite(near.distance)
     shape = envelope(near.time[kept], near.distance[kept], MOST_CLEARANCES)
-    return {"time": floats(shape.time), "low": floats(shape.low), "label": result.step.label}
+    return {"time": floats(shape.time), "low": floats(shape.low), "label": label}
 
 
-def _lanes(analysis: Analysis) -> Iterator[dict[str, Any]]:
+def _lanes(analysis: Analysis) -> Iterator[dict[str, Json]]:
     """Rows of spans [from, to, text, style] above the power curve."""
     recording = analysis.recording
-    steps = [
-        [
-            r.step.start,
-            r.step.end,
-            r.step.label,
-            "pause" if r.step.movement.is_pause else r.step.movement.kind,
-        ]
-        for r in analysis.steps
-    ]
+    steps = [_step_span(result.step) for result in analysis.steps]
     if steps:
         yield {"label": "program", "spans": steps}
     if recording.power is not None and len(recording.power.time) > 1:
@@ -77,7 +73,11 @@ def _lanes(analysis: Analysis) -> Iterator[dict[str, Any]]:
                     yield {"label": f"{_BITS[name]} {side}", "spans": spans, "thin": True}
 
 
-def _mode_spans(analysis: Analysis) -> Iterator[list[Any]]:
+def _step_span(step: ExecutedStep) -> list[Json]:
+    return [step.start, step.end, step.label, "pause" if step.movement.is_pause else step.movement.kind]
+
+
+def _mode_spans(analysis: Analysis) -> Iterator[list[Json]]:
     power = analysis.recording.power
     if power is None:
         return
@@ -88,7 +88,7 @@ def _mode_spans(analysis: Analysis) -> Iterator[list[Any]]:
         yield [float(start), float(power.time[last - 1]), mode_words(name), f"m-{name}"]
 
 
-def _load_spans(analysis: Analysis) -> Iterator[list[Any]]:
+def _load_spans(analysis: Analysis) -> Iterator[list[Json]]:
     observations = analysis.loads.observations
     start, current = observations[0]
     for time, load in [*observations[1:], (analysis.recording.duration, "")]:
@@ -97,7 +97,7 @@ def _load_spans(analysis: Analysis) -> Iterator[list[Any]]:
             start, current = time, load
 
 
-def _bit_spans(series: BitSeries, name: str, end: float) -> Iterator[list[Any]]:
+def _bit_spans(series: BitSeries, name: str, end: float) -> Iterator[list[Json]]:
     levels = series.levels[:, series.names.index(name)]
     times = np.append(series.time, end)
     since = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ir_recorder.read.recording import PowerSeries
 from ir_recorder.report.series import envelope
 from ir_recorder.report.words import joules, mode_words
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 MODE_COLOURS = {
     "STAND_ON_MOTORS": "#5b8def",
     "MOVING": "#f08c00",
@@ -25,7 +28,7 @@ MODE_COLOURS = {
     "EMERGENCY_STOP": "#e03131",
 }
 TRANSITION = "#c3ccd6"
-MOST_POINTS = 4000
+MOST_POINTS = 4000  # more than twice the picture's pixels
 
 
 def write_picture(analysis: Analysis, path: str | Path) -> Path:
@@ -52,7 +55,7 @@ def write_picture(analysis: Analysis, path: str | Path) -> Path:
     return target
 
 
-def _power(axes: Any, analysis: Analysis) -> None:
+def _power(axes: Axes, analysis: Analysis) -> None:
     power = analysis.recording.power
     axes.set(xlabel="time [s]", ylabel="power at the mains [W]", title=f"Power, {joules(analysis.energy)}")
     _plain(axes)
@@ -68,7 +71,7 @@ def _power(axes: Any, analysis: Analysis) -> None:
     axes.legend(handles, labels, loc="upper left", ncols=3, frameon=False, fontsize=8)
 
 
-def _mode_bands(axes: Any, power: PowerSeries) -> None:
+def _mode_bands(axes: Axes, power: PowerSeries) -> None:
     change = np.flatnonzero(np.diff(power.mode)) + 1
     named: set[str] = set()
     for first, last in zip([0, *change], [*change, len(power.mode)], strict=True):
@@ -81,7 +84,7 @@ def _mode_bands(axes: Any, power: PowerSeries) -> None:
         named.add(label)
 
 
-def _joules(axes: Any, analysis: Analysis) -> None:
+def _joules(axes: Axes, analysis: Analysis) -> None:
     moved = analysis.movements
     rows = np.arange(len(moved))
     measured = [result.energy for result in moved]
@@ -96,7 +99,7 @@ def _joules(axes: Any, analysis: Analysis) -> None:
         axes.legend(frameon=False, fontsize=8)
 
 
-def _path(axes: Any, analysis: Analysis) -> None:
+def _path(axes: Axes, analysis: Analysis) -> None:
     cell, joints = analysis.cell, analysis.recording.joints
     axes.set(xlabel="x [m]", ylabel="y [m]", title="Tool path from above, by power", aspect="equal")
     _plain(axes)
@@ -123,7 +126,7 @@ def _power_at(analysis: Analysis, time: Numbers) -> Numbers:
     return np.interp(time, power.time, power.power) if power is not None else np.zeros(len(time))
 
 
-def _plain(axes: Any) -> None:
+def _plain(axes: Axes) -> None:
     axes.grid(color="#dde3ea", linewidth=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ir_recorder.read.cdr import Numbers
+
+Json: TypeAlias = "Mapping[str, Json] | Sequence[Json] | str | float | bool | None"
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +25,7 @@ class Envelope:
 
 
 def envelope(time: Numbers, value: Numbers, most: int) -> Envelope:
-    """The series as at most `most` stretches of equal count; no peak gets lost. A short series stays as it
-    is.
-    """
+    """A series (N,) as at most `most` stretches of equal count, every peak kept; a short one unchanged."""
     if len(time) <= most:
         return Envelope(time, value, value)
     edges = np.linspace(0, len(time), most + 1).astype(int)[:-1]
@@ -33,18 +35,18 @@ def envelope(time: Numbers, value: Numbers, most: int) -> Envelope:
 
 
 def floats(values: ArrayLike) -> str:
-    """float32, little endian, in base64."""
+    """An array of any shape (...) as float32, little endian, in base64."""
     return _base64(np.asarray(values, dtype="<f4"))
 
 
 def quantised(values: ArrayLike, step: float) -> str:
-    """int16 multiples of `step`, little endian, in base64; values beyond the range are clipped."""
+    """An array (...) as int16 multiples of `step`, little endian, in base64; clipped to its range."""
     counts = np.clip(np.rint(np.nan_to_num(np.asarray(values, dtype=float)) / step), -32768, 32767)
     return _base64(counts.astype("<i2"))
 
 
 def indices(values: ArrayLike) -> str:
-    """uint16, little endian, in base64."""
+    """An array (...) of indices as uint16, little endian, in base64."""
     return _base64(np.asarray(values, dtype="<u2"))
 
 

@@ -7,7 +7,7 @@ from ir_recorder.errors import PathError
 from ir_recorder.write.session import CellFiles
 
 
-def cell_files(name_or_path: str) -> CellFiles:
+def files_of_cell(name_or_path: str) -> CellFiles:
     """Files of a bundled cell or of one on disk; PathError when there is none or it is broken."""
     try:
         cell = load_cell(name_or_path)

@@ -21,7 +21,7 @@ from ir_recorder.format.qos import QosOffer, offers_to_yaml
 from ir_recorder.format.schemas import SchemaLibrary
 
 CHUNK_SIZE = 256 * 1024  # bytes: about 1.5 s of a cell; what a power cut may cost
-REORDERED = 1_000_000_000  # ns
+REORDERED = 1_000_000_000  # ns: topics are polled every 20 ms; more is a clock that was set back
 _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 
 

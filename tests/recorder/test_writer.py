@@ -6,13 +6,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ir_recorder.errors import PathError, SchemaError, WriteError
-from ir_recorder.format.definition import definitions_of
-from ir_recorder.format.qos import QosOffer, offers_from_yaml, offers_to_yaml, request_for
-from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.listen.topics import TopicSelection, single_type
+from ir_recorder.errors import PathError, WriteError
 from ir_recorder.read.raw import read_raw
-from ir_recorder.write.session import CellFiles, RecordingSession
 from ir_recorder.write.writer import RecordingWriter
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -61,22 +56,6 @@ def test_channels_carry_what_rosbag2_wants(demo_file: Path) -> None:
         assert profile["deadline"] == {"sec": 9223372036, "nsec": 854775807}
     latched = next(c for c in channels if c.topic == "/ir_program_runner/program_state")
     assert "durability: transient_local" in latched.metadata["offered_qos_profiles"]
-
-
-def test_a_schema_holds_all_types_a_message_is_built_from() -> None:
-    schema = SchemaLibrary().schema("ir_msgs/msg/ProgramState")
-    definitions = definitions_of(schema.name, schema.text)
-    used = {f.type for fields in definitions.values() for f in fields if not f.primitive}
-    assert used <= set(definitions)
-    assert "trajectory_msgs/JointTrajectoryPoint" in used
-
-
-@pytest.mark.parametrize(
-    "name", ["nothing_msgs/msg/Nothing", "ir_msgs/action/Plan_FeedbackMessage", "JointState"]
-)
-def test_types_that_cannot_be_recorded_are_named(name: str) -> None:
-    with pytest.raises(SchemaError, match=r"no definition|not a message type"):
-        SchemaLibrary().schema(name)
 
 
 def test_cdr_bytes_are_kept_as_they_came(tmp_path: Path) -> None:
@@ -148,51 +127,3 @@ def test_finishing_twice_changes_nothing(tmp_path: Path) -> None:
     size = first.path.stat().st_size
     assert writer.finish() == first
     assert first.path.stat().st_size == size
-
-
-def test_facts_and_cell_are_in_the_file(tmp_path: Path) -> None:
-    session = RecordingSession(RecordingWriter(tmp_path / "a.mcap"), {"shift": "night"}, 5)
-    session.attach_cell(CellFiles("name: here", "<robot/>"), 6)
-    session.attach_cell(CellFiles("name: other", ""), 7)
-    raw = read_raw(session.finish().path)
-    assert raw.fact("shift") == "night"
-    assert raw.fact("started_ns") == "5"
-    assert raw.attachment("cell.yaml") == b"name: here"
-
-
-def test_offered_qualities_survive_the_file_in_names_and_numbers() -> None:
-    offers = (QosOffer(reliable=False, depth=7), QosOffer(transient_local=True))
-    assert offers_from_yaml(offers_to_yaml(offers)) == offers
-    old = "- {history: 1, depth: 3, reliability: 2, durability: 1}"
-    assert offers_from_yaml(old) == (QosOffer(reliable=False, transient_local=True, depth=3),)
-    assert offers_from_yaml("not: [a list") == ()
-
-
-def test_a_request_meets_all_offers() -> None:
-    mixed = request_for([QosOffer(transient_local=True), QosOffer(reliable=False)])
-    assert not mixed.reliable
-    assert not mixed.transient_local
-    assert request_for([QosOffer(transient_local=True)]).transient_local
-    assert request_for([]).reliable
-
-
-def test_the_cells_topics_are_chosen_and_strangers_are_not() -> None:
-    cell = TopicSelection()
-    for topic in ("/joint_states", "/robot_description", "/rosout", "/diagnostics", "/ir_planner/markers"):
-        assert topic in cell
-    assert "/ir_sim_driver/execute_trajectory/_action/status" in cell
-    for topic in ("/camera/image", "/ir_planner_2/markers", "/ir_sim_driver/x/_action/feedback", "/_hidden"):
-        assert topic not in cell
-
-
-def test_a_namespace_moves_the_selection() -> None:
-    cell = TopicSelection(namespace="/cell_1")
-    assert "/cell_1/joint_states" in cell
-    assert "/joint_states" not in cell
-    assert "/diagnostics" in cell
-    assert "/cell_1/other" in TopicSelection(("other",), "/cell_1")
-
-
-def test_topics_of_several_types_are_passed_over() -> None:
-    assert single_type("/a", ["std_msgs/msg/String"]) == "std_msgs/msg/String"
-    assert single_type("/a", ["std_msgs/msg/String", "std_msgs/msg/Bool"]) is None

@@ -1,0 +1,52 @@
+"""An analysed recording against closed forms and against what the synthetic run put in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_recorder import Analysis, analyse, findings, read_recording
+
+HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+
+
+def test_steps_know_when_they_moved_and_what_they_took(analysis: Analysis) -> None:
+    assert [result.step.label for result in analysis.steps] == [
+        "home → table",
+        "table → press",
+        "pause at press (STAND_ON_MOTORS)",
+        "pause at press (BUS_POWER_OFF)",
+        "press → home",
+    ]
+    for result in analysis.movements:
+        assert result.seconds == pytest.approx(1.5, abs=1e-6)
+        assert result.energy == pytest.approx(result.step.movement.report.energy, rel=1e-6)
+        np.testing.assert_allclose(result.joint_energy, result.step.movement.report.joint_energy, atol=0.5)
+
+
+def test_energy_is_base_and_axes_and_burnt_and_what_the_capacitor_took(analysis: Analysis) -> None:
+    capacity = 106.0  # J, data of the drive
+    for result in analysis.movements:
+        rest = result.energy - result.base_energy - result.joint_energy.sum() - result.dissipated_energy
+        assert abs(rest) <= capacity + 1.0
+
+
+def test_motion_and_torque_tell_the_same_energy_as_the_meter(analysis: Analysis) -> None:
+    for result in analysis.movements:
+        assert result.indirect_energy == pytest.approx(result.energy, abs=110.0)  # the capacitor's charge
+
+
+def test_a_recording_without_power_or_cell_gives_what_is_left(demo_file: Path) -> None:
+    recording = read_recording(demo_file)
+    bare = analyse(replace(recording, power=None, cell_yaml="", controller=None))
+    assert len(bare.steps) == 5
+    assert np.isnan(bare.energy)
+    assert bare.movements[0].clearance is None
+    assert any("no cell is attached" in problem for problem in bare.problems)
+    broken = analyse(replace(recording, cell_yaml="format: ir_cell/1\nname: ["))
+    assert any("attached cell can't be read" in problem for problem in broken.problems)
+    empty = analyse(replace(recording, power=None, joints=None, events=(), loads=()))
+    assert [check.ok for check in findings(empty)] == [False]

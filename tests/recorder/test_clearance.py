@@ -1,0 +1,26 @@
+"""Executed clearance is that of the recorded joint states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ir_recorder.analysis.clearance import collision_model
+
+from ir_recorder import Analysis
+
+
+def test_clearance_is_that_of_the_recorded_joint_states(analysis: Analysis) -> None:
+    result = analysis.movements[1]
+    near, joints = result.clearance, analysis.recording.joints
+    model = collision_model(analysis.cell, "gripper+part", analysis.cell.parts_at_start())
+    inside = (joints.time >= result.step.start) & (joints.time <= result.step.end)
+    distances = model.distances(joints.position[inside])
+    allowed = [{"p_body", "press_bed"} == {pair.body_a, pair.body_b} for pair in model.pairs]
+    assert near.least == pytest.approx(distances[:, ~np.array(allowed)].min(), abs=1e-6)
+    assert near.contact_margin >= distances[:, allowed].min() - 0.001 - 1e-9
+    assert near.least <= near.distance.min()
+
+
+def test_a_part_that_was_put_down_is_a_body_where_it_lies(analysis: Analysis) -> None:
+    leaving = analysis.movements[2].clearance
+    assert any("part_box" in pair for pair in leaving.pairs)

@@ -1,0 +1,54 @@
+"""What is left of a damaged file is read; what is no recording is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ir_recorder.errors import ReadError
+from ir_recorder.read.reader import read_recording
+from mcap.reader import make_reader
+
+
+def test_a_truncated_file_gives_what_is_left(demo_file: Path, tmp_path: Path) -> None:
+    data = demo_file.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data[: len(data) * 2 // 3])
+    recording = read_recording(cut)
+    assert 0 < len(recording.joints.time) < len(read_recording(demo_file).joints.time)
+    assert any("ends early" in problem for problem in recording.problems)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.5, 0.999])
+def test_no_cut_is_too_early_or_late(demo_file: Path, tmp_path: Path, share: float) -> None:
+    data = demo_file.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data[: int(len(data) * share)])
+    assert read_recording(cut).problems
+
+
+def test_a_damaged_chunk_costs_only_itself(demo_file: Path, tmp_path: Path) -> None:
+    data = bytearray(demo_file.read_bytes())
+    with demo_file.open("rb") as stream:
+        chunk = make_reader(stream).get_summary().chunk_indexes[2]
+    middle = chunk.chunk_start_offset + chunk.chunk_length // 2
+    data[middle : middle + 64] = bytes(64)
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(data)
+    recording, whole = read_recording(broken), read_recording(demo_file)
+    assert any("is damaged" in problem for problem in recording.problems)
+    assert recording.joints.time[-1] == pytest.approx(whole.joints.time[-1], abs=1.0)
+    assert len(recording.joints.time) < len(whole.joints.time)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 a zip", b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_is_refused_with_a_sentence(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    with pytest.raises(ReadError, match=r"x\.mcap"):
+        read_recording(path)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ReadError, match="No such file"):
+        read_recording(tmp_path / "none.mcap")

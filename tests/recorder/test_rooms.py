@@ -1,0 +1,71 @@
+"""The recorder's rooms know each other in one direction, and each shows a public face."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import ir_recorder
+
+FOLDER = Path(ir_recorder.__file__).parent
+READING = {"errors", "format", "read"}
+KNOWS = {
+    "errors": set(),
+    "format": {"errors"},
+    "settings": {"errors"},
+    "parameters": {"settings"},
+    "write": {"errors", "format"},
+    "read": {"errors", "format"},
+    "listen": {"errors", "format"},
+    "play": READING,
+    "analysis": READING,
+    "report": READING | {"analysis"},
+    "report_main": READING | {"analysis", "report"},
+    "node": {"errors", "format", "listen", "parameters", "settings", "write"},
+    "__init__": READING | {"analysis"},
+}
+FACE = {
+    *("Analysis", "Finding", "PathError", "ReadError", "RecorderError", "Recording", "SchemaError"),
+    *("Tolerances", "WriteError", "analyse", "findings", "read_recording"),
+}
+ROOMS = [path.parent.name for path in sorted(FOLDER.glob("*/__init__.py"))]
+
+
+def own_imports(module: Path) -> Iterator[str]:
+    """Rooms of this package that a module imports, its own aside."""
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("ir_recorder."):
+            yield node.module.split(".")[1]
+        elif isinstance(node, ast.ImportFrom) and node.module == "ir_recorder":
+            yield from (alias.name for alias in node.names)
+
+
+@pytest.mark.parametrize("module", sorted(FOLDER.rglob("*.py")), ids=lambda p: str(p.relative_to(FOLDER)))
+def test_a_room_knows_only_those_below_it(module: Path) -> None:
+    room = module.relative_to(FOLDER).parts[0].removesuffix(".py")
+    assert set(own_imports(module)) <= KNOWS[room] | {room}
+
+
+def test_no_two_rooms_know_each_other() -> None:
+    done: set[str] = set()
+    while len(done) < len(KNOWS):
+        ready = {room for room, below in KNOWS.items() if room not in done and below <= done}
+        assert ready, f"a circle among {sorted(set(KNOWS) - done)}"
+        done |= ready
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_has_a_first_line_and_shows_what_may_be_used(room: str) -> None:
+    module = import_module(f"ir_recorder.{room}")
+    assert module.__doc__
+    assert module.__all__ == sorted(module.__all__)
+    assert all(hasattr(module, name) for name in module.__all__)
+
+
+def test_the_public_face_is_this_list() -> None:
+    assert set(ir_recorder.__all__) == FACE
+    assert all(hasattr(ir_recorder, name) for name in FACE)

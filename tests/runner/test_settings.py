@@ -1,0 +1,14 @@
+"""Settings name what is wrong."""
+
+from __future__ import annotations
+
+import pytest
+from ir_msgs_py.errors import ParameterError
+from ir_program_runner.settings import LinkSettings, ProgramSettings
+
+
+def test_settings_name_what_is_wrong():
+    with pytest.raises(ParameterError, match=r"wake_margin is -1 s: it must be 0 \.\. 3600 s"):
+        ProgramSettings(wake_margin=-1.0)
+    with pytest.raises(ValueError, match="mac is '12': it must be six hex bytes"):
+        LinkSettings(mac="12")
