@@ -59,9 +59,6 @@ GENERATED = {"build", "install", "log", "__pycache__", "egg-info"}
 PENDING: tuple[str, ...] = (
     "src/ir_planner",
     "src/ir_sim_driver",
-    "src/ir_recorder",
-    "src/ir_program_runner",
-    "src/ir_cli",
     "src/ir_msgs_py",
     "src/ir_description",
     "src/ir_kernels",
@@ -70,7 +67,6 @@ PENDING: tuple[str, ...] = (
     "docs/cell_format.md",
     "docs/driver.md",
     "docs/notation.md",
-    "docs/recording.md",
 )
 
 GAP = r"[\s#/*_-]+"  # between two words: also the end of a commented line, or an underscore

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 
 DEMONSTRATION_DOMAINS = range(1, 101)
-"""ROS domain ids that leave room for all participants below the ephemeral ports of Linux."""
+"""ROS domain ids whose ports stay, for all participants, below the ephemeral ports of Linux."""
 
 
 def ros_defaults() -> dict[str, str]:

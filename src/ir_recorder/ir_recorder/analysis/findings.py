@@ -19,7 +19,7 @@ class Tolerances:
     energy_relative or energy_absolute [J], whichever is larger, per movement; duration [s]; tool_deviation
     [m]; safety_distance [m]: S_m, that the executed clearance keeps but for the deviation that was measured
     (or tolerated, where none was) and `slack` [m]; where a certified plan comes nearer, its clearance stands
-    for the S_m it was made with, which no message tells; allowed pairs keep their own distance alike;
+    for the S_m it was made with, which no message carries; allowed pairs keep their own distance alike;
     table_2_relative; table_2_rows: how many rows the recording has to show; indirect_relative: indirect
     against direct measurement.
     """

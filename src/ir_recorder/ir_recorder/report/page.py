@@ -94,12 +94,12 @@ def _verdict(checks: Sequence[Finding]) -> str:
 
 
 def _notes(analysis: Analysis) -> str:
-    """What the recorder was told of this run, as shortened transitions."""
+    """Facts of this run from the recorder's parameter, as shortened transitions."""
     facts = [(key, value) for key, value in analysis.recording.facts if key not in OWN_FACTS]
     if not facts:
         return ""
     items = "".join(f"<li>{text(key.replace('_', ' '))} <b>{text(value)}</b></li>" for key, value in facts)
-    return f'<ul class="notes"><li class="head">Told of this run</li>{items}</ul>'
+    return f'<ul class="notes"><li class="head">Settings of this run</li>{items}</ul>'
 
 
 def _tiles(analysis: Analysis, checks: Sequence[Finding]) -> str:

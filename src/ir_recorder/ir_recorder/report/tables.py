@@ -33,7 +33,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -
 def step_table(results: Sequence[StepResult]) -> str:
     """Every step: planned against measured."""
     heads = ("#", "step", "load", ">time", ">planned", ">measured", ">deviation", ">mean", ">clearance")
-    return table((*heads, ">tool off by"), (_step(result) for result in results))
+    return table((*heads, ">tool deviation"), (_step(result) for result in results))
 
 
 def _step(result: StepResult) -> tuple[str, ...]:
@@ -48,7 +48,7 @@ def _step(result: StepResult) -> tuple[str, ...]:
         text(step.movement.load or DASH),
         f"{result.seconds:.2f} s",
         joules(plan) if plan else DASH,
-        joules(result.energy) + _small("torque says", joules(result.indirect_energy)),
+        joules(result.energy) + _small("from torque", joules(result.indirect_energy)),
         percent(result.energy / plan - 1.0) if plan and not step.movement.is_pause else DASH,
         watts(result.mean_power) + _small("peak", watts(result.peak_power)),
         f"{millimetres(near.least)}<small>{text(near.least_pair)}</small>" if near else DASH,
@@ -70,7 +70,7 @@ def station_table(analysis: Analysis) -> str:
     other = analysis.elsewhere
     if math.isfinite(other.energy):
         rows.append((text(other.name), DASH, DASH, DASH, f"{other.seconds:.1f} s", joules(other.energy)))
-    return table(("station", ">the way there", ">in and out", ">resting", ">time", ">energy"), rows)
+    return table(("station", ">travel to it", ">service movements", ">pauses", ">time", ">energy"), rows)
 
 
 def mode_table(analysis: Analysis) -> str:
