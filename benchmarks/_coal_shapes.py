@@ -4,12 +4,11 @@ from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
 
 
-def along_z(p0: Array, p1: Array) -> Array:
+def along_z(p0: FloatArray, p1: FloatArray) -> FloatArray:
     """Pose of a frame in the middle of a segment, z along it."""
     pose = np.eye(4)
     d = p1 - p0

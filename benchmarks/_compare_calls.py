@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from _compare_face import name_of, planner_of
+
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
+from ir_description import Cell, load_power_data
 from ir_msgs_py.power import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.motion.goal import TrajectoryGoal
-
-from ir_description import Cell, load_power_data
 
 HOUR = 3600.0
 TICK = 0.01

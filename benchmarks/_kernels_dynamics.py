@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
 from ir_description import load_robot
 from ir_kernels import (
@@ -27,8 +26,8 @@ from ir_kernels import (
     dc_bus,
     motion_extrema,
 )
+from ir_msgs_py.arrays import FloatArray
 
-Array = NDArray[np.float64]
 SAMPLES = 4096
 PINOCCHIO_SAMPLES = 512
 REPETITIONS = 30
@@ -94,7 +93,7 @@ def _pinocchio_model(robot: Any, load: Tool) -> Any:
     return model
 
 
-def _agreement(model: DynamicsModel, peer: Any, samples: Sequence[Array], robot: Any) -> float:
+def _agreement(model: DynamicsModel, peer: Any, samples: Sequence[FloatArray], robot: Any) -> float:
     """Largest difference of the arm's torque from Pinocchio's, relative to the largest torque."""
     q, qd, qdd = samples
     data = peer.createData()

@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 from _kernels_dynamics import Claim, Row, best
 from _kernels_peers import Bullet, Coal
-from numpy.typing import NDArray
 
 from ir_description import Cell, load_cell
 from ir_kernels import FREE, UNDECIDED, Chain, CollisionModel
+from ir_msgs_py.arrays import BoolArray, FloatArray
 
-Array = NDArray[np.float64]
 SAMPLES = 4000  # configurations per batch: a hundred edges
 REPETITIONS, TURNS = 60, 10
 EDGE, SAFETY, ROOM = 0.8, 0.02, 0.005  # rad, m, m
@@ -38,9 +37,9 @@ class Body:
 
     name: str
     kind: str
-    pose: Array
-    size: Array
-    vertices: Array
+    pose: FloatArray
+    size: FloatArray
+    vertices: FloatArray
 
 
 def model_of(cell: Cell, bodies: Sequence[Any] | None = None) -> tuple[CollisionModel, list[Any], list[Any]]:
@@ -53,24 +52,24 @@ def model_of(cell: Cell, bodies: Sequence[Any] | None = None) -> tuple[Collision
     return CollisionModel(Chain(robot, cell.base_pose, cell.tcp), capsules, scene, own), capsules, scene
 
 
-def uniform(cell: Cell, rng: np.random.Generator, count: int) -> Array:
+def uniform(cell: Cell, rng: np.random.Generator, count: int) -> FloatArray:
     return rng.uniform(cell.robot.position_min, cell.robot.position_max, (count, cell.robot.n))
 
 
-def edges(cell: Cell, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+def edges(cell: Cell, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
     start = uniform(cell, rng, count)
     step = rng.uniform(-1.0, 1.0, start.shape)
     goal = start + EDGE * step / np.abs(step).max(axis=1, keepdims=True)
     return start, np.clip(goal, cell.robot.position_min, cell.robot.position_max)
 
 
-def path_like(cell: Cell, rng: np.random.Generator, count: int = SAMPLES) -> Array:
+def path_like(cell: Cell, rng: np.random.Generator, count: int = SAMPLES) -> FloatArray:
     q0, q1 = edges(cell, rng, count // 40)
     t = np.linspace(0.0, 1.0, 40)[None, :, None]
     return np.ascontiguousarray((q0[:, None] + t * (q1 - q0)[:, None]).reshape(-1, q0.shape[1]))
 
 
-def threaded(model: CollisionModel, q: Array) -> float:
+def threaded(model: CollisionModel, q: FloatArray) -> float:
     """Seconds per configuration with two threads, each with its half."""
     halves = np.ascontiguousarray(q[: len(q) // 2]), np.ascontiguousarray(q[len(q) // 2 :])
     with ThreadPoolExecutor(2) as pool:
@@ -139,7 +138,7 @@ def _agreement(name: str, cell: Cell, rng: np.random.Generator) -> list[Claim]:
     ]
 
 
-def _roomy(model: CollisionModel, q0: Array, q1: Array) -> NDArray[np.bool_]:
+def _roomy(model: CollisionModel, q0: FloatArray, q1: FloatArray) -> BoolArray:
     """Edges whose 81 samples all keep the safety distance and ROOM."""
     free = np.ones(len(q0), bool)
     for t in np.linspace(0.0, 1.0, 81):
@@ -147,7 +146,7 @@ def _roomy(model: CollisionModel, q0: Array, q1: Array) -> NDArray[np.bool_]:
     return free
 
 
-def _refuted(model: CollisionModel, q0: Array, q1: Array) -> int:
+def _refuted(model: CollisionModel, q0: FloatArray, q1: FloatArray) -> int:
     """Edges among those called free with a sample, every FINE rad, that isn't."""
     count = 0
     for a, b in zip(q0, q1, strict=True):

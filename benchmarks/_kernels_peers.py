@@ -12,15 +12,13 @@ import numpy as np
 import pinocchio
 import pybullet
 from _coal_shapes import along_z, solid
-from numpy.typing import NDArray
 
 from ir_description import Cell, robot_urdf
 from ir_kernels import CollisionModel
+from ir_msgs_py.arrays import FloatArray
 
-Array = NDArray[np.float64]
 
-
-def _se3(pose: Array) -> Any:
+def _se3(pose: FloatArray) -> Any:
     return pinocchio.SE3(np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3]))
 
 
@@ -52,16 +50,16 @@ class Coal:
             self.geometry.addCollisionPair(pinocchio.CollisionPair(index[pair.body_a], index[other]))
         self.data, self.geometry_data = self.model.createData(), self.geometry.createData()
 
-    def compute(self, q: Array) -> None:
+    def compute(self, q: FloatArray) -> None:
         """All distances at one configuration."""
         pinocchio.computeDistances(self.model, self.data, self.geometry, self.geometry_data, q)
 
-    def compute_all(self, batch: Array) -> None:
+    def compute_all(self, batch: FloatArray) -> None:
         """All distances, one configuration after the other."""
         for q in batch:
             self.compute(q)
 
-    def distances(self, q: Array) -> Array:
+    def distances(self, q: FloatArray) -> FloatArray:
         """(Z,), after compute, in the order of the model's pairs."""
         self.compute(q)
         return np.array([result.min_distance for result in self.geometry_data.distanceResults])
@@ -125,7 +123,7 @@ class Bullet:
             )
         )
 
-    def compute(self, q: Array) -> float:
+    def compute(self, q: FloatArray) -> float:
         """The least distance of robot and bodies at one configuration."""
         for joint, value in zip(self.joints, q, strict=True):
             pybullet.resetJointState(self.robot, joint, value, physicsClientId=self.client)

@@ -12,6 +12,7 @@ from _regional_ompl import PLANNERS, OmplPath, ompl_path
 from _regional_ours import asked, until
 from _regional_tasks import Cost, Task
 from _regional_toppra import timed
+
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.trajectories.through_points import Reference

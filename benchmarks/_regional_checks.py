@@ -7,12 +7,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio
 from _kernels_peers import Coal
+
 from ir_kernels.dynamics_data import STANDARD_GRAVITY
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene.planning_scene import PlanningScene
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 STEP = 0.0005  # rad of the fastest joint between two configurations that Coal is asked about
 RATE = 10_000.0  # Hz
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from _regional_tasks import Task
-from ir_planner.scene.planning_scene import PROOF_TOLERANCE
-from numpy.typing import NDArray
 from ompl import base, geometric, util
 
-FloatArray = NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
+from ir_planner.scene.planning_scene import PROOF_TOLERANCE
+
 PLANNERS = {"RRTConnect": geometric.RRTConnect, "BKPIECE1": geometric.BKPIECE1}
 RESOLUTION = 0.01  # rad of the fastest joint between two states that are checked
 SEARCH_S = 1.0  # ceiling of a search

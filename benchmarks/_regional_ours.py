@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 from _regional_tasks import TIME_VALUE, Cost, Task
+
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo
 from ir_msgs_py.trajectory import JointTrajectory

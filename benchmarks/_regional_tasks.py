@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ir_planner.checks.energy import STEP_S, movement_energy
-from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
-from numpy.typing import NDArray
 
 from ir_description import load_cell, load_power_data
+from ir_msgs_py.arrays import FloatArray
+from ir_planner.checks.energy import STEP_S, movement_energy
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 
-FloatArray = NDArray[np.float64]
 CELLS = ("open", "table_columns", "cnc_door", "deep_box")
 S_M = 0.02  # m
 SHARE_OF_ENDS = 0.8  # of the clearance at start and goal, where that is smaller

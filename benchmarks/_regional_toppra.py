@@ -15,15 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from _regional_ompl import RESOLUTION, Free, OmplPath
 from _regional_tasks import Cost, Task, cost_of
-from ir_msgs_py.trajectory import Samples
-from ir_planner.scene.planning_scene import PlanningScene
-from numpy.typing import NDArray
 from toppra import SplineInterpolator
 from toppra.algorithm import TOPPRA
 from toppra.constraint import LinearConstraint
 from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
 
-FloatArray = NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import Samples
+from ir_planner.scene.planning_scene import PlanningScene
+
 GRID = 120  # intervals of a path
 ITERATIONS = 5
 CHECK_S = 1e-3  # s between samples of the limits

@@ -10,16 +10,15 @@ import time
 
 import numpy as np
 from _kernels_peers import Coal
+
 from ir_msgs.srv import PlanServiceMovement
+from ir_msgs_py import names
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.scene.zones import tcp_inside
-from numpy.typing import NDArray
 
-from ir_msgs_py import names
-
-FloatArray = NDArray[np.float64]
 STEP = 0.0005  # rad between two configurations that Coal is asked about
 RATE = 10_000.0  # Hz
 

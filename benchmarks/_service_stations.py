@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from ir_description import Cell, Station, load_power_data
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.configurations.interaction_point import searched_configurations
@@ -19,11 +22,7 @@ from ir_planner.service.service_movement import ServiceRequest, plan_service
 from ir_planner.service.settings import WithdrawalSettings
 from ir_planner.service.withdrawal import withdraw
 from ir_planner.service.withdrawal_paths import Exit
-from numpy.typing import NDArray
 
-from ir_description import Cell, Station, load_power_data
-
-FloatArray = NDArray[np.float64]
 S_M = 0.02  # m
 SHARE_OF_BEST = 0.8  # of the station's best clearance, where that is smaller
 STARTS = 32

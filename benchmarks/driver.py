@@ -19,15 +19,15 @@ from typing import Any
 import numpy as np
 from _driver_power import energy_rows, table_2_rows, transition_rows
 from _driver_stream import streamed
+from kernels import commit, machine
+
+from ir_description import Cell, load_cell
 from ir_kernels.power import DcBusParameters, dc_bus
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import TrajectoryGoal
-from kernels import commit, machine
-
-from ir_description import Cell, load_cell
 
 DT = 0.001
 MOVEMENTS = 4

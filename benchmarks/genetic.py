@@ -21,13 +21,14 @@ from typing import Any
 import numpy as np
 from _regional_figures import Claim, at_least, at_most
 from _regional_tasks import CELLS, Task, tasks_of
+from kernels import commit, machine
+
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.request.work import Work
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.search.correction import Correction, corrected
 from ir_planner.search.genetic_settings import GeneticSettings
 from ir_planner.search.shortcuts import fewest_corners, pulled
-from kernels import commit, machine
 
 DEFAULT = "default"
 VARIANTS: dict[str, dict[str, Any]] = {

@@ -39,9 +39,10 @@ from _regional_ours import (
 from _regional_plot import plot
 from _regional_tasks import CELLS, Task, tasks_of
 from _regional_toppra import timed
+from kernels import commit, machine
+
 from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
-from kernels import commit, machine
 
 METHODS = 3  # of the best known J
 GENETIC = "genetic"

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 from _kernels_dynamics import Claim
-from ir_kernels.search import BidirectionalTree
-from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from kernels import commit, machine
 
 from ir_description import load_cell, load_power_data
+from ir_kernels.search import BidirectionalTree
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 
 BOUNDS = {"open": 1.0, "table_columns": 2.0, "cnc_door": 10.0, "deep_box": 30.0}  # ms, of the median
 SAFETY = 0.02

@@ -15,6 +15,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import movement_energy
@@ -22,12 +23,10 @@ from ir_planner.planner import Planner
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import stretched
 from ir_planner.trajectories.optimization import OptimizationPlan
-from numpy.typing import NDArray
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-FloatArray = NDArray[np.float64]
 CELL, TASK = "deep_box", "bin->pal"
 BEFORE, AFTER, STEEL = "#c2272d", "#2a6fbb", "#8a8f98"
 

@@ -16,6 +16,10 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from scipy.spatial import ConvexHull
+
+from ir_description import load_cell, load_power_data
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.settings import InteractionSettings
@@ -25,15 +29,10 @@ from ir_planner.service.service_movement import ServicePlan, ServiceRequest, pla
 from ir_planner.service.settings import WithdrawalSettings
 from ir_planner.service.withdrawal import Walk, withdraw
 from ir_planner.service.withdrawal_paths import Exit
-from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
-
-from ir_description import load_cell, load_power_data
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-FloatArray = NDArray[np.float64]
 SIDE, PLAN = (0, 2), (0, 1)  # machine axes that a panel shows
 PICTURES = (("cnc_door", "press", "service_press.png"), ("deep_box", "tun", "service_tunnel.png"))
 S_M = 0.02

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ir_cli.main import main
 
+from ir_cli.main import main
 from ir_description import bundled_cells, cell_to_yaml, load_cell
 
 

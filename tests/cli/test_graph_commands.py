@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
 from ir_cli.main import main
 from ir_msgs.msg import Signal
 from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros.background import BackgroundExecutor
-from rclpy.context import Context
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
 SERVICE = "/machine/set"
 TOPIC = "/machine/signal"

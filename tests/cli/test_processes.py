@@ -7,6 +7,7 @@ import threading
 from pathlib import Path
 
 import pytest
+
 from ir_cli.errors import ProcessError
 from ir_cli.processes import NodeCommand, NodeProcesses
 

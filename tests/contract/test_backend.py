@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from ir_description import Cell, Load, load_cell
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.controller.assembly import BACKENDS, make_backend
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant.backend import Backend, Work
-
-from ir_description import Cell, Load, load_cell
 
 SETTINGS = SimulationSettings()
 DT = SETTINGS.dt

@@ -7,12 +7,12 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from ir_msgs_py.power import REST_MODES, Mode
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 
 from ir_description import PowerData, load_power_data
+from ir_msgs_py.power import REST_MODES, Mode
 from ir_planner import Planner
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 
 FOLDER = files("ir_description") / "data" / "power"
 CONTROLLERS = sorted(entry.name.removesuffix(".yaml") for entry in FOLDER.iterdir())

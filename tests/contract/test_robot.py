@@ -7,13 +7,13 @@ import itertools
 import numpy as np
 import pinocchio
 import pytest
-from ir_msgs_py.options import PlanOptions
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.motion.goal import TrajectoryGoal
 
 from ir_description import CellFileError, RobotModel, bundled_robots, cell_from_yaml, load_robot, robot_urdf
 from ir_kernels import Chain, DynamicsModel, SphericalWristIk
+from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, parse_goal
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.motion.goal import TrajectoryGoal
 
 POSITION = 1e-9  # m
 TORQUE = 1e-6  # Nm; sums of thousands of Nm in another order

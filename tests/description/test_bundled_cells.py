@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from ir_description import (
@@ -20,8 +19,7 @@ from ir_description import (
     load_cell,
 )
 from ir_kernels import Chain, CollisionModel, SphericalWristIk
-
-Array = npt.NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
 
 PARK_CLEARANCE = 0.0982
 CLEARANCE = {  # m, at the configurations of the tasks; published with the cells to 0.1 mm
@@ -42,7 +40,7 @@ def model(cell: Cell, held: str = "", places: PartPlaces | None = None) -> Colli
     )
 
 
-def thresholds(collisions: CollisionModel, station: Station | None, safety_distance: float) -> Array:
+def thresholds(collisions: CollisionModel, station: Station | None, safety_distance: float) -> FloatArray:
     """Safety distance per pair (Z,) [m], the station's own for its allowed contacts."""
     allowed = {
         frozenset((c.body_a, c.body_b)): c.safety_distance
@@ -53,7 +51,7 @@ def thresholds(collisions: CollisionModel, station: Station | None, safety_dista
     )
 
 
-def unturned(q: Array) -> Array:
+def unturned(q: FloatArray) -> FloatArray:
     """The configurations (M, 6) with the wrist as at machine home: |A4| below a quarter turn."""
     return q[np.abs(q[:, 3]) < np.pi / 2.0]
 
@@ -161,7 +159,7 @@ def test_every_move_of_the_demo_is_free_straight_or_by_way_of_park() -> None:
         )
         collisions = model(cell, places.held, places)
 
-        def connects(a: Array, b: Array, collisions: CollisionModel = collisions) -> bool:
+        def connects(a: FloatArray, b: FloatArray, collisions: CollisionModel = collisions) -> bool:
             q = a + (b - a) * np.linspace(0.0, 1.0, 50)[:, None]
             return bool(collisions.is_free(q, SAFETY_DISTANCE).all())
 

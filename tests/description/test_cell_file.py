@@ -8,20 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ir_description.arrays import solid_box_inertia
-from ir_description.body import KINDS
-from ir_description.equipment import ZONE_KINDS, station_at, zone_around
-from ir_description.poses import (
-    abc_from_rotation,
-    pose_of,
-    rotation_from_abc,
-    rotation_from_matrix,
-    rotation_from_quaternion,
-)
 
 from ir_description import (
     AllowedContact,
@@ -44,8 +33,18 @@ from ir_description import (
     load_cell,
     load_robot,
 )
+from ir_description.arrays import solid_box_inertia
+from ir_description.body import KINDS
+from ir_description.equipment import ZONE_KINDS, station_at, zone_around
+from ir_description.poses import (
+    abc_from_rotation,
+    pose_of,
+    rotation_from_abc,
+    rotation_from_matrix,
+    rotation_from_quaternion,
+)
+from ir_msgs_py.arrays import FloatArray
 
-Array = npt.NDArray[np.float64]
 ROBOT = load_robot()
 ROTATION_TOLERANCE = 1e-14  # a few roundings of a product of three matrices
 
@@ -72,7 +71,7 @@ angles = st.floats(-180.0, 180.0)
 
 
 @st.composite
-def rotations(draw: st.DrawFn) -> Array:
+def rotations(draw: st.DrawFn) -> FloatArray:
     if draw(st.booleans()):
         return rotation_from_abc([draw(angles), draw(angles), draw(angles)])
     q = np.array([draw(st.floats(-1, 1)) for _ in range(4)])
@@ -81,7 +80,7 @@ def rotations(draw: st.DrawFn) -> Array:
 
 
 @st.composite
-def poses(draw: st.DrawFn) -> Array:
+def poses(draw: st.DrawFn) -> FloatArray:
     return pose_of([draw(coordinates) for _ in range(3)], draw(rotations()))
 
 
@@ -180,7 +179,7 @@ def test_a_cell_survives_its_file(cell: Cell) -> None:
 
 
 @given(rotations())
-def test_abc_angles_give_the_rotation_back(R: Array) -> None:
+def test_abc_angles_give_the_rotation_back(R: FloatArray) -> None:
     again = rotation_from_abc(abc_from_rotation(R))
     assert np.abs(again - R).max() < 1e-7  # near B = +-90 deg A and C share an axis
     assert np.abs(again @ again.T - np.eye(3)).max() < ROTATION_TOLERANCE
@@ -219,12 +218,12 @@ FACES = [
 ]  # fmt: skip
 
 
-def binary_stl(triangles: Array) -> bytes:
+def binary_stl(triangles: FloatArray) -> bytes:
     rows = b"".join(struct.pack("<12fH", 0, 0, 0, *triangle.ravel(), 0) for triangle in triangles)
     return b"\0" * 80 + struct.pack("<I", len(triangles)) + rows
 
 
-def ascii_stl(triangles: Array) -> bytes:
+def ascii_stl(triangles: FloatArray) -> bytes:
     lines = ["solid box"]
     for triangle in triangles:
         lines += ["facet normal 0 0 0", "outer loop"]

@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from ir_description.arrays import solid_box_inertia
-from ir_description.body import BodyKind
-from ir_description.convex_distance import capsule_distance
-from ir_description.equipment import zone_around
-from ir_description.poses import composed, inverse, pose_of, rotation_from_abc
 
 from ir_description import (
     Body,
@@ -26,9 +20,13 @@ from ir_description import (
     check_cell,
     load_cell,
 )
+from ir_description.arrays import solid_box_inertia
+from ir_description.body import BodyKind
+from ir_description.convex_distance import capsule_distance
+from ir_description.equipment import zone_around
+from ir_description.poses import composed, inverse, pose_of, rotation_from_abc
 from ir_kernels import Chain, CollisionModel
-
-Array = npt.NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
 
 
 @pytest.fixture
@@ -168,12 +166,12 @@ def test_the_default_zone_encloses_bodies_in_any_orientation() -> None:
             assert np.abs(surface).max(axis=0) == pytest.approx(zone.size / 2, rel=0.05)  # and no larger
 
 
-def surface_points(body: Body, rng: np.random.Generator) -> Array:
+def surface_points(body: Body, rng: np.random.Generator) -> FloatArray:
     """Points (N, 3) of the surface in the body's frame, its farthest ones among them."""
     d = rng.normal(size=(4000, 3))
     d /= np.linalg.norm(d, axis=1)[:, None]
-    ends: Array = np.sign(d[:, 2:]) * [[0.0, 0.0, body.size[1] / 2]]
-    points: Array = np.sign(d) * body.size / 2
+    ends: FloatArray = np.sign(d[:, 2:]) * [[0.0, 0.0, body.size[1] / 2]]
+    points: FloatArray = np.sign(d) * body.size / 2
     if body.kind == "box":
         return points
     if body.kind in ("sphere", "capsule"):
@@ -229,7 +227,7 @@ def test_distances_of_the_review_agree_with_the_kernels(cell: Cell) -> None:
     capsule = replace(cell.robot.capsules[0], link=cell.robot.n)
     in_world = capsule.placed(chain.link_poses(home)[0, -1])
     tetrahedron = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.6, 0.0], [0.0, 0.0, 0.7]])
-    shapes: list[tuple[BodyKind, list[float], Array]] = [
+    shapes: list[tuple[BodyKind, list[float], FloatArray]] = [
         ("box", [0.3, 0.5, 0.7], np.zeros((0, 3))),
         ("cylinder", [0.3, 0.9, 0.0], np.zeros((0, 3))),
         ("sphere", [0.4, 0.0, 0.0], np.zeros((0, 3))),

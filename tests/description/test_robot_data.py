@@ -6,9 +6,7 @@ from dataclasses import fields, replace
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from ir_description.robot_file import robot_from_yaml
 
 from ir_description import (
     Counterbalance,
@@ -20,8 +18,8 @@ from ir_description import (
     load_power_data,
     load_robot,
 )
+from ir_description.robot_file import robot_from_yaml
 
-Array = npt.NDArray[np.float64]
 GRAVITY = 9.80665
 ROUNDING = 0.05  # W: copper losses are given to four digits
 ROBOT_TEXT = (files("ir_description") / "data" / "robots" / "kr210_r2700_extra.yaml").read_text()

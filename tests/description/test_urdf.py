@@ -7,15 +7,14 @@ from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from ir_description.arrays import solid_box_inertia
 
 from ir_description import Load, RobotModel, load_cell, load_robot, robot_urdf
+from ir_description.arrays import solid_box_inertia
+from ir_msgs_py.arrays import FloatArray
 
 pybullet = pytest.importorskip("pybullet")
 
-Array = npt.NDArray[np.float64]
 POSITION_TOLERANCE = 1e-9  # m; the centre-of-mass frame is kept in double precision
 GRAVITY = 9.80665
 TOOL_155KG = Load(
@@ -45,25 +44,25 @@ class Bullet:
                 self.joints.append(j)
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
 
-    def place(self, q: Array) -> None:
+    def place(self, q: FloatArray) -> None:
         for joint, value in zip(self.joints, q, strict=True):
             pybullet.resetJointState(self.body, joint, float(value), physicsClientId=self.client)
 
-    def com_position(self, link: str) -> Array:
+    def com_position(self, link: str) -> FloatArray:
         index = self.names.index(link) - 1
         state = pybullet.getLinkState(
             self.body, index, computeForwardKinematics=True, physicsClientId=self.client
         )
         return np.array(state[0])
 
-    def gravity(self, q: Array) -> Array:
+    def gravity(self, q: FloatArray) -> FloatArray:
         zeros = [0.0] * len(self.joints)
         torque = pybullet.calculateInverseDynamics(
             self.body, list(map(float, q)), zeros, zeros, physicsClientId=self.client
         )
         return np.array(torque)
 
-    def dynamics(self, link: str) -> tuple[float, Array]:
+    def dynamics(self, link: str) -> tuple[float, FloatArray]:
         info = pybullet.getDynamicsInfo(self.body, self.names.index(link) - 1, physicsClientId=self.client)
         return info[0], np.array(info[2])
 
@@ -87,7 +86,7 @@ def loaded(tmp_path: Path, robot: RobotModel) -> Iterator[Bullet]:
     pybullet.disconnect(physicsClientId=world.client)
 
 
-def link_poses(robot: RobotModel, q: Array) -> list[Array]:
+def link_poses(robot: RobotModel, q: FloatArray) -> list[FloatArray]:
     """Poses (4, 4) of links 0..n in the base, straight from the chain's definition."""
     poses = [np.eye(4)]
     for i in range(robot.n):

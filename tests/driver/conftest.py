@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from ir_description import Cell, load_cell
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.motion.goal import Outcome, TrajectoryGoal
-
-from ir_description import Cell, load_cell
 
 
 @pytest.fixture(scope="session")

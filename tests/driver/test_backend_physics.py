@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
+from ir_description import Load, load_power_data
 from ir_kernels.chain import Chain
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.power import Mode
@@ -13,9 +16,6 @@ from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.plant.drivetrain import Drivetrain
 from ir_sim_driver.plant.ideal_backend import IdealBackend
-from scipy.spatial.transform import Rotation
-
-from ir_description import Load, load_power_data
 
 POSITION_TOLERANCE = 1e-9  # m; the centre-of-mass frame is double precision in Bullet
 TORQUE_TOLERANCE = 1e-6  # Nm; sums of a few thousand Nm in another order

@@ -6,6 +6,7 @@ import threading
 
 import numpy as np
 import pytest
+
 from ir_msgs_py.power import Mode
 from ir_sim_driver.controller.driver import NO_GOAL, QUEUE_MAX, Driver
 from ir_sim_driver.controller.settings import ControllerSettings

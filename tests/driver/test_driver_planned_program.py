@@ -6,13 +6,13 @@ import itertools
 
 import numpy as np
 import pytest
+
+from ir_description import load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_planner.planner import Planner
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant.loads import carried
-
-from ir_description import load_cell
 
 ENERGY_SHARE, ENERGY_JOULES = 0.05, 200.0  # whichever is larger
 TOOL = 0.001  # m

@@ -6,6 +6,7 @@ import resource
 
 import numpy as np
 import pytest
+
 from ir_msgs_py.power import Mode
 from ir_sim_driver.controller.driver import Driver
 

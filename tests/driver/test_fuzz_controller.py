@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.power import Mode
 from ir_sim_driver.controller.settings import ControllerSettings

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from ir_description import load_cell
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plant.loads import carried, custom_load
-
-from ir_description import load_cell
 
 NOTHING = np.zeros(0)
 POINT = np.array([0.2, 0.0, 0.0])

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymodbus.client import ModbusTcpClient
+
 from ir_msgs_py.power import Mode
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
@@ -25,7 +27,6 @@ from ir_sim_driver.plc.modbus_map import (
 )
 from ir_sim_driver.plc.plc_link import PlcLink
 from ir_sim_driver.power.power_modes import TransitionSettings
-from pymodbus.client import ModbusTcpClient
 
 PERIOD = 2_000_000
 WATCHDOG = 0.5

@@ -6,6 +6,7 @@ import threading
 from itertools import pairwise
 
 import pytest
+
 from ir_sim_driver.node.real_time import GridThread
 
 PERIOD = 2_000_000

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from ir_msgs_py.errors import TrajectoryError
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.trajectory import JointTrajectory

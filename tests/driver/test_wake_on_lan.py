@@ -6,6 +6,7 @@ import socket
 import threading
 
 import pytest
+
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plc.wake_on_lan import WakeListener, magic_packet, wakes
 

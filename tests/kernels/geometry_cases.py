@@ -5,11 +5,9 @@ package.
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ir_kernels import Chain, CollisionModel
-
-FloatArray = NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -28,8 +27,8 @@ class CounterbalanceLiteral:
 class LoadLiteral:
     name: str
     mass: float
-    com: Array
-    inertia: Array
+    com: FloatArray
+    inertia: FloatArray
 
 
 @dataclass(frozen=True)
@@ -37,30 +36,30 @@ class RobotLiteral:
     name: str
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
-    joint_origin: Array
-    joint_axis: Array
-    position_min: Array
-    position_max: Array
-    velocity_max: Array
-    acceleration_max: Array
-    jerk_max: Array
-    link_mass: Array
-    link_com: Array
-    link_inertia: Array
-    gear_ratio: Array
-    reflected_inertia: Array
-    friction_viscous: Array
-    friction_coulomb: Array
-    copper_loss: Array
-    envelope_speed: Array
-    envelope_torque: Array
+    joint_origin: FloatArray
+    joint_axis: FloatArray
+    position_min: FloatArray
+    position_max: FloatArray
+    velocity_max: FloatArray
+    acceleration_max: FloatArray
+    jerk_max: FloatArray
+    link_mass: FloatArray
+    link_com: FloatArray
+    link_inertia: FloatArray
+    gear_ratio: FloatArray
+    reflected_inertia: FloatArray
+    friction_viscous: FloatArray
+    friction_coulomb: FloatArray
+    copper_loss: FloatArray
+    envelope_speed: FloatArray
+    envelope_torque: FloatArray
     counterbalance: Any = None
     capsules: tuple[Any, ...] = ()
     self_pairs: tuple[tuple[str, str], ...] = ()
     load_self_capsules: tuple[str, ...] = field(default=())
 
 
-def _translations(offsets: list[list[float]]) -> Array:
+def _translations(offsets: list[list[float]]) -> FloatArray:
     poses = np.tile(np.eye(4), (len(offsets), 1, 1))
     poses[:, :3, 3] = offsets
     return poses
@@ -131,7 +130,7 @@ def tool_155() -> LoadLiteral:
     return LoadLiteral("tool", 155.0, np.array([0.24, 0.0, 0.0]), np.diag([5.0, 4.0, 6.0]))
 
 
-def random_rotation(rng: np.random.Generator) -> Array:
+def random_rotation(rng: np.random.Generator) -> FloatArray:
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q = q * np.sign(np.diag(r))
     return q if np.linalg.det(q) > 0 else -q

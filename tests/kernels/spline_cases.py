@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 from geometry_cases import CAPSULES, COLUMNS, KR210, SELF_PAIRS, TCP, Body, Capsule, every_kind
-from ir_kernels.data import FloatArray
 from robots import RobotLiteral, kr210, random_chain, tool_155
 from scipy.interpolate import BSpline
 
 from ir_kernels import Chain, CollisionModel, DynamicsModel, SplineCost, SplineTerms
+from ir_msgs_py.arrays import FloatArray
 
 FEW = ("l3b", "l6", "t_bar", "t_part")  # capsules that a quick scene has
 

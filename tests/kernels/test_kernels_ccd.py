@@ -4,22 +4,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ir_kernels.reference import ccd as reference
-from ir_kernels.reference.chain import axes
-from robots import Array, kr210, random_chain, random_rotation
+from robots import kr210, random_chain, random_rotation
 
 from ir_kernels import CcdSettings, Chain, InputError, ccd
+from ir_kernels.reference import ccd as reference
+from ir_kernels.reference.chain import axes
+from ir_msgs_py.arrays import FloatArray
 
 TOOL = np.eye(4)
 TOOL[:3, 3] = [0.42, 0.0, 0.0]
 
 
-def truncated_normal(rng: np.random.Generator, low: Array, high: Array, count: int) -> Array:
+def truncated_normal(rng: np.random.Generator, low: FloatArray, high: FloatArray, count: int) -> FloatArray:
     """Starts of eq. 1."""
     return np.clip(rng.normal((low + high) / 2.0, (high - low) / 6.0, (count, len(low))), low, high)
 
 
-def problem_of(chain: Chain, pose: Array, low: Array, high: Array) -> reference.Problem:
+def problem_of(chain: Chain, pose: FloatArray, low: FloatArray, high: FloatArray) -> reference.Problem:
     return reference.Problem(
         chain.joint_origin, chain.joint_axis, chain.base_pose, chain.tcp, pose, low, high, rotation_length=0.5
     )
@@ -135,7 +136,7 @@ def test_a_start_that_is_there_spends_no_work(core: Any) -> None:
         ({"position_min": np.full(6, 4.0)}, r"position_min\[0\] is 4.0 rad, above"),
     ],
 )
-def test_a_bad_argument_is_named(change: dict[str, Array], message: str) -> None:
+def test_a_bad_argument_is_named(change: dict[str, FloatArray], message: str) -> None:
     arguments: dict[str, Any] = {"pose": np.eye(4), "starts": np.zeros((1, 6))}
     arguments |= {"position_min": np.full(6, -3.0), "position_max": np.full(6, 3.0)} | change
     with pytest.raises(InputError, match=message):

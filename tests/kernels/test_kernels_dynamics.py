@@ -5,28 +5,29 @@ from typing import Any
 import numpy as np
 import pinocchio
 import pytest
-from ir_kernels.reference import dynamics as reference
-from robots import Array, LoadLiteral, RobotLiteral, kr210, random_chain, random_rotation, tool_155
+from robots import LoadLiteral, RobotLiteral, kr210, random_chain, random_rotation, tool_155
 
 from ir_kernels import Chain, DynamicsModel, InputError
+from ir_kernels.reference import dynamics as reference
+from ir_msgs_py.arrays import FloatArray
 
 HOME = np.radians([[0.0, -90.0, 90.0, 0.0, 0.0, 0.0]])
 AGREEMENT = 1e-9  # relative to the largest torque of the batch: sums of a few hundred roundings
 FITTED = 1e-11  # the compiled core evaluates the counterbalance by a fitted polynomial
 
 
-def batch(seed: int, n: int, N: int = 40) -> tuple[Array, Array, Array]:
+def batch(seed: int, n: int, N: int = 40) -> tuple[FloatArray, FloatArray, FloatArray]:
     rng = np.random.default_rng(seed)
     return rng.uniform(-3, 3, (N, n)), rng.normal(size=(N, n)), 2.0 * rng.normal(size=(N, n))
 
 
-def tilted(seed: int) -> Array:
+def tilted(seed: int) -> FloatArray:
     pose = np.eye(4)
     pose[:3, :3] = random_rotation(np.random.default_rng(seed))
     return pose
 
 
-def relative(a: Array, b: Array) -> float:
+def relative(a: FloatArray, b: FloatArray) -> float:
     return float(np.abs(a - b).max() / np.abs(b).max())
 
 
@@ -56,7 +57,7 @@ def test_counterbalance_gives_the_table_of_the_machine_data(
     assert (np.delete(about, 1) == 0.0).all()
 
 
-def pinocchio_model(robot: RobotLiteral, loads: tuple[LoadLiteral, ...], base: Array) -> pinocchio.Model:
+def pinocchio_model(robot: RobotLiteral, loads: tuple[LoadLiteral, ...], base: FloatArray) -> pinocchio.Model:
     model = pinocchio.Model()
     model.gravity.linear = base[:3, :3].T @ np.array([0.0, 0.0, -9.80665])
     parent = 0
@@ -138,13 +139,13 @@ def test_lagrange_form_equals_newton_euler(core: Any) -> None:
     chain = Chain(robot)
     q, qd, qdd = batch(7, 6, 5)
 
-    def potential(x: Array) -> Array:
+    def potential(x: FloatArray) -> FloatArray:
         links = chain.link_poses(x)[:, 1:]
         mass, com = np.array(model.data.mass), np.array(model.data.com)
         height = np.einsum("nij,ij->ni", links[:, :, 2, :3], com) + links[:, :, 2, 3]
         return np.asarray(9.80665 * height @ mass)
 
-    def kinetic(x: Array) -> Array:
+    def kinetic(x: FloatArray) -> FloatArray:
         return np.asarray(0.5 * np.einsum("ni,nij,nj->n", qd, model.mass_matrix(x), qd))
 
     eps = 1e-5
@@ -174,7 +175,7 @@ def test_free_motion_without_friction_keeps_its_energy(core: Any) -> None:
     chain = Chain(still)
     zero = np.zeros((1, 6))
 
-    def energy(q: Array, qd: Array) -> float:
+    def energy(q: FloatArray, qd: FloatArray) -> float:
         inertia = model.mass_matrix(q)[0] + np.diag(robot.reflected_inertia)
         links = chain.link_poses(q)[0, 1:]
         height = np.einsum("ij,ij->i", links[:, 2, :3], np.array(model.data.com)) + links[:, 2, 3]

@@ -24,10 +24,10 @@ from geometry_cases import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ir_kernels.reference import chain as chain_reference
-from ir_kernels.reference.model import Model
 
 from ir_kernels import Chain, CollisionModel, compiled
+from ir_kernels.reference import chain as chain_reference
+from ir_kernels.reference.model import Model
 
 EXACT = 1e-9  # [m] double precision on lengths of some metres
 IN_FLOATS = 2e-6  # [m] where lanes of floats choose between pairs

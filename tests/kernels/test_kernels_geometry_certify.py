@@ -16,9 +16,9 @@ from geometry_cases import (
     every_kind,
     sample,
 )
-from ir_kernels.reference.model import Model
 
 from ir_kernels import COLLIDES, FREE, UNDECIDED, Chain, CollisionModel, compiled
+from ir_kernels.reference.model import Model
 
 SAFETY = 0.02
 ROUNDING = 1e-6  # [m] what a proof may be wrong by, at most

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from robots import Array, RobotLiteral, kr210, random_rotation
+from robots import RobotLiteral, kr210, random_rotation
 
 from ir_kernels import Chain, InputError, SphericalWristIk
+from ir_msgs_py.arrays import FloatArray
 
 EXACT = 1e-9  # m and entries of rotations
 
@@ -158,7 +159,7 @@ def test_out_of_reach_is_no_solution(core: Any) -> None:
 
 def with_origin(joint: int, xyz: list[float]) -> RobotLiteral:
     robot = kr210()
-    origin: Array = robot.joint_origin.copy()
+    origin: FloatArray = robot.joint_origin.copy()
     origin[joint, :3, 3] = xyz
     return RobotLiteral(**{**vars(robot), "joint_origin": origin})
 
@@ -194,7 +195,7 @@ def test_an_arm_of_another_kind_is_refused_with_the_reason(robot: RobotLiteral, 
         (np.diag([1.0, 1.0, -1.0, 1.0])[None], "poses mirrors"),
     ],
 )
-def test_a_bad_pose_is_named(core: Any, bad: Array, message: str) -> None:
+def test_a_bad_pose_is_named(core: Any, bad: FloatArray, message: str) -> None:
     robot = kr210()
     ik = SphericalWristIk(Chain(robot), robot.position_min, robot.position_max, core=core)
     with pytest.raises(InputError, match=message):

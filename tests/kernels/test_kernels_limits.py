@@ -6,18 +6,21 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from robots import kr210, tool_155
+
+from ir_kernels import DynamicsModel, InputError, motion_extrema, polynomial_extrema
 from ir_kernels.reference.interval import Dual, interval, power, sine_cosine
 from ir_kernels.reference.limits import derivative, evaluate
 from ir_kernels.torque_bounds import EXCEEDS, UNDECIDED, WITHIN
-from robots import Array, kr210, tool_155
-
-from ir_kernels import DynamicsModel, InputError, motion_extrema, polynomial_extrema
+from ir_msgs_py.arrays import FloatArray
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 GOAL = np.radians([60.0, -60.0, 70.0, 40.0, -50.0, 0.0])
 
 
-def rest_to_rest(duration: float, start: Array = HOME, goal: Array = GOAL) -> tuple[Array, Array]:
+def rest_to_rest(
+    duration: float, start: FloatArray = HOME, goal: FloatArray = GOAL
+) -> tuple[FloatArray, FloatArray]:
     """One quintic from rest to rest."""
     c = np.zeros((1, 6, 6))
     c[0, :, 0] = start
@@ -26,7 +29,7 @@ def rest_to_rest(duration: float, start: Array = HOME, goal: Array = GOAL) -> tu
     return c, np.array([duration])
 
 
-def sampled(model: DynamicsModel, c: Array, T: Array, count: int) -> Array:
+def sampled(model: DynamicsModel, c: FloatArray, T: FloatArray, count: int) -> FloatArray:
     """Largest |tau| / limit per joint on a grid that is open at the ends (at rest friction has no sign)."""
     worst = np.zeros(6)
     for segment, duration in zip(c, T, strict=True):

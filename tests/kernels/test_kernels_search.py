@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from coal_scene import CoalScene
 from geometry_cases import CAPSULES, COLUMNS, FLOOR, HOME, KR210, SELF_PAIRS, TCP, Body, FloatArray, box
-from ir_kernels.search import BidirectionalTree
 
 from ir_kernels import FREE, Chain, CollisionModel, InputError, compiled
+from ir_kernels.search import BidirectionalTree
 
 SAFETY = 0.02
 SCALE = np.array([1.0, 0.85, 0.75, 0.68, 0.63, 0.62])

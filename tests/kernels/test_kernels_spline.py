@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_cases import COLUMNS, OPEN, Body, box
-from ir_kernels.data import FloatArray, IntArray
-from ir_kernels.power import REGENERATIONS, Regeneration
 from robots import RobotLiteral, kr210
 from spline_cases import (
     MIDDLE,
@@ -30,6 +28,8 @@ from ir_kernels import (
     compiled,
     drive_energy,
 )
+from ir_kernels.power import REGENERATIONS, Regeneration
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 FREE: dict[str, Any] = {"penalty": 0.0, "clearance_penalty": 0.0, "time_value": 0.0, "travel": np.zeros(6)}
 

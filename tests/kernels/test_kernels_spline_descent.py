@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_cases import CAPSULES, KR210, box
-from ir_kernels.data import FloatArray
 from robots import kr210, random_chain
 from spline_cases import along, at_rest, chain_models, kr210_cost, kr210_models, motion, swing, terms
 
 from ir_kernels import Chain, CollisionModel, DynamicsModel, InputError, SplineCost, SplineDescent, compiled
+from ir_msgs_py.arrays import FloatArray
 
 BLOCK = (box("block", (1.9, 0.35, 1.1), (0.3, 0.3, 2.2)),)  # in the way of `swing`
 

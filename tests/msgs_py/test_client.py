@@ -6,6 +6,10 @@ import threading
 
 import numpy as np
 import pytest
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, Station, Status
 from ir_msgs.srv import GetTrajectory, SetCell
@@ -15,9 +19,6 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.trajectory import JointTrajectory
-from rclpy.action import ActionServer, CancelResponse
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
 TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**9], np.zeros((2, 6)))
 

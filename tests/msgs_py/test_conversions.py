@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
-from ir_msgs_py.names import JOINT_NAMES
-from ir_msgs_py.ros import conversions
-from ir_msgs_py.status import Status, StatusCode
-from ir_msgs_py.trajectory import JointTrajectory
 from rclpy.serialization import deserialize_message, serialize_message
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 
 from ir_msgs_py import options, plc, power, program, report, stations
+from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
+from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.ros import conversions
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
 
 numbers = st.floats(-1e6, 1e6)
 lengths = st.floats(0.0, 1e6)

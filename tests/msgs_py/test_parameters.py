@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.settings import setting
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 
 @dataclass(frozen=True)

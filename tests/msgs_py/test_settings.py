@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 import pytest
+
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.settings import check_settings, describe, setting, settings_table
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 
 import pytest
-from ir_msgs_py.ros.background import BackgroundExecutor
-from ir_msgs_py.ros.waiting import Waiting
 from rclpy.node import Node
 from std_msgs.msg import Float64
+
+from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.ros.waiting import Waiting
 
 
 def test_a_message_goes_from_node_to_node(ros_node, ros_executor, ros_context, wait_for):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from ir_msgs_py.errors import JointNamesError, TrajectoryError
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.trajectory import JointTrajectory

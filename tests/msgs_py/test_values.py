@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from ir_msgs_py import plc, power, program, report, stations
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
-
-from ir_msgs_py import plc, power, program, report, stations
 
 NAN = float("nan")
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+
 from ir_msgs.msg import PlanOptions, PowerState, Status, TrajectoryReport
 from ir_msgs.srv import CheckState, EvaluateTrajectory, PlanTrajectory, SetCell, SetLoad
 from ir_msgs_py.errors import MessageTextError, UnknownTypeError

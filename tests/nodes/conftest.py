@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from ir_planner.node.node import PlannerNode
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
 from rclpy.parameter import Parameter
+
+from ir_planner.node.node import PlannerNode
 
 Call = Callable[..., Any]
 

@@ -7,18 +7,18 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from ir_msgs.action import ExecuteTrajectory
-from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.conversions import trajectory_to_msg
-from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.node import SimDriver
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from ir_description import load_cell
+from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py import names
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.node import SimDriver
 
 NS = 1_000_000_000
 PERIOD = 2_000_000

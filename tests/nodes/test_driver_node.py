@@ -7,15 +7,6 @@ import socket
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from ir_msgs.action import ExecuteTrajectory
-from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
-from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
-from ir_msgs_py.errors import RequestRefusedError
-from ir_msgs_py.ros.client import Client
-from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.node import SimDriver
-from ir_sim_driver.plc.modbus_map import COILS
-from ir_sim_driver.plc.wake_on_lan import magic_packet
 from pymodbus.client import ModbusTcpClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -23,7 +14,16 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from ir_description import load_cell
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
+from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
+from ir_msgs_py.errors import RequestRefusedError
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.node import SimDriver
+from ir_sim_driver.plc.modbus_map import COILS
+from ir_sim_driver.plc.wake_on_lan import magic_packet
 
 MAC = "02:00:00:c4:02:10"
 QUICK = {

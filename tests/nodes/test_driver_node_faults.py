@@ -5,14 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from ir_msgs.action import ExecuteTrajectory
-from ir_msgs.msg import JointTolerance, PlcInputs
-from ir_msgs.srv import QueryModes, SetPlcInput, StartPause
-from ir_msgs_py.errors import RequestRefusedError
-from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.conversions import trajectory_to_msg
-from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.node import SimDriver
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -21,7 +13,15 @@ from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint, MultiDOFJointTrajectoryPoint
 
 from ir_description import load_cell
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import JointTolerance, PlcInputs
+from ir_msgs.srv import QueryModes, SetPlcInput, StartPause
 from ir_msgs_py import names
+from ir_msgs_py.errors import RequestRefusedError
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.node import SimDriver
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

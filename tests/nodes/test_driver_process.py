@@ -8,11 +8,11 @@ import sys
 
 import pytest
 import rclpy
-from ir_msgs.msg import PowerState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from ir_msgs.msg import PowerState
 from ir_msgs_py import names
 
 

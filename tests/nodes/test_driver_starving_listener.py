@@ -7,12 +7,12 @@ import subprocess
 import sys
 
 import pytest
-from ir_sim_driver.node import SimDriver
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from ir_msgs_py import names
+from ir_sim_driver.node import SimDriver
 
 COUNT = 2_500
 STARVED = 1_000  # messages, 2 s

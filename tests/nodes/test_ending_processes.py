@@ -25,11 +25,12 @@ INT, TERM = signal.SIGINT, signal.SIGTERM
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
+    from rclpy.serialization import serialize_message
+    from std_msgs.msg import String
+
     from ir_recorder.format.qos import QosOffer
     from ir_recorder.write.session import RecordingSession
     from ir_recorder.write.writer import RecordingWriter
-    from rclpy.serialization import serialize_message
-    from std_msgs.msg import String
 
     path = tmp_path_factory.mktemp("recording") / "played.mcap"
     session = RecordingSession(RecordingWriter(path), {}, 10**18)

@@ -9,6 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+
 from ir_msgs.srv import OptimizeTrajectory, PlanRegionalMovement
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.names import JOINT_NAMES, OPTIMIZE_TRAJECTORY, PLANNED_TRAJECTORY
@@ -18,11 +24,6 @@ from ir_msgs_py.ros.conversions import trajectory_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.node.node import PlannerNode
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
-from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 AWAY = np.radians([60.0, -90.0, 100.0, 0.0, 20.0, 0.0])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
+
+from ir_description import load_cell
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.node.inputs import LastState, measured_velocity, state_of
 from ir_planner.scene.motion_limits import STILL
-from sensor_msgs.msg import JointState
-
-from ir_description import load_cell
 
 
 def test_a_standing_robot_is_one_start_however_its_measurement_trembles() -> None:

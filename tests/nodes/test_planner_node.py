@@ -10,6 +10,14 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
+from rcl_interfaces.srv import SetParameters
+from rclpy.action import ActionClient
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from visualization_msgs.msg import MarkerArray
+
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import (
@@ -29,13 +37,6 @@ from ir_msgs.srv import (
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros.conversions import trajectory_from_msg
 from ir_planner.node.node import PlannerNode
-from rcl_interfaces.srv import SetParameters
-from rclpy.action import ActionClient
-from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-from visualization_msgs.msg import MarkerArray
 
 HOME = [0.0, -1.5707963267948966, 1.5707963267948966, 0.0, 0.0, 0.0]
 Call = Callable[..., Any]

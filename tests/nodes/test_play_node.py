@@ -5,16 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64, String
+
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.play.node import PlayNode
 from ir_recorder.play.schedule import PlaySettings
 from ir_recorder.read.raw import read_raw
 from ir_recorder.write.session import RecordingSession
 from ir_recorder.write.writer import RecordingWriter
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.serialization import serialize_message
-from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Float64, String
 
 START = 1_700_000_000_000_000_000
 

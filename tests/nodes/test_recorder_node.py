@@ -10,6 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import PathError, WriteError
@@ -17,10 +22,6 @@ from ir_recorder.node import RecorderNode
 from ir_recorder.read.raw import read_raw
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.write.writer import RecordingWriter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, String
 
 LATCHED = QoSProfile(
     depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL

@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.parameter import Parameter
+
 from ir_msgs.msg import Status
+from ir_msgs_py import names
 from ir_msgs_py.ros.types import interface_type
 from ir_msgs_py.ros.yaml_messages import message_from_yaml
 from ir_recorder.node import RecorderNode
 from ir_recorder.settings import RecorderSettings
 from ir_sim_driver.node import SimDriver
-from rclpy.parameter import Parameter
-
-from ir_msgs_py import names
 
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs" / "srv"
 LINE = re.compile(r'# ros2 service call (\S+) (\S+) "(.*)"')

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
+
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import ComputeIk, GetTrajectory, PlanServiceMovement, SetEquipment
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros.conversions import trajectory_from_msg
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import JointState
-from visualization_msgs.msg import MarkerArray
 
 Call = Callable[..., Any]
 SERVICE = "plan_service_movement"

@@ -10,10 +10,15 @@ import pytest
 
 SRC = Path(__file__).resolve().parents[2] / "src"
 
-BASE = {"ir_description", "ir_kernels", "ir_msgs_py"}
+BASE_KNOWS: dict[str, set[str]] = {
+    "ir_msgs_py": set(),
+    "ir_kernels": {"ir_msgs_py"},
+    "ir_description": {"ir_msgs_py"},
+}
+BASE = set(BASE_KNOWS)
 ROOMS = {"ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder"}
 KNOWS = {
-    **{package: set() for package in BASE},
+    **BASE_KNOWS,
     **dict.fromkeys(ROOMS, BASE),
     "ir_cli": BASE | ROOMS,
 }

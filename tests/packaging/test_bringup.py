@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import yaml
+
+from ir_msgs_py import names
 from ir_msgs_py.settings import describe
 from ir_planner.settings import PlannerSettings
 from ir_program_runner.settings import LinkSettings, ProgramSettings
@@ -16,8 +18,6 @@ from ir_recorder.settings import RecorderSettings
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.node.parameters import NodeSettings
-
-from ir_msgs_py import names
 
 ROOT = Path(__file__).resolve().parents[2]
 BRINGUP = ROOT / "ros_ws" / "src" / "ir_bringup"

@@ -13,20 +13,20 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from ir_msgs.msg import ControllerState, PlannedMovement, PlcOutputs, PowerState, ProgramState
-from ir_msgs_py.power import Mode
-from ir_recorder.format.qos import QosOffer
-from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.report import report_html
-from ir_recorder.write.session import CellFiles, RecordingSession
-from ir_recorder.write.writer import RecordingWriter
 from mcap_ros2._dynamic import serialize_dynamic
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from ir_description import cell_from_yaml, load_power_data
 from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
+from ir_msgs.msg import ControllerState, PlannedMovement, PlcOutputs, PowerState, ProgramState
+from ir_msgs_py.power import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
+from ir_recorder.format.qos import QosOffer
+from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.report import report_html
+from ir_recorder.write.session import CellFiles, RecordingSession
+from ir_recorder.write.writer import RecordingWriter
 
 CELL_YAML = """
 format: ir_cell/1

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.read.cdr import Columns
-from ir_recorder.read.raw import read_raw
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
+
+from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.read.cdr import Columns
+from ir_recorder.read.raw import read_raw
 
 
 def test_columns_agree_with_the_decoder_message_by_message(demo_file: Path) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ir_recorder.analysis.clearance import collision_model
 
 from ir_recorder import Analysis
+from ir_recorder.analysis.clearance import collision_model
 
 
 def test_clearance_is_that_of_the_recorded_joint_states(analysis: Analysis) -> None:

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+
 from ir_msgs_py.settings import describe
 from ir_recorder.settings import RecorderSettings
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ir_msgs_py.power import Mode
-from ir_recorder.analysis.meter import Meter
 
+from ir_msgs_py.power import Mode
 from ir_recorder import read_recording
+from ir_recorder.analysis.meter import Meter
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 

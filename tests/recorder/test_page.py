@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ir_recorder.report import report_html, write_report
-from ir_recorder.report.picture import write_picture
 
 from ir_recorder import PathError, RecorderError, analyse, findings, read_recording
+from ir_recorder.report import report_html, write_report
+from ir_recorder.report.picture import write_picture
 
 
 class _Links(HTMLParser):

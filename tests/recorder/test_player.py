@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from ir_recorder.play.player import Player
 from ir_recorder.play.schedule import PlaySettings
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
+
 from ir_recorder.errors import ReadError
 from ir_recorder.read.reader import read_recording
-from mcap.reader import make_reader
 
 
 def test_a_truncated_file_gives_what_is_left(demo_file: Path, tmp_path: Path) -> None:

@@ -7,14 +7,15 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from mcap.writer import Writer
+from rclpy.serialization import serialize_message
+
 from ir_msgs.msg import PlcInputs
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.read.reader import read_recording
 from ir_recorder.write.session import RecordingSession
 from ir_recorder.write.writer import RecordingWriter
-from mcap.writer import Writer
-from rclpy.serialization import serialize_message
 
 
 def test_series_are_what_was_published(demo_file: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from ir_recorder.errors import RecorderError
 from ir_recorder.play.schedule import DueMessage, PlaySettings, schedule
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.definition import definitions_of
 from ir_recorder.format.schemas import SchemaLibrary

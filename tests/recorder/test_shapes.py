@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ir_description.body import Body
-from ir_recorder.report.shapes import body_mesh, capsule_mesh
 
 from ir_description import Capsule
+from ir_description.body import Body
+from ir_recorder.report.shapes import body_mesh, capsule_mesh
 
 BODIES = [
     Body("b", "box", np.eye(4), np.array([0.4, 0.6, 0.8])),

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ir_recorder.errors import PathError, WriteError
-from ir_recorder.read.raw import read_raw
-from ir_recorder.write.writer import RecordingWriter
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
+
+from ir_recorder.errors import PathError, WriteError
+from ir_recorder.read.raw import read_raw
+from ir_recorder.write.writer import RecordingWriter
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.power import Mode, PowerMode
@@ -14,11 +15,10 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes
+from ir_program_runner import requests as ask
 from ir_program_runner.errors import CanceledError
 from ir_program_runner.program import Program
 from ir_program_runner.settings import ProgramSettings
-
-from ir_program_runner import requests as ask
 
 ENTER, STAY, LEAVE = 3.0, 2.0, 20.0
 TO = {

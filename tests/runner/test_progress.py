@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory

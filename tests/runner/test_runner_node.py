@@ -8,6 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
+
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, ProgramState, Status
 from ir_msgs.msg import Signal as SignalMsg
@@ -24,11 +30,6 @@ from ir_msgs_py.transitions import TransitionTimes
 from ir_program_runner.machines import Machines
 from ir_program_runner.node import ProgramRunnerNode
 from ir_program_runner.wake_on_lan import magic_packet
-from rclpy.action import ActionServer, CancelResponse
-from rclpy.node import Node
-from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
-from rosgraph_msgs.msg import Clock
 
 MAC = "02:00:00:00:00:01"
 TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**7], np.zeros((2, 6)))

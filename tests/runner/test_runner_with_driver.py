@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+
 from ir_msgs.action import RunProgram
 from ir_msgs.msg import PowerState
 from ir_msgs_py.names import JOINT_NAMES
@@ -17,8 +20,6 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner.node import ProgramRunnerNode
 from ir_program_runner.wake_on_lan import send_packet
 from ir_sim_driver.node import SimDriver
-from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
 
 TRANSITIONS = {  # s: enter, leave, shortest stay
     "bus_power_off": (0.2, 0.4, 0.1),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from ir_msgs_py.errors import ParameterError
 from ir_program_runner.settings import LinkSettings, ProgramSettings
 

@@ -9,17 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ir_description.errors import InvalidValueError
-
-Array = npt.NDArray[np.float64]
+from ir_msgs_py.arrays import FloatArray
 
 ROTATION_TOLERANCE = 1e-9
 """Largest entry of R R^T - 1 that still counts as a rotation."""
 
 
-def frozen(value: Any, shape: tuple[int | None, ...], name: str) -> Array:
+def frozen(value: Any, shape: tuple[int | None, ...], name: str) -> FloatArray:
     """Return a read-only float64 copy of that shape (None: any length), refusing NaN and infinity."""
     try:
         array = np.array(value, dtype=np.float64)
@@ -36,7 +34,7 @@ def frozen(value: Any, shape: tuple[int | None, ...], name: str) -> Array:
     return array
 
 
-def frozen_pose(value: Any, name: str) -> Array:
+def frozen_pose(value: Any, name: str) -> FloatArray:
     """Return a read-only (4, 4) rigid motion, refusing what is not one."""
     pose = frozen(value, (4, 4), name)
     rotation = pose[:3, :3]
@@ -49,7 +47,7 @@ def frozen_pose(value: Any, name: str) -> Array:
     return pose
 
 
-def frozen_inertia(value: Any, name: str) -> Array:
+def frozen_inertia(value: Any, name: str) -> FloatArray:
     """Return a read-only (3, 3) inertia [kg m^2], refusing what no body can have.
 
     A body's inertia is symmetric and positive definite, and its principal moments satisfy the triangle
@@ -80,13 +78,13 @@ def in_range(value: float, low: float, high: float, unit: str, name: str, *, ope
     return number
 
 
-def solid_box_inertia(mass: float, size: Any) -> Array:
+def solid_box_inertia(mass: float, size: Any) -> FloatArray:
     """Return the inertia (3, 3) [kg m^2] of a solid box about its centre: mass [kg], full size (3,) [m]."""
     x, y, z = frozen(size, (3,), "size") ** 2
     return frozen(np.diag([y + z, x + z, x + y]) * (mass / 12.0), (3, 3), "inertia")
 
 
-def transformed(pose: Array, points: Array) -> Array:
+def transformed(pose: FloatArray, points: FloatArray) -> FloatArray:
     """Return the points (N, 3) or (3,) moved by a pose (4, 4)."""
-    moved: Array = points @ pose[:3, :3].T + pose[:3, 3]
+    moved: FloatArray = points @ pose[:3, :3].T + pose[:3, 3]
     return moved

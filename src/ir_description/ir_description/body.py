@@ -7,9 +7,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ir_description.arrays import Array, frozen, frozen_pose
+from ir_description.arrays import frozen, frozen_pose
 from ir_description.errors import InvalidValueError
 from ir_description.poses import composed, pose_of
+from ir_msgs_py.arrays import FloatArray
 
 BodyKind = Literal["box", "cylinder", "sphere", "capsule", "plane", "mesh"]
 KINDS: tuple[BodyKind, ...] = get_args(BodyKind)
@@ -31,9 +32,9 @@ class Body:
 
     name: str
     kind: BodyKind
-    pose: Array
-    size: Array
-    vertices: Array = field(default_factory=lambda: _NO_VERTICES)
+    pose: FloatArray
+    size: FloatArray
+    vertices: FloatArray = field(default_factory=lambda: _NO_VERTICES)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -60,11 +61,11 @@ class Body:
                 f"{self.name} has {len(self.vertices)} vertices, a mesh must have at least 4 and others none"
             )
 
-    def placed(self, pose: Array) -> Body:
+    def placed(self, pose: FloatArray) -> Body:
         """Return the body re-expressed by the pose (4, 4) of its owner's frame."""
         return replace(self, pose=composed(pose, self.pose))
 
-    def bounds(self) -> tuple[Array, Array]:
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and highest corner (3,) [m] in the owner's frame; infinite for a plane."""
         R, centre = self.pose[:3, :3], self.pose[:3, 3]
         if self.kind == "plane":

@@ -6,25 +6,25 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.body import KINDS, SIZE_MAX, Body
 from ir_description.cell_checks import BODIES_MAX, NameRegister
 from ir_description.errors import InvalidValueError
 from ir_description.items import Item, Table
 from ir_description.mesh import HULL_VERTICES_MAX, convex_vertices, hull_vertices, mesh_path, read_stl
 from ir_description.poses import pose_of, rotation_from_abc, rotation_from_matrix, rotation_from_quaternion
+from ir_msgs_py.arrays import FloatArray
 
 POSE_KEYS = ("xyz", "abc_deg", "quaternion", "rotation")
 FAR = 1000.0
 """Farthest place [m] of anything in a cell."""
 
 
-def read_pose(item: Item) -> Array:
+def read_pose(item: Item) -> FloatArray:
     """Return the pose (4, 4) of a mapping with POSE_KEYS."""
     return pose_in(item.table((), POSE_KEYS))
 
 
-def pose_in(table: Table) -> Array:
+def pose_in(table: Table) -> FloatArray:
     """Return the pose (4, 4) of xyz [m] and one of abc_deg, quaternion (x, y, z, w) or rotation (rows)."""
     xyz = table["xyz"].numbers(3, -FAR, FAR, "m") if "xyz" in table else np.zeros(3)
     if not any(key in table for key in POSE_KEYS[1:]):
@@ -47,7 +47,7 @@ class BodyReader:
     def __init__(self, shapes: NameRegister, folder: Path | None) -> None:
         self._shapes, self._folder = shapes, folder
         self._count = 0
-        self._meshes: dict[tuple[str, bool], Array] = {}
+        self._meshes: dict[tuple[str, bool], FloatArray] = {}
 
     def read(self, item: Item) -> Body:
         """Return one body; its keys depend on its kind."""
@@ -72,7 +72,7 @@ class BodyReader:
         with item.blamed():
             return Body(name, kind, pose_in(table), size, vertices)  # type: ignore[arg-type]
 
-    def _mesh(self, table: Table) -> tuple[Array, Array]:
+    def _mesh(self, table: Table) -> tuple[FloatArray, FloatArray]:
         key = table.one_of("file", "vertices")
         if key == "vertices":
             for other in ("scale", "convex_hull"):
@@ -114,7 +114,7 @@ _SHAPE_KEYS: dict[str, tuple[str, ...]] = {
 _ALL_SHAPE_KEYS = ("size", "radius", "length", "file", "scale", "convex_hull", "vertices")
 
 
-def _size(table: Table, kind: str) -> Array:
+def _size(table: Table, kind: str) -> FloatArray:
     """Return size (3,) [m] as Body wants it."""
     for key in _SHAPE_KEYS[kind]:
         if key not in table:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ir_description.arrays import Array, frozen, in_range, transformed
+from ir_description.arrays import frozen, in_range, transformed
 from ir_description.errors import InvalidValueError
+from ir_msgs_py.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,8 +18,8 @@ class Capsule:
 
     name: str
     link: int
-    p0: Array
-    p1: Array
+    p0: FloatArray
+    p1: FloatArray
     radius: float
 
     def __post_init__(self) -> None:
@@ -28,6 +29,6 @@ class Capsule:
         object.__setattr__(self, "p1", frozen(self.p1, (3,), "p1"))
         object.__setattr__(self, "radius", in_range(self.radius, 0.0, 100.0, "m", "radius", open_low=True))
 
-    def placed(self, pose: Array) -> Capsule:
+    def placed(self, pose: FloatArray) -> Capsule:
         """Return the capsule re-expressed by a pose (4, 4) of its frame in another frame of the same link."""
         return replace(self, p0=transformed(pose, self.p0), p1=transformed(pose, self.p1))

@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from ir_description.arrays import Array, frozen, frozen_pose
+from ir_description.arrays import frozen, frozen_pose
 from ir_description.body import Body, floor_body
 from ir_description.capsule import Capsule
 from ir_description.cell_checks import (
@@ -27,6 +27,7 @@ from ir_description.load import Load
 from ir_description.part import Part
 from ir_description.program import CellSignal, PartPlaces, ProgramStep, Signal
 from ir_description.robot import RobotModel
+from ir_msgs_py.arrays import FloatArray
 
 __all__ = [
     "AllowedContact",
@@ -58,8 +59,8 @@ class Task:
     """A movement to plan: start and goal configuration (n,) [rad]."""
 
     name: str
-    start: Array
-    goal: Array
+    start: FloatArray
+    goal: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +73,15 @@ class Cell:
 
     name: str
     robot: RobotModel
-    base_pose: Array
+    base_pose: FloatArray
     tool: Load | None
-    tcp: Array
+    tcp: FloatArray
     parts: tuple[Part, ...]
     equipment: tuple[Equipment, ...]
     stations: tuple[Station, ...]
     signals: tuple[CellSignal, ...]
-    park: Array
-    machine_home: Array
+    park: FloatArray
+    machine_home: FloatArray
     program: tuple[ProgramStep, ...]
     tasks: tuple[Task, ...] = ()
     floor: bool = True
@@ -120,7 +121,7 @@ class Cell:
         """Return the task of that name."""
         return _named(self.tasks, "task", name)
 
-    def posture(self, name: str) -> Array:
+    def posture(self, name: str) -> FloatArray:
         """Return the joint values (n,) [rad] of "home" or "park"."""
         if name not in ("home", "park"):
             raise UnknownNameError("posture", name, ("home", "park"))
@@ -172,7 +173,7 @@ class Cell:
         return PartPlaces("", {part.name: part.station for part in self.parts})
 
     def with_equipment(
-        self, name: str, pose: Array | None = None, enabled: bool | None = None, state: str | None = None
+        self, name: str, pose: FloatArray | None = None, enabled: bool | None = None, state: str | None = None
     ) -> Cell:
         """Return the cell with a machine moved, switched on or off, or in another state; stations follow."""
         old = self.machine(name)
@@ -189,7 +190,7 @@ class Cell:
         )
 
 
-def check_posture(robot: RobotModel, posture: Array, name: str) -> None:
+def check_posture(robot: RobotModel, posture: FloatArray, name: str) -> None:
     """Refuse joint values (n,) [rad] beyond the robot's limits."""
     for i, value in enumerate(posture):
         low, high = robot.position_min[i], robot.position_max[i]

@@ -13,7 +13,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.body_reader import BodyReader, read_pose
 from ir_description.cell import Cell, Task, check_posture
 from ir_description.cell_checks import (
@@ -35,6 +34,7 @@ from ir_description.part import Part
 from ir_description.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.program_reader import read_signal, read_step
 from ir_description.robot import RobotModel
+from ir_msgs_py.arrays import FloatArray
 
 FORMAT = "ir_cell/1"
 RobotSource = Callable[[str], RobotModel]
@@ -201,7 +201,7 @@ class _CellReader:
                 check_follows(signals)
         return tuple(signals)
 
-    def _posture(self, name: str, default: Array) -> Array:
+    def _posture(self, name: str, default: FloatArray) -> FloatArray:
         given = [key for key in (name, f"{name}_deg") if key in self._table]
         if not given:
             return default
@@ -243,7 +243,7 @@ class _CellReader:
         return tuple(steps)
 
 
-def _pose(item: Item | None) -> Array:
+def _pose(item: Item | None) -> FloatArray:
     return np.eye(4) if item is None else read_pose(item)
 
 

@@ -12,13 +12,13 @@ from typing import Literal
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.cell import Cell
 from ir_description.convex_distance import capsule_distance, point_distance
 from ir_description.equipment import Zone
 from ir_description.library import load_power_data
 from ir_description.power import PowerData
 from ir_description.program import AUTO
+from ir_msgs_py.arrays import FloatArray
 
 PAIRS_MAX = 200_000
 """Zones are compared pairwise up to this many pairs."""
@@ -99,7 +99,7 @@ def _reach(cell: Cell) -> float:
     return float(offsets.sum() + np.linalg.norm(cell.tcp[:3, 3]))
 
 
-def _inside(zone: Zone, point: Array) -> bool:
+def _inside(zone: Zone, point: FloatArray) -> bool:
     local = zone.pose[:3, :3].T @ (point - zone.pose[:3, 3])
     return bool((np.abs(local) <= zone.size / 2.0).all())
 

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.body import Body
 from ir_description.capsule import Capsule
 from ir_description.cell import Cell
@@ -21,6 +20,7 @@ from ir_description.load import Load
 from ir_description.part import Part
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_description.program import CellSignal, ProgramStep, Signal
+from ir_msgs_py.arrays import FloatArray
 
 _DIGITS = 10
 _IDENTITY = np.eye(4)
@@ -166,7 +166,7 @@ def _signals(signals: Sequence[Signal]) -> str:
     return f"[{', '.join(signal.text for signal in signals)}]"
 
 
-def _posture(name: str, posture: Array) -> Iterator[str]:
+def _posture(name: str, posture: FloatArray) -> Iterator[str]:
     degrees = np.round(np.degrees(posture), _DIGITS)
     if np.array_equal(np.radians(degrees), posture):
         yield f"{name}_deg: {_row(degrees)}"
@@ -174,7 +174,7 @@ def _posture(name: str, posture: Array) -> Iterator[str]:
         yield f"{name}: {_row(posture)}"
 
 
-def _pose(pose: Array) -> str:
+def _pose(pose: FloatArray) -> str:
     """Return the keys of a pose without braces."""
     xyz, R = f"xyz: {_row(pose[:3, 3])}", pose[:3, :3]
     if np.array_equal(R, np.eye(3)):

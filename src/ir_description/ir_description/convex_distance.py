@@ -6,12 +6,12 @@ import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 from scipy.spatial import ConvexHull
 
-from ir_description.arrays import Array
 from ir_description.body import Body
 from ir_description.capsule import Capsule
+from ir_msgs_py.arrays import FloatArray
 
 
-def point_distance(body: Body, point: Array) -> float:
+def point_distance(body: Body, point: FloatArray) -> float:
     """Return the distance [m] of a point (3,) in the body's owner frame to its surface, negative inside."""
     p = body.pose[:3, :3].T @ (point - body.pose[:3, 3])
     if body.kind == "plane":
@@ -43,12 +43,12 @@ def capsule_distance(body: Body, capsule: Capsule) -> float:
     return min(float(found.fun), at(0.0), at(1.0)) - capsule.radius
 
 
-def _outside_or_depth(excess: Array) -> float:
+def _outside_or_depth(excess: FloatArray) -> float:
     outside = float(np.linalg.norm(np.maximum(excess, 0.0)))
     return outside if outside > 0.0 else float(excess.max())
 
 
-def _hull_distance(vertices: Array, point: Array) -> float:
+def _hull_distance(vertices: FloatArray, point: FloatArray) -> float:
     """Inside: the nearest facet. Outside: the nearest convex combination of the vertices."""
     facets = ConvexHull(vertices).equations
     depth = float((facets[:, :3] @ point + facets[:, 3]).max())

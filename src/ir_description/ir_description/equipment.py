@@ -8,10 +8,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ir_description.arrays import Array, frozen, frozen_pose, in_range
+from ir_description.arrays import frozen, frozen_pose, in_range
 from ir_description.body import SIZE_MAX, Body
 from ir_description.errors import InvalidValueError, UnknownNameError
 from ir_description.poses import composed, pose_of
+from ir_msgs_py.arrays import FloatArray
 
 ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
 ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)
@@ -29,8 +30,8 @@ class Zone:
     """
 
     kind: ZoneKind
-    pose: Array
-    size: Array
+    pose: FloatArray
+    size: FloatArray
 
     def __post_init__(self) -> None:
         if self.kind not in ZONE_KINDS:
@@ -69,7 +70,7 @@ class Equipment:
     """
 
     name: str
-    pose: Array
+    pose: FloatArray
     bodies: tuple[Body, ...]
     zone_in_equipment: Zone
     states: tuple[EquipmentState, ...] = ()
@@ -134,9 +135,9 @@ class Station:
 
     name: str
     equipment: str
-    pose: Array
+    pose: FloatArray
     zone: ZoneKind
-    pose_in_equipment: Array
+    pose_in_equipment: FloatArray
     allowed_contacts: tuple[AllowedContact, ...] = ()
     approach_distance: float = 0.0
 
@@ -147,7 +148,7 @@ class Station:
         )
         in_range(self.approach_distance, 0.0, APPROACH_MAX, "m", f"approach_distance of {self.name}")
 
-    def retreat_pose(self) -> Array:
+    def retreat_pose(self) -> FloatArray:
         """Return the pose (4, 4) of the tcp in the world after the retreat along -x."""
         back = pose_of((-self.approach_distance, 0.0, 0.0))
         return composed(self.pose, back)
@@ -156,7 +157,7 @@ class Station:
 def station_at(
     equipment: Equipment,
     name: str,
-    pose_in_equipment: Array,
+    pose_in_equipment: FloatArray,
     allowed_contacts: tuple[AllowedContact, ...] = (),
     approach_distance: float = 0.0,
 ) -> Station:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.body import Body
 from ir_description.body_reader import POSE_KEYS, BodyReader, pose_in, read_pose
 from ir_description.equipment import (
@@ -20,6 +19,7 @@ from ir_description.equipment import (
     zone_around,
 )
 from ir_description.items import Item, Table
+from ir_msgs_py.arrays import FloatArray
 
 
 def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tuple[Item, Station]]]:
@@ -40,7 +40,7 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
     return machine, [(station, _station(station, machine)) for station in stations]
 
 
-def _pose(table: Table) -> Array:
+def _pose(table: Table) -> FloatArray:
     return read_pose(table["pose"]) if "pose" in table else np.eye(4)
 
 

@@ -14,9 +14,9 @@ from typing import NoReturn
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.errors import DescriptionFileError, InvalidValueError, UnknownNameError, listed, shown
 from ir_description.yaml_tree import Node, Scalar, parse_yaml
+from ir_msgs_py.arrays import FloatArray
 
 NAME_LENGTH = 64
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.\-]*")
@@ -173,12 +173,16 @@ class Item:
             self.fail(f"is {text}{_unit(unit)}, must be in {left}{low:g}, {high:g}]{_unit(unit)}")
         return value
 
-    def numbers(self, count: int, low: float, high: float, unit: str = "", *, above: bool = False) -> Array:
+    def numbers(
+        self, count: int, low: float, high: float, unit: str = "", *, above: bool = False
+    ) -> FloatArray:
         """Return `count` numbers as an array (count,)."""
         values = [item.number(low, high, unit, above=above) for item in self.list(count, count)]
         return np.array(values, dtype=np.float64)
 
-    def rows(self, columns: int, low: float, high: float, unit: str = "", *, count: tuple[int, int]) -> Array:
+    def rows(
+        self, columns: int, low: float, high: float, unit: str = "", *, count: tuple[int, int]
+    ) -> FloatArray:
         """Return a list of rows of numbers as an array (rows, columns)."""
         rows = [row.numbers(columns, low, high, unit) for row in self.list(*count)]
         return np.array(rows, dtype=np.float64).reshape(-1, columns)

@@ -7,9 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from ir_description.arrays import Array, frozen, frozen_inertia, frozen_pose, in_range, transformed
+from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range, transformed
 from ir_description.capsule import Capsule
 from ir_description.errors import InvalidValueError
+from ir_msgs_py.arrays import FloatArray
 
 MASS_MAX = 2000.0
 """Largest mass [kg] a load may claim; what the robot carries is limited by RobotModel.rated_payload."""
@@ -29,8 +30,8 @@ class Load:
     name: str
     kind: LoadKind
     mass: float
-    com: Array
-    inertia: Array
+    com: FloatArray
+    inertia: FloatArray
     capsules: tuple[Capsule, ...] = ()
     watts_always: float = 0.0
     watts_drive_bus: float = 0.0
@@ -48,7 +49,7 @@ class Load:
         if len(set(names)) != len(names):
             raise InvalidValueError(f"load {self.name} names a capsule twice")
 
-    def placed(self, pose: Array) -> Load:
+    def placed(self, pose: FloatArray) -> Load:
         """Return the load with its geometry re-expressed by the pose (4, 4) of its frame in another frame."""
         pose = frozen_pose(pose, "pose")
         R = pose[:3, :3]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description.arrays import Array, solid_box_inertia
+from ir_description.arrays import solid_box_inertia
 from ir_description.body_reader import FAR, BodyReader, read_pose
 from ir_description.capsule import Capsule
 from ir_description.cell_checks import NameRegister
@@ -12,6 +12,7 @@ from ir_description.items import Item, Table
 from ir_description.load import MASS_MAX, Load
 from ir_description.part import Part
 from ir_description.robot_file import inertia_matrix
+from ir_msgs_py.arrays import FloatArray
 
 _MASS_KEYS = ("inertia", "inertia_box", "capsules")
 
@@ -52,7 +53,7 @@ def read_part(item: Item, link: int, shapes: NameRegister, bodies: BodyReader) -
     )
 
 
-def _inertia(table: Table, mass: float) -> Array:
+def _inertia(table: Table, mass: float) -> FloatArray:
     key = table.one_of("inertia", "inertia_box")
     item = table[key]
     with item.blamed():

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from ir_description.arrays import Array, frozen
+from ir_description.arrays import frozen
 from ir_description.errors import InvalidValueError, shown
+from ir_msgs_py.arrays import FloatArray
 
 BYTES_MAX = 20_000_000
 TRIANGLES_MAX = 200_000
@@ -64,12 +65,12 @@ def mesh_path(folder: Path, name: str) -> Path:
     return resolved
 
 
-def read_stl(path: Path) -> Array:
+def read_stl(path: Path) -> FloatArray:
     """Return the triangles (T, 3, 3) of an STL file in its own unit."""
     return triangles_from_stl(read_regular_file(path, BYTES_MAX))
 
 
-def triangles_from_stl(content: bytes) -> Array:
+def triangles_from_stl(content: bytes) -> FloatArray:
     """Return the triangles (T, 3, 3) of STL content; the length tells binary from ASCII."""
     count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else -1
     if len(content) == 84 + 50 * count:
@@ -81,7 +82,7 @@ def triangles_from_stl(content: bytes) -> Array:
     return frozen(triangles, (None, 3, 3), "mesh")
 
 
-def _ascii_triangles(content: bytes) -> Array:
+def _ascii_triangles(content: bytes) -> FloatArray:
     if not content.lstrip().startswith(b"solid"):
         raise InvalidValueError("the file is neither a binary STL (its length does not fit) nor an ASCII one")
     found = _VERTEX.findall(content)
@@ -93,12 +94,12 @@ def _ascii_triangles(content: bytes) -> Array:
         raise InvalidValueError("the ASCII STL has a vertex that is not three numbers") from error
 
 
-def hull_vertices(points: Array) -> Array:
+def hull_vertices(points: FloatArray) -> FloatArray:
     """Return the corners (V, 3) of the convex hull of points (N, 3)."""
     return _points_of(_hull(points), points)
 
 
-def convex_vertices(triangles: Array, take_hull: bool) -> Array:
+def convex_vertices(triangles: FloatArray, take_hull: bool) -> FloatArray:
     """Return the corners (V, 3) of a convex mesh (T, 3, 3); others are refused unless `take_hull`."""
     points = np.unique(triangles.reshape(-1, 3), axis=0)
     hull = _hull(points)
@@ -116,7 +117,7 @@ def convex_vertices(triangles: Array, take_hull: bool) -> Array:
     return _points_of(hull, points)
 
 
-def _hull(points: Array) -> ConvexHull:
+def _hull(points: FloatArray) -> ConvexHull:
     if not np.isfinite(points).all():
         raise InvalidValueError("the mesh has corners that are not finite")
     try:
@@ -125,14 +126,14 @@ def _hull(points: Array) -> ConvexHull:
         raise InvalidValueError(f"the mesh has {len(points)} corners that span no volume") from error
 
 
-def _points_of(hull: ConvexHull, points: Array) -> Array:
+def _points_of(hull: ConvexHull, points: FloatArray) -> FloatArray:
     corners = points[np.sort(hull.vertices)]
     if len(corners) > HULL_VERTICES_MAX:
         raise InvalidValueError(f"the hull has {len(corners)} corners, must have at most {HULL_VERTICES_MAX}")
     return frozen(corners, (None, 3), "vertices")
 
 
-def _closed(triangles: Array) -> bool:
+def _closed(triangles: FloatArray) -> bool:
     """Whether every edge is walked once in each direction."""
     _, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     corners = index.reshape(-1, 3)

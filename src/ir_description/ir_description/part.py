@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ir_description.arrays import Array, frozen_pose
+from ir_description.arrays import frozen_pose
 from ir_description.body import Body
 from ir_description.errors import InvalidValueError
 from ir_description.load import Load
 from ir_description.poses import composed
+from ir_msgs_py.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +22,7 @@ class Part:
 
     load: Load
     bodies: tuple[Body, ...]
-    grasp: Array
+    grasp: FloatArray
     station: str = ""
 
     def __post_init__(self) -> None:
@@ -36,11 +37,11 @@ class Part:
         """The name of the part."""
         return self.load.name
 
-    def held(self, tcp: Array) -> Load:
+    def held(self, tcp: FloatArray) -> Load:
         """Return the load in the frame of the last link, where the tcp (4, 4) stands."""
         return self.load.placed(composed(tcp, self.grasp))
 
-    def lying(self, station_pose: Array) -> tuple[Body, ...]:
+    def lying(self, station_pose: FloatArray) -> tuple[Body, ...]:
         """Return its bodies in the world, lying where the tcp (4, 4) would hold it."""
         pose = composed(station_pose, self.grasp)
         return tuple(body.placed(pose) for body in self.bodies)

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ir_description.arrays import Array, frozen
+from ir_description.arrays import frozen
 from ir_description.errors import InvalidValueError
+from ir_msgs_py.arrays import FloatArray
 
 QUATERNION_TOLERANCE = 1e-3
 """A quaternion this far from unit length is normalised, beyond it is refused."""
@@ -19,7 +20,7 @@ MATRIX_TOLERANCE = 1e-6
 """A matrix this far from orthonormal is made so, beyond it is refused."""
 
 
-def pose_of(position: Any, rotation: Any = None) -> Array:
+def pose_of(position: Any, rotation: Any = None) -> FloatArray:
     """Return the read-only pose (4, 4) of a position (3,) [m] and a rotation (3, 3)."""
     pose = np.eye(4)
     pose[:3, 3] = position
@@ -28,13 +29,13 @@ def pose_of(position: Any, rotation: Any = None) -> Array:
     return frozen(pose, (4, 4), "pose")
 
 
-def inverse(pose: Array) -> Array:
+def inverse(pose: FloatArray) -> FloatArray:
     """Return the inverse (4, 4) of a pose."""
     R = pose[:3, :3].T
     return pose_of(-R @ pose[:3, 3], R)
 
 
-def composed(first: Array, second: Array) -> Array:
+def composed(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return first @ second as a read-only pose whose last row is exact."""
     pose = first @ second
     pose[3] = (0.0, 0.0, 0.0, 1.0)
@@ -50,7 +51,7 @@ def _cos_sin(angle_deg: float) -> tuple[float, float]:
     return math.cos(math.radians(turn)), math.sin(math.radians(turn))
 
 
-def rotation_from_abc(abc_deg: Any) -> Array:
+def rotation_from_abc(abc_deg: Any) -> FloatArray:
     """Return the rotation (3, 3) of KUKA's A, B, C [deg]."""
     a, b, c = frozen(abc_deg, (3,), "abc_deg")
     (ca, sa), (cb, sb), (cc, sc) = _cos_sin(a), _cos_sin(b), _cos_sin(c)
@@ -63,7 +64,7 @@ def rotation_from_abc(abc_deg: Any) -> Array:
     )
 
 
-def abc_from_rotation(rotation: Array) -> Array:
+def abc_from_rotation(rotation: FloatArray) -> FloatArray:
     """Return A, B, C [deg] of a rotation (3, 3), B in [-90, 90]; where A and C share an axis, C is 0."""
     R = np.asarray(rotation, dtype=np.float64)
     b = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
@@ -74,7 +75,7 @@ def abc_from_rotation(rotation: Array) -> Array:
     return np.degrees([a, b, c])
 
 
-def rotation_from_quaternion(xyzw: Any) -> Array:
+def rotation_from_quaternion(xyzw: Any) -> FloatArray:
     """Return the rotation (3, 3) of a quaternion x, y, z, w; small errors of length are normalised."""
     q = frozen(xyzw, (4,), "quaternion")
     length = float(np.linalg.norm(q))
@@ -92,7 +93,7 @@ def rotation_from_quaternion(xyzw: Any) -> Array:
     )
 
 
-def rotation_from_matrix(rows: Any) -> Array:
+def rotation_from_matrix(rows: Any) -> FloatArray:
     """Return rows (3, 3) as a rotation; errors of a few written digits are removed."""
     R = frozen(rows, (3, 3), "rotation")
     error = float(np.abs(R @ R.T - np.eye(3)).max())
@@ -101,5 +102,5 @@ def rotation_from_matrix(rows: Any) -> Array:
     if error <= 1e-12:
         return R
     left, _, right = np.linalg.svd(R)
-    nearest: Array = left @ right
+    nearest: FloatArray = left @ right
     return nearest

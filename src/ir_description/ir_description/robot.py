@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description.arrays import Array, frozen, frozen_inertia, frozen_pose, in_range
+from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range
 from ir_description.capsule import Capsule
 from ir_description.errors import InvalidValueError
+from ir_msgs_py.arrays import FloatArray
 
 __all__ = ["Capsule", "Counterbalance", "RobotModel"]
 
@@ -27,8 +28,8 @@ class Counterbalance:
     """
 
     joint: int
-    pivot: Array
-    rod_eye: Array
+    pivot: FloatArray
+    rod_eye: FloatArray
     piston_area: float
     gas_volume: float
     charge_pressure: float
@@ -70,28 +71,28 @@ class RobotModel:
     name: str
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
-    joint_origin: Array
-    joint_axis: Array
-    position_min: Array
-    position_max: Array
-    velocity_max: Array
-    acceleration_max: Array
-    jerk_max: Array
-    link_mass: Array
-    link_com: Array
-    link_inertia: Array
-    gear_ratio: Array
-    reflected_inertia: Array
-    friction_viscous: Array
-    friction_coulomb: Array
-    copper_loss: Array
-    envelope_speed: Array
-    envelope_torque: Array
+    joint_origin: FloatArray
+    joint_axis: FloatArray
+    position_min: FloatArray
+    position_max: FloatArray
+    velocity_max: FloatArray
+    acceleration_max: FloatArray
+    jerk_max: FloatArray
+    link_mass: FloatArray
+    link_com: FloatArray
+    link_inertia: FloatArray
+    gear_ratio: FloatArray
+    reflected_inertia: FloatArray
+    friction_viscous: FloatArray
+    friction_coulomb: FloatArray
+    copper_loss: FloatArray
+    envelope_speed: FloatArray
+    envelope_torque: FloatArray
     counterbalance: Counterbalance | None
     capsules: tuple[Capsule, ...]
     self_pairs: tuple[tuple[str, str], ...]
     load_self_capsules: tuple[str, ...]
-    machine_home: Array
+    machine_home: FloatArray
     rated_payload: float
 
     def __post_init__(self) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.capsule import Capsule
 from ir_description.errors import RobotFileError
 from ir_description.items import Item, Table, read_items
 from ir_description.robot import Counterbalance, RobotModel
+from ir_msgs_py.arrays import FloatArray
 
 FORMAT = "ir_description/robot/1"
 BIG = 1e12
@@ -108,23 +108,23 @@ def robot_from_yaml(text: str, source: str = "<text>") -> RobotModel:
         )
 
 
-def inertia_matrix(entries: Sequence[float] | Array) -> Array:
+def inertia_matrix(entries: Sequence[float] | FloatArray) -> FloatArray:
     """Return the matrix (3, 3) of xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = entries
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=np.float64)
 
 
-def _row(table: Table, key: str, n: int, low: float = 0.0) -> Array:
+def _row(table: Table, key: str, n: int, low: float = 0.0) -> FloatArray:
     return figure(table[key]).numbers(n, low, BIG)
 
 
-def _origins(offsets: Array) -> Array:
+def _origins(offsets: FloatArray) -> FloatArray:
     poses = np.tile(np.eye(4), (len(offsets), 1, 1))
     poses[:, :3, 3] = offsets
     return poses
 
 
-def _link(item: Item) -> tuple[str, float, Array, Array]:
+def _link(item: Item) -> tuple[str, float, FloatArray, FloatArray]:
     table = item.table(("name", "mass_kg", "com_m", "inertia_kgm2"))
     return (
         table["name"].name(),
@@ -150,7 +150,7 @@ def _pair(item: Item) -> tuple[str, str]:
     return first.name(), second.name()
 
 
-def _envelope(drives: Table, n: int, gear_ratio: Array) -> tuple[Array, Array]:
+def _envelope(drives: Table, n: int, gear_ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
     peak = np.minimum(
         _row(drives, "gear_peak_torque_nm", n), _row(drives, "motor_peak_torque_nm", n) * gear_ratio
     )

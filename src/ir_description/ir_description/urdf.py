@@ -13,11 +13,11 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ir_description.arrays import Array
 from ir_description.capsule import Capsule
 from ir_description.load import Load
 from ir_description.poses import abc_from_rotation
 from ir_description.robot import RobotModel
+from ir_msgs_py.arrays import FloatArray
 
 FRAME_MASS = 1e-9
 """Mass [kg] of a link that is only a frame: some simulators take a missing mass for 1 kg."""
@@ -26,7 +26,9 @@ _TOOL0 = (0.0, math.pi / 2.0, 0.0)
 _COLOURS = {"link": "1.0 0.45 0.1 1.0", "load": "0.35 0.4 0.45 1.0"}
 
 
-def robot_urdf(robot: RobotModel, load: Load | Sequence[Load] | None = None, tcp: Array | None = None) -> str:
+def robot_urdf(
+    robot: RobotModel, load: Load | Sequence[Load] | None = None, tcp: FloatArray | None = None
+) -> str:
     """Return the URDF text of the robot with its load(s) and the tcp (4, 4) in the last link's frame.
 
     Each load is a link `load_<name>` fixed to the flange. Without a tcp it stands at the flange.
@@ -58,8 +60,8 @@ def _link(
     root: Xml.Element,
     name: str,
     mass: float,
-    com: Array,
-    inertia: Array,
+    com: FloatArray,
+    inertia: FloatArray,
     capsules: Iterable[Capsule],
     material: str,
 ) -> None:
@@ -90,7 +92,7 @@ def _capsule(link: Xml.Element, kind: str, capsule: Capsule, material: str) -> N
 
 
 def _shape(
-    link: Xml.Element, kind: str, name: str, xyz: Array, rpy: Sequence[float], material: str
+    link: Xml.Element, kind: str, name: str, xyz: FloatArray, rpy: Sequence[float], material: str
 ) -> Xml.Element:
     shape = Xml.SubElement(link, kind, name=name)
     _origin(shape, xyz, rpy)
@@ -119,14 +121,14 @@ def _joint(root: Xml.Element, robot: RobotModel, i: int) -> None:
 
 
 def _frame(
-    root: Xml.Element, name: str, parent: str, xyz: Sequence[float] | Array, rpy: Sequence[float]
+    root: Xml.Element, name: str, parent: str, xyz: Sequence[float] | FloatArray, rpy: Sequence[float]
 ) -> None:
     _link(root, name, FRAME_MASS, np.zeros(3), _FRAME_INERTIA, (), "link")
     _fixed(root, name, parent, xyz, rpy)
 
 
 def _fixed(
-    root: Xml.Element, child: str, parent: str, xyz: Sequence[float] | Array, rpy: Sequence[float]
+    root: Xml.Element, child: str, parent: str, xyz: Sequence[float] | FloatArray, rpy: Sequence[float]
 ) -> None:
     joint = Xml.SubElement(root, "joint", name=f"{child}_joint", type="fixed")
     _origin(joint, xyz, rpy)
@@ -134,7 +136,7 @@ def _fixed(
     Xml.SubElement(joint, "child", link=child)
 
 
-def _origin(element: Xml.Element, xyz: Sequence[float] | Array, rpy: Sequence[float]) -> None:
+def _origin(element: Xml.Element, xyz: Sequence[float] | FloatArray, rpy: Sequence[float]) -> None:
     Xml.SubElement(element, "origin", xyz=_row(xyz), rpy=_row(rpy))
 
 
@@ -142,7 +144,7 @@ def _row(values: Iterable[float]) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def _rpy(R: Array) -> tuple[float, float, float]:
+def _rpy(R: FloatArray) -> tuple[float, float, float]:
     """Return roll, pitch, yaw [rad]: KUKA's C, B, A."""
     yaw, pitch, roll = np.radians(abc_from_rotation(R))
     return float(roll), float(pitch), float(yaw)

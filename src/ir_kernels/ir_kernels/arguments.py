@@ -5,16 +5,15 @@ names them.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ir_kernels import compiled
 from ir_kernels.errors import InputError
+from ir_msgs_py.arrays import FloatArray
 
-Array = NDArray[np.float64]
 FLOAT64 = np.dtype(np.float64)
 
 
-def shaped(name: str, value: Any, *shape: int | None) -> Array:
+def shaped(name: str, value: Any, *shape: int | None) -> FloatArray:
     """`value` as a C-contiguous float64 array of that shape (None: any length but 0); values are not
     looked at.
 
@@ -35,7 +34,7 @@ def shaped(name: str, value: Any, *shape: int | None) -> Array:
         raise InputError(f"{name} is not an array of numbers: {error}") from error
     if raw.dtype.kind not in "fiu":
         raise InputError(f"{name} has dtype {raw.dtype}, expected float64")
-    array: Array = np.asarray(raw, dtype=np.float64)
+    array: FloatArray = np.asarray(raw, dtype=np.float64)
     wanted = tuple("N" if length is None else length for length in shape)
     if array.ndim != len(shape) or any(
         w is not None and w != g for w, g in zip(shape, array.shape, strict=True)
@@ -46,11 +45,11 @@ def shaped(name: str, value: Any, *shape: int | None) -> Array:
     return array
 
 
-def _all_finite(array: Array) -> bool:
+def _all_finite(array: FloatArray) -> bool:
     return bool(np.isfinite(array).all() if compiled.MODULE is None else compiled.MODULE.all_finite(array))
 
 
-def finite(name: str, array: Array) -> Array:
+def finite(name: str, array: FloatArray) -> FloatArray:
     """`array`, or InputError that says where it is not finite."""
     if not _all_finite(array):
         where = np.argwhere(~np.isfinite(array))[0].tolist()
@@ -58,12 +57,12 @@ def finite(name: str, array: Array) -> Array:
     return array
 
 
-def checked(name: str, value: Any, *shape: int | None) -> Array:
+def checked(name: str, value: Any, *shape: int | None) -> FloatArray:
     """`shaped` and `finite`."""
     return finite(name, shaped(name, value, *shape))
 
 
-def same_length(**arrays: Array) -> None:
+def same_length(**arrays: FloatArray) -> None:
     """Raise InputError when batches that belong together have different lengths."""
     lengths = {name: len(array) for name, array in arrays.items()}
     if len(set(lengths.values())) > 1:

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data
-from ir_kernels.arguments import Array, checked
+from ir_kernels.arguments import checked
 from ir_kernels.chain import Chain
-from ir_kernels.data import IntArray
 from ir_kernels.errors import InputError
 from ir_kernels.reference import ccd as reference
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ class CcdResult:
     sweeps (P,) and newton_steps (P,): the work spent.
     """
 
-    q: Array
-    psi: Array
-    position_error: Array
-    rotation_error: Array
+    q: FloatArray
+    psi: FloatArray
+    position_error: FloatArray
+    rotation_error: FloatArray
     sweeps: IntArray
     newton_steps: IntArray
 
-    def reached(self, position_error: float = 1e-4, rotation_error: float = 3e-4) -> data.BoolArray:
+    def reached(self, position_error: float = 1e-4, rotation_error: float = 3e-4) -> BoolArray:
         """(P,): which starts ended within these errors, m and rad."""
         close = (self.position_error <= position_error) & (self.rotation_error <= rotation_error)
         return np.asarray(close)

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data
-from ir_kernels.data import ChainLike, FloatArray
+from ir_kernels.data import ChainLike
 from ir_kernels.errors import InputError
+from ir_msgs_py.arrays import FloatArray
 
 AXIS_TOLERANCE = 1e-6
 

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ir_kernels import compiled, data
 from ir_kernels.chain import Chain
-from ir_kernels.data import BodyLike, BoolArray, CapsuleLike, FloatArray, IntArray
+from ir_kernels.data import BodyLike, CapsuleLike
 from ir_kernels.errors import InputError
 from ir_kernels.geometry import Geometry, Pair, geometry
 from ir_kernels.verdicts import COLLIDES, FREE, UNDECIDED
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "COLLIDES",

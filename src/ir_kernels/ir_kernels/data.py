@@ -13,10 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ir_kernels import arguments
 from ir_kernels.errors import InputError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 
 class ChainLike(Protocol):

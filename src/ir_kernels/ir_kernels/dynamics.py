@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
-from ir_kernels.arguments import Array, checked, finite, same_length, shaped
+from ir_kernels.arguments import checked, finite, same_length, shaped
 from ir_kernels.dynamics_data import STANDARD_GRAVITY, dynamics_data
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
 from ir_kernels.reference import dynamics as reference
 from ir_kernels.reference import torque_bounds as bounds_reference
 from ir_kernels.torque_bounds import TorqueBounds, torque_bounds
+from ir_msgs_py.arrays import FloatArray
 
 MAX_TERMS = 8  # of a polynomial segment
 
@@ -28,9 +29,9 @@ class Gradients:
     x_j.
     """
 
-    q: Array
-    qd: Array
-    qdd: Array
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
 
 
 class DynamicsModel:
@@ -68,11 +69,11 @@ class DynamicsModel:
             finite(name, array)
         return result if self._core is not None else getattr(reference, function)(self.data, *arrays)
 
-    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
         """Motor torque (N,n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
         return np.asarray(self._run("inverse_dynamics", q=q, qd=qd, qdd=qdd))
 
-    def inverse_dynamics_single(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def inverse_dynamics_single(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
         """`inverse_dynamics` computed in single precision, in half the time; 1e-5 of the largest torque
         exact.
 
@@ -80,39 +81,39 @@ class DynamicsModel:
         """
         return np.asarray(self._run("inverse_dynamics_single", q=q, qd=qd, qdd=qdd))
 
-    def bias(self, q: ArrayLike, qd: ArrayLike) -> Array:
+    def bias(self, q: ArrayLike, qd: ArrayLike) -> FloatArray:
         """C qd + g (N,n) Nm of the arm and its loads, without friction and counterbalance."""
         return np.asarray(self._run("bias", q=q, qd=qd))
 
-    def gravity(self, q: ArrayLike) -> Array:
+    def gravity(self, q: ArrayLike) -> FloatArray:
         """Torque (N,n) Nm that holds arm and loads against gravity, without the counterbalance."""
         return np.asarray(self._run("gravity", q=q))
 
-    def counterbalance(self, q: ArrayLike) -> Array:
+    def counterbalance(self, q: ArrayLike) -> FloatArray:
         """What the counterbalance does about each joint's +axis (N,n) Nm; zero for joints without one."""
         return np.asarray(self._run("counterbalance", q=q))
 
-    def mass_matrix(self, q: ArrayLike) -> Array:
+    def mass_matrix(self, q: ArrayLike) -> FloatArray:
         """H (N,n,n) kg m^2 of arm and loads, without rotor inertia."""
         return np.asarray(self._run("mass_matrix", q=q))
 
-    def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+    def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
         """Accelerations (N,n) rad/s^2 under motor torques `tau`, with H + J_r, friction and
         counterbalance.
         """
         return np.asarray(self._run("forward_dynamics", q=q, qd=qd, tau=tau))
 
-    def torque_limit(self, qd: ArrayLike) -> Array:
+    def torque_limit(self, qd: ArrayLike) -> FloatArray:
         """Torque (N,n) Nm available at the speeds |qd|: the envelope of gear and motor."""
         return np.asarray(self._run("torque_limit", qd=qd))
 
-    def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> Array:
+    def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
         """Power (N,n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2; negative while
         braking.
         """
         return np.asarray(self._run("axis_power", qd=qd, tau=tau))
 
-    def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
         """Power (N,n) W each axis takes from the DC bus along a motion: `axis_power` of
         `inverse_dynamics`.
         """

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ir_kernels.errors import InputError
+from ir_msgs_py.arrays import FloatArray
 
-Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665  # m/s^2
 
 
@@ -45,19 +44,19 @@ class DynamicsData:
     available, a step down at the first speed.
     """
 
-    origin: Array
-    axis: Array
-    mass: Array
-    com: Array
-    inertia: Array
-    gravity: Array
-    rotor_inertia: Array
-    viscous: Array
-    coulomb: Array
-    gear_ratio: Array
-    copper_loss: Array
-    envelope_speed: Array
-    envelope_torque: Array
+    origin: FloatArray
+    axis: FloatArray
+    mass: FloatArray
+    com: FloatArray
+    inertia: FloatArray
+    gravity: FloatArray
+    rotor_inertia: FloatArray
+    viscous: FloatArray
+    coulomb: FloatArray
+    gear_ratio: FloatArray
+    copper_loss: FloatArray
+    envelope_speed: FloatArray
+    envelope_torque: FloatArray
     counterbalance: CounterbalanceData | None
 
     @property
@@ -66,7 +65,7 @@ class DynamicsData:
         return len(self.mass)
 
 
-def _frozen(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+def _frozen(name: str, value: Any, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(value, dtype=np.float64)
     if array.shape != shape:
         raise InputError(f"{name} has shape {array.shape}, expected {shape}")
@@ -76,7 +75,9 @@ def _frozen(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     return array
 
 
-def lump(mass: float, com: Array, inertia: Array, loads: Sequence[Any]) -> tuple[float, Array, Array]:
+def lump(
+    mass: float, com: FloatArray, inertia: FloatArray, loads: Sequence[Any]
+) -> tuple[float, FloatArray, FloatArray]:
     """Mass, centre of mass and inertia about it of a link with loads bolted on (parallel axis theorem)."""
     masses = [float(mass), *(float(load.mass) for load in loads)]
     centres = [np.asarray(com, float), *(np.asarray(load.com, float) for load in loads)]

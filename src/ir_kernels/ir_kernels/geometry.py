@@ -10,9 +10,10 @@ import numpy as np
 
 from ir_kernels import data
 from ir_kernels.chain import Chain
-from ir_kernels.data import BodyLike, CapsuleLike, FloatArray, IntArray
+from ir_kernels.data import BodyLike, CapsuleLike
 from ir_kernels.errors import InputError
 from ir_kernels.scene import Scene, scene
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 ENVIRONMENT, SELF = "ENVIRONMENT", "SELF"
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data
-from ir_kernels.arguments import Array, shaped
+from ir_kernels.arguments import shaped
 from ir_kernels.chain import Chain
-from ir_kernels.data import IntArray
 from ir_kernels.errors import InputError
 from ir_kernels.reference import inverse_kinematics as reference
 from ir_kernels.wrist_geometry import wrist_geometry
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,14 @@ class IkSet:
     Branch bits: 4 the arm reaches backwards over its base, 2 the other elbow, 1 the other wrist.
     """
 
-    q: Array
+    q: FloatArray
     pose_index: IntArray
     branch: IntArray
 
-    def of_pose(self, index: int) -> Array:
+    def of_pose(self, index: int) -> FloatArray:
         """(m,6): the solutions of one pose."""
         begin, end = np.searchsorted(self.pose_index, [index, index + 1])
-        solutions: Array = self.q[begin:end]
+        solutions: FloatArray = self.q[begin:end]
         return solutions
 
 

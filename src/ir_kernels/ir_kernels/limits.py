@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data
-from ir_kernels.arguments import Array, checked
+from ir_kernels.arguments import checked
 from ir_kernels.errors import InputError
 from ir_kernels.reference import limits as reference
+from ir_msgs_py.arrays import FloatArray
 
 COMPILED_TERMS = 16  # of a polynomial, beyond them the reference works
 
@@ -22,10 +23,10 @@ class Extrema:
     segment.
     """
 
-    minimum: Array
-    maximum: Array
-    time_of_minimum: Array
-    time_of_maximum: Array
+    minimum: FloatArray
+    maximum: FloatArray
+    time_of_minimum: FloatArray
+    time_of_maximum: FloatArray
 
 
 @dataclass(frozen=True)
@@ -35,19 +36,19 @@ class MotionExtrema:
     rad, rad/s, rad/s^2, rad/s^3; times in s from the start of the trajectory.
     """
 
-    position_min: Array
-    position_max: Array
-    velocity: Array
-    acceleration: Array
-    jerk: Array
-    time_of_position_min: Array
-    time_of_position_max: Array
-    time_of_velocity: Array
-    time_of_acceleration: Array
-    time_of_jerk: Array
+    position_min: FloatArray
+    position_max: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    time_of_position_min: FloatArray
+    time_of_position_max: FloatArray
+    time_of_velocity: FloatArray
+    time_of_acceleration: FloatArray
+    time_of_jerk: FloatArray
 
 
-def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[Array, Array]:
+def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Coefficients (S,n,d+1) and durations (S,) checked, or InputError."""
     c = checked("coefficients", coefficients, None, None, None)
     T = checked("durations", durations, len(c))

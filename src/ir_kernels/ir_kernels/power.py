@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
-from ir_kernels.arguments import Array, checked, finite
+from ir_kernels.arguments import checked, finite
 from ir_kernels.errors import InputError
 from ir_kernels.reference import power as reference
+from ir_msgs_py.arrays import FloatArray
 
 Regeneration = Literal["shared", "none", "fed_back"]
 REGENERATIONS: tuple[Regeneration, ...] = ("shared", "none", "fed_back")
@@ -47,9 +48,9 @@ class DcBus:
     step.
     """
 
-    mains: Array
-    burnt: Array
-    stored: Array
+    mains: FloatArray
+    burnt: FloatArray
+    stored: FloatArray
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,13 @@ class DriveEnergy:
     """
 
     mains: float
-    axes: Array
+    axes: FloatArray
     burnt: float
     capacitor_change: float
     peak: float
 
 
-def _steps(dt: ArrayLike, N: int) -> Array:
+def _steps(dt: ArrayLike, N: int) -> FloatArray:
     steps = checked("dt", np.broadcast_to(np.asarray(dt, float), (N,)).copy() if np.ndim(dt) == 0 else dt, N)
     if (steps <= 0.0).any():
         raise InputError(f"dt holds {steps.min()} s: steps have to be longer than 0")

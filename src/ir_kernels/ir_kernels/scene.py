@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ir_kernels import data
-from ir_kernels.data import BodyLike, FloatArray, IntArray
+from ir_kernels.data import BodyLike
 from ir_kernels.errors import InputError
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 KINDS = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
 SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "plane": 0, "mesh": 0}
@@ -46,7 +46,7 @@ class Scene:
     """
 
     names: tuple[str, ...]
-    kind: NDArray[np.int64]
+    kind: IntArray
     pose: FloatArray
     size: FloatArray
     hulls: tuple[Hull, ...] = field(default=())

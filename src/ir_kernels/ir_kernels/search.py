@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
-from ir_kernels.arguments import Array, checked
+from ir_kernels.arguments import checked
 from ir_kernels.collision import CollisionModel
 from ir_kernels.errors import InputError
+from ir_msgs_py.arrays import FloatArray
 
 
 class BidirectionalTree:
@@ -95,7 +96,7 @@ class BidirectionalTree:
         return bool(self._search.found())
 
     @property
-    def path(self) -> Array:
+    def path(self) -> FloatArray:
         """(M, n) from the start to a goal, both exact; every step, in this direction, has a FREE certificate.
         (0, n) while none has been found.
         """
@@ -123,7 +124,7 @@ class BidirectionalTree:
         return float(self._search.gap()[0])
 
     @property
-    def gap_ends(self) -> Array:
+    def gap_ends(self) -> FloatArray:
         """(2, n): those nodes; how near a search came that found nothing."""
         return np.array(self._search.gap()[1], dtype=np.float64).reshape(2, self._n)
 
@@ -137,13 +138,13 @@ def _core() -> Any:
     return compiled.MODULE.BidirectionalSearch
 
 
-def _line(name: str, value: ArrayLike, n: int) -> Array:
+def _line(name: str, value: ArrayLike, n: int) -> FloatArray:
     """A line (M, n), which may have no configuration at all."""
     rows = np.asarray(value)
     return np.empty((0, n)) if rows.shape == (0, n) else checked(name, value, None, n)
 
 
-def _within(name: str, rows: Array, low: Array, high: Array) -> None:
+def _within(name: str, rows: FloatArray, low: FloatArray, high: FloatArray) -> None:
     """Raise InputError for configurations (M, n) outside the limits."""
     outside = np.argwhere((rows < low) | (rows > high))
     if len(outside):

@@ -24,8 +24,8 @@ from ir_kernels.collision import CollisionModel, core_of
 from ir_kernels.dynamics import DynamicsModel
 from ir_kernels.errors import InputError
 from ir_kernels.power import REGENERATIONS, Regeneration
+from ir_msgs_py.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 RowArray = NDArray[np.int32]
 SAME_CHAIN = 1e-5  # m, or of a unit vector: what the chains of two models of one robot may differ by
 MOST_EVALUATIONS = 2**31 - 1

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_kernels.arguments import Array
+from ir_msgs_py.arrays import FloatArray
 
 WITHIN, EXCEEDS, UNDECIDED = np.uint8(0), np.uint8(1), np.uint8(2)
 
@@ -21,9 +21,9 @@ class TorqueBounds:
     a joint that rests through a segment has none.
     """
 
-    upper: Array
-    sampled: Array
-    time: Array
+    upper: FloatArray
+    sampled: FloatArray
+    time: FloatArray
     verdict: NDArray[np.uint8]
     intervals: int
 
@@ -33,7 +33,7 @@ class TorqueBounds:
         return bool((self.verdict == WITHIN).all())
 
 
-def torque_bounds(upper: Array, sampled: Array, time: Array, intervals: int) -> TorqueBounds:
+def torque_bounds(upper: FloatArray, sampled: FloatArray, time: FloatArray, intervals: int) -> TorqueBounds:
     """The verdicts that follow from the bounds."""
     verdict = np.where(upper <= 1.0, WITHIN, np.where(sampled > 1.0, EXCEEDS, UNDECIDED)).astype(np.uint8)
     for array in (upper, sampled, time, verdict):

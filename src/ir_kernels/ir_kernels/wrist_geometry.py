@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_kernels.arguments import Array
 from ir_kernels.chain import Chain
 from ir_kernels.errors import InputError
+from ir_msgs_py.arrays import FloatArray
 
 POINT_TOLERANCE = 1e-9  # m: by how much axes 4, 5, 6 may miss each other
 ANGLE_TOLERANCE = 1e-9  # of the scalar products that have to vanish
@@ -23,9 +23,9 @@ ANGLE_TOLERANCE = 1e-9  # of the scalar products that have to vanish
 class WristGeometry:
     """See the module. All in the frame of link 0 at q = 0; arrays are read-only."""
 
-    axis: Array  # (6,3) z_i
-    plane: Array  # (3,3) rows x, y = z2, z = z1
-    axis_point: Array  # (3,) foot of axis 1: a point on it
+    axis: FloatArray  # (6,3) z_i
+    plane: FloatArray  # (3,3) rows x, y = z2, z = z1
+    axis_point: FloatArray  # (3,) foot of axis 1: a point on it
     lateral: float  # m, distance of the wrist centre from axis 1 along z2
     forward: float  # +1 or -1: the side of axis 1, along x, to which the arm reaches forwards at q1 = 0
     shoulder: complex  # axis 2 seen from axis_point
@@ -33,11 +33,11 @@ class WristGeometry:
     forearm: complex  # from axis 3 to the wrist centre
     elbow_sign: float  # +1 where z3 = z2, -1 where z3 = -z2
     wrist_zero: float  # rad, angle from z4 to z6 about z5
-    hand: Array  # (4,4) pose of link 6 at q = 0
-    wrist_in_hand: Array  # (3,) wrist centre in the frame of link 6
+    hand: FloatArray  # (4,4) pose of link 6 at q = 0
+    wrist_in_hand: FloatArray  # (3,) wrist centre in the frame of link 6
 
 
-def _meeting_point(o: Array, z: Array) -> Array:
+def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
     """Point nearest to the three lines, or InputError when it isn't on each of them."""
     normal = np.eye(3) - z[:, :, None] * z[:, None, :]
     point = np.linalg.lstsq(normal.reshape(-1, 3), np.einsum("kij,kj->ki", normal, o).ravel(), rcond=None)[0]
@@ -72,7 +72,7 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
     plane = np.stack([np.cross(z[1], z[0]), z[1], z[0]])
     foot = o[0] + z[0] * (z[0] @ (o[1] - o[0]))
 
-    def planar(vector: Array) -> complex:
+    def planar(vector: FloatArray) -> complex:
         return complex(plane[2] @ vector, plane[0] @ vector)
 
     for array in (z, plane, foot):

@@ -7,12 +7,9 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 def finite(value: float, name: str, unit: str = "") -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_msgs_py.checks import FloatArray
+from ir_msgs_py.arrays import FloatArray
 
 
 def hermite_coefficients(

@@ -7,7 +7,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from ir_msgs_py.checks import FloatArray, at_least, finite, read_only, set_field
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.checks import at_least, finite, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
 
 

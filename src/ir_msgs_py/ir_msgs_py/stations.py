@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from ir_msgs_py.checks import FloatArray, finite, not_nan, one_of, read_only, set_field
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.checks import finite, not_nan, one_of, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import DistancePair, TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory

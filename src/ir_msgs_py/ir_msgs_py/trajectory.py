@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ir_msgs_py.checks import FloatArray, IntArray, set_field
+from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.checks import set_field
 from ir_msgs_py.errors import JointNamesError, TrajectoryError
 from ir_msgs_py.hermite import evaluate, hermite_coefficients
 

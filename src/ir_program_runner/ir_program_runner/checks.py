@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
-
 from ir_program_runner.errors import ProgramError
 
 JOINT_TOLERANCE = 0.01  # rad, as the driver's for the first point of a trajectory

@@ -10,7 +10,6 @@ from ir_msgs_py.plc import Signal
 from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_program_runner import requests as ask
 from ir_program_runner.errors import CanceledError
 from ir_program_runner.machines import Machines

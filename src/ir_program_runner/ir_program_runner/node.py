@@ -7,9 +7,18 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+
+from ir_description import DescriptionError, load_cell
 from ir_msgs.action import RunProgram
 from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
+from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError, ParameterError
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.program import Event, ProgramState
@@ -26,15 +35,6 @@ from ir_msgs_py.ros.planner import Planner
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
-from rclpy.action import ActionServer, CancelResponse
-from rclpy.action.server import ServerGoalHandle
-from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
-from rclpy.duration import Duration
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
-
-from ir_description import DescriptionError, load_cell
-from ir_msgs_py import names
 from ir_program_runner.checks import check_program
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports

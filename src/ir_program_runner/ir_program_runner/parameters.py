@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ir_msgs_py.ros.parameters import Parameters
-from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from rclpy.node import Node
 
+from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_program_runner.settings import LinkSettings, ProgramSettings
 
 

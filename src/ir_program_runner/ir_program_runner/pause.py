@@ -12,7 +12,6 @@ from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-
 from ir_program_runner.errors import CanceledError, StepFailedError
 from ir_program_runner.requests import (
     AskModes,

@@ -15,7 +15,6 @@ from ir_msgs_py.program import Event
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-
 from ir_program_runner.checks import load_after, step_name
 from ir_program_runner.errors import CanceledError, StepFailedError
 from ir_program_runner.pause import Pause

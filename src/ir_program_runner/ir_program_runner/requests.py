@@ -12,7 +12,6 @@ from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.program import Event
 from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_program_runner.errors import StepFailedError
 
 

@@ -13,15 +13,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from ir_msgs.srv import GetCell, StartRecording, StopRecording
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.running import run_node
-from ir_msgs_py.status import StatusCode
 from rclpy.node import Node
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
+from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py import names
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.listen.node import Listener

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ir_msgs_py.ros.parameters import Parameters
 from rclpy.node import Node
 
+from ir_msgs_py.ros.parameters import Parameters
 from ir_recorder.settings import RecorderSettings
 
 

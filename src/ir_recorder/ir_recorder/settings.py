@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_recorder.errors import RecorderError
 
 

@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from ir_recorder.report import write_report
-from ir_recorder.report.picture import write_picture
-
 from ir_cli.terminal import table
 from ir_recorder import Analysis, Finding, Tolerances, analyse, findings, read_recording
+from ir_recorder.report import write_report
+from ir_recorder.report.picture import write_picture
 
 TABLE_2_ROWS = 4
 """Power modes of the paper's Table II; once without, once with the tool."""

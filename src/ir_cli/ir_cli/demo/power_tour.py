@@ -10,12 +10,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 
+from ir_cli.errors import DemonstrationError
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import SetLoad, SetPlcInput
-from ir_msgs_py.ros.client import Client
-
-from ir_cli.errors import DemonstrationError
 from ir_msgs_py import names
+from ir_msgs_py.ros.client import Client
 
 MODE_SECONDS = 30.0
 """Longest wait for a mode [s]; transitions of the demonstration take a few seconds."""

@@ -11,18 +11,17 @@ import socket
 from dataclasses import replace
 from pathlib import Path
 
+from ir_cli.nodes import cell_nodes
+from ir_cli.processes import NodeProcesses
+from ir_cli.terminal import Progress
+from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
+from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.answers import ProgramPlan
 from ir_msgs_py.ros.client import Client
 from ir_program_runner.settings import LinkSettings
 from ir_program_runner.wake_on_lan import magic_packet, send_packet
-
-from ir_cli.nodes import cell_nodes
-from ir_cli.processes import NodeProcesses
-from ir_cli.terminal import Progress
-from ir_description import Cell, cell_to_yaml, load_cell
-from ir_msgs_py import names
 
 from .outcome import Outcome, examine
 from .power_tour import PowerWatch, tour

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_kernels.arguments import Array
-from ir_kernels.data import IntArray
 from ir_kernels.reference.chain import axes, axis_rotation, jacobian, link_poses
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 DAMPING_START, DAMPING_DOWN, DAMPING_UP = 1e-4, 0.1, 10.0
 DAMPING_LEAST, DAMPING_MOST = 1e-12, 1e6
@@ -20,23 +19,23 @@ DAMPING_LEAST, DAMPING_MOST = 1e-12, 1e6
 class Problem:
     """Chain (origins, axes, base, tcp), pose (4,4) in the world, limits (n,), lambda [m/rad] of eq. 2."""
 
-    joint_origin: Array
-    joint_axis: Array
-    base_pose: Array
-    tcp: Array
-    pose: Array
-    position_min: Array
-    position_max: Array
+    joint_origin: FloatArray
+    joint_axis: FloatArray
+    base_pose: FloatArray
+    tcp: FloatArray
+    pose: FloatArray
+    position_min: FloatArray
+    position_max: FloatArray
     rotation_length: float
 
 
-def tcp_poses(problem: Problem, q: Array) -> Array:
+def tcp_poses(problem: Problem, q: FloatArray) -> FloatArray:
     """(P,4,4) in the world."""
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     return np.asarray(links[:, -1] @ problem.tcp)
 
 
-def psi(problem: Problem, poses: Array) -> Array:
+def psi(problem: Problem, poses: FloatArray) -> FloatArray:
     """Eq. 2 for tcp poses (P,4,4)."""
     step = poses[:, :3, 3] - problem.pose[:3, 3]
     turn = poses[:, :3, :3] - problem.pose[:3, :3]
@@ -44,7 +43,7 @@ def psi(problem: Problem, poses: Array) -> Array:
     return np.asarray((step**2).sum(axis=1) + weight * (turn**2).sum(axis=(1, 2)))
 
 
-def rotation_vector(R: Array) -> Array:
+def rotation_vector(R: FloatArray) -> FloatArray:
     """Axis times angle (P,3) of rotations (P,3,3), accurate for small angles and usable near pi."""
     twice_sine = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     length = np.linalg.norm(twice_sine, axis=1)
@@ -52,7 +51,7 @@ def rotation_vector(R: Array) -> Array:
     return np.asarray(twice_sine * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 0.5)[:, None])
 
 
-def errors(problem: Problem, q: Array) -> tuple[Array, Array, Array]:
+def errors(problem: Problem, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Psi, distance [m] and rotation angle [rad] (P,) at q (P,n)."""
     poses = tcp_poses(problem, q)
     relative = np.swapaxes(poses[:, :3, :3], 1, 2) @ problem.pose[:3, :3]
@@ -70,7 +69,9 @@ def errors(problem: Problem, q: Array) -> tuple[Array, Array, Array]:
     return psi(problem, poses), np.linalg.norm(poses[:, :3, 3] - problem.pose[:3, 3], axis=1), angle
 
 
-def coefficients(problem: Problem, z: Array, o: Array, pose: Array) -> tuple[Array, Array, Array]:
+def coefficients(
+    problem: Problem, z: FloatArray, o: FloatArray, pose: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """k1, k2, k3 (P,) of eq. 3 for axes z (P,3) through o (P,3) and tcp poses (P,4,4)."""
     wo = problem.rotation_length**2 / 2.0
     Pc, Pt = pose[:, :3, 3] - o, problem.pose[:3, 3] - o
@@ -82,7 +83,9 @@ def coefficients(problem: Problem, z: Array, o: Array, pose: Array) -> tuple[Arr
     return k1, k2, np.einsum("pi,pi->p", z, turned)
 
 
-def best_value(q: Array, k1: Array, k2: Array, k3: Array, low: float, high: float) -> Array:
+def best_value(
+    q: FloatArray, k1: FloatArray, k2: FloatArray, k3: FloatArray, low: float, high: float
+) -> FloatArray:
     """The joint value (P,) within [low, high] that minimises Psi, of equal ones the nearest to q (P,)."""
     free = q + np.arctan2(k3, k2 - k1)
     turns = 2.0 * np.pi * np.arange(-1, 2)
@@ -91,14 +94,14 @@ def best_value(q: Array, k1: Array, k2: Array, k3: Array, low: float, high: floa
     distance = np.where(inside, np.abs(candidates - q[:, None]), np.inf)
     nearest = np.take_along_axis(candidates, distance.argmin(axis=1)[:, None], axis=1)[:, 0]
 
-    def gain(value: float) -> Array:
+    def gain(value: float) -> FloatArray:
         return np.asarray((k2 - k1) * np.cos(value - q) + k3 * np.sin(value - q))
 
     at_limit = np.where(gain(low) >= gain(high), low, high)
     return np.where(inside.any(axis=1), nearest, at_limit)
 
 
-def sweep(problem: Problem, q: Array) -> Array:
+def sweep(problem: Problem, q: FloatArray) -> FloatArray:
     """One pass over the joints, from the tool to the base (P,n)."""
     q = q.copy()
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
@@ -116,7 +119,7 @@ def sweep(problem: Problem, q: Array) -> Array:
     return q
 
 
-def newton_step(problem: Problem, q: Array, damping: Array) -> Array:
+def newton_step(problem: Problem, q: FloatArray, damping: FloatArray) -> FloatArray:
     """Damped least-squares step (P,n), held at limits: joints at a limit that would leave it are fixed."""
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     J = jacobian(problem.joint_axis, links, problem.tcp)
@@ -133,8 +136,13 @@ def newton_step(problem: Problem, q: Array, damping: Array) -> Array:
 
 
 def run(
-    problem: Problem, starts: Array, xi: float, max_sweeps: int, newton_steps: int, newton_tolerance: float
-) -> tuple[Array, Array, Array, Array, IntArray, IntArray]:
+    problem: Problem,
+    starts: FloatArray,
+    xi: float,
+    max_sweeps: int,
+    newton_steps: int,
+    newton_tolerance: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
     """q (P,n), Psi, distance, angle (P,), sweeps and Newton steps spent (P,) of every start on its own."""
     q = np.clip(starts, problem.position_min, problem.position_max)
     value = psi(problem, tcp_poses(problem, q))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ir_kernels.data import FloatArray
+from ir_msgs_py.arrays import FloatArray
 
 
 def axis_rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ir_kernels.data import BoolArray, FloatArray, IntArray
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import chain
 from ir_kernels.reference.segments import Witness, segment_body, segment_segment
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 
 def poses(model: Geometry, q: FloatArray) -> FloatArray:

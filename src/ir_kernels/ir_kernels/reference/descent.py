@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ir_kernels.data import FloatArray
+from ir_msgs_py.arrays import FloatArray
 
 MEMORY = 16  # pairs of steps and changes of the gradient
 PATIENCE = 10  # iterations that have to gain something together

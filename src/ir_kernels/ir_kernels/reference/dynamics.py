@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_kernels.dynamics_data import Array, CounterbalanceData, DynamicsData
+from ir_kernels.dynamics_data import CounterbalanceData, DynamicsData
 from ir_kernels.reference.vectors import (
     Matrix,
     Number,
@@ -26,6 +26,7 @@ from ir_kernels.reference.vectors import (
     transpose,
     vector,
 )
+from ir_msgs_py.arrays import FloatArray
 
 
 def rigid_body_torque(
@@ -91,7 +92,7 @@ def counterbalance_torque(
     return pressure * data.piston_area * (pz * bx - px * bz) * power(length, -1.0)
 
 
-def counterbalance(data: DynamicsData, q: Array) -> Array:
+def counterbalance(data: DynamicsData, q: FloatArray) -> FloatArray:
     """What the counterbalance does about each joint's +axis (N,n); zero where there is none."""
     torque = np.zeros(q.shape, q.dtype)
     if data.counterbalance is not None:
@@ -102,7 +103,9 @@ def counterbalance(data: DynamicsData, q: Array) -> Array:
     return torque
 
 
-def rigid(data: DynamicsData, q: Array, qd: Array, qdd: Array, with_gravity: bool = True) -> Array:
+def rigid(
+    data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray, with_gravity: bool = True
+) -> FloatArray:
     """H qdd + h (N,n), the arm alone."""
     columns = rigid_body_torque(
         data, list(np.sin(q).T), list(np.cos(q).T), list(qd.T), list(qdd.T), with_gravity
@@ -110,12 +113,12 @@ def rigid(data: DynamicsData, q: Array, qd: Array, qdd: Array, with_gravity: boo
     return np.stack(columns, axis=1)
 
 
-def friction(data: DynamicsData, qd: Array) -> Array:
+def friction(data: DynamicsData, qd: FloatArray) -> FloatArray:
     """F_v qd + F_c sign(qd), zero at rest."""
     return data.viscous * qd + data.coulomb * np.sign(qd.real)
 
 
-def inverse_dynamics(data: DynamicsData, q: Array, qd: Array, qdd: Array) -> Array:
+def inverse_dynamics(data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
     """Torque of the motors, seen at the joint, with rotor inertia and friction, less the counterbalance."""
     arm = rigid(data, q, qd, qdd)
     return arm + data.rotor_inertia * qdd + friction(data, qd) - counterbalance(data, q)
@@ -124,18 +127,18 @@ def inverse_dynamics(data: DynamicsData, q: Array, qd: Array, qdd: Array) -> Arr
 inverse_dynamics_single = inverse_dynamics  # the compiled core has one in single precision
 
 
-def gravity(data: DynamicsData, q: Array) -> Array:
+def gravity(data: DynamicsData, q: FloatArray) -> FloatArray:
     """Torque that holds the arm against gravity, without the counterbalance."""
     zero = np.zeros_like(q)
     return rigid(data, q, zero, zero)
 
 
-def bias(data: DynamicsData, q: Array, qd: Array) -> Array:
+def bias(data: DynamicsData, q: FloatArray, qd: FloatArray) -> FloatArray:
     """h = C qd + g of the arm."""
     return rigid(data, q, qd, np.zeros_like(q))
 
 
-def mass_matrix(data: DynamicsData, q: Array) -> Array:
+def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
     """H (N,n,n) without rotor inertia, by composite bodies in the frame of link 0."""
     N, n = q.shape
     R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
@@ -165,20 +168,20 @@ def mass_matrix(data: DynamicsData, q: Array) -> Array:
     return H
 
 
-def _about_origin(d: Array) -> Array:
+def _about_origin(d: FloatArray) -> FloatArray:
     """|d|^2 1 - d d' (N,3,3)."""
     squared = np.einsum("ni,ni->n", d, d)[:, None, None] * np.eye(3)
     return np.asarray(squared - d[:, :, None] * d[:, None, :])
 
 
-def forward_dynamics(data: DynamicsData, q: Array, qd: Array, tau: Array) -> Array:
+def forward_dynamics(data: DynamicsData, q: FloatArray, qd: FloatArray, tau: FloatArray) -> FloatArray:
     """Accelerations under the motor torques `tau`: (H + J_r) qdd = tau - h - friction + T_cb."""
     effort = tau - bias(data, q, qd) - friction(data, qd) + counterbalance(data, q)
     H = mass_matrix(data, q) + np.diag(data.rotor_inertia)
     return np.asarray(np.linalg.solve(H, effort[:, :, None])[:, :, 0])
 
 
-def torque_limit(data: DynamicsData, qd: Array) -> Array:
+def torque_limit(data: DynamicsData, qd: FloatArray) -> FloatArray:
     """Torque available at the speed |qd| (N,n)."""
     limit = np.empty_like(qd)
     for j in range(data.n):
@@ -188,7 +191,7 @@ def torque_limit(data: DynamicsData, qd: Array) -> Array:
     return limit
 
 
-def axis_power(data: DynamicsData, qd: Array, tau: Array) -> Array:
+def axis_power(data: DynamicsData, qd: FloatArray, tau: FloatArray) -> FloatArray:
     """Power each axis takes from the DC bus (N,n) W: mechanical plus copper losses, negative while
     braking.
     """
@@ -198,7 +201,9 @@ def axis_power(data: DynamicsData, qd: Array, tau: Array) -> Array:
 STEP = 1e-100  # of the complex steps: so small that no digit is lost
 
 
-def torque_gradients(data: DynamicsData, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+def torque_gradients(
+    data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """d tau_i / d q_j, d qd_j, d qdd_j, each (N,n,n) [i, j], by complex steps: exact to rounding."""
     N, n = q.shape
     of_q, of_qd = np.empty((N, n, n)), np.empty((N, n, n))

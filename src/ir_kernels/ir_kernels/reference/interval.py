@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_kernels.arguments import Array
+from ir_msgs_py.arrays import FloatArray
 
 OUTWARD, TINY = 4.5e-16, 1e-300
 
@@ -20,8 +20,8 @@ OUTWARD, TINY = 4.5e-16, 1e-300
 class Interval:
     """Closed intervals [lo, hi], arrays of one shape."""
 
-    lo: Array
-    hi: Array
+    lo: FloatArray
+    hi: FloatArray
     __array_ufunc__ = None  # so that a NumPy number times an Interval comes here
 
     def __neg__(self) -> Interval:
@@ -84,7 +84,7 @@ def interval(x: Any) -> Interval:
     return x if isinstance(x, Interval) else Interval(np.asarray(x, float), np.asarray(x, float))
 
 
-def outward(lo: Array, hi: Array) -> Interval:
+def outward(lo: FloatArray, hi: FloatArray) -> Interval:
     """[lo, hi] widened by two units in the last place."""
     return Interval(lo - (np.abs(lo) * OUTWARD + TINY), hi + (np.abs(hi) * OUTWARD + TINY))
 
@@ -108,7 +108,7 @@ def sine_cosine(x: Interval) -> tuple[Interval, Interval]:
     sine, cosine = (np.sin(x.lo), np.sin(x.hi)), (np.cos(x.lo), np.cos(x.hi))
     wide = x.hi - x.lo > 3.0
 
-    def between(value: tuple[Array, Array], slope: tuple[Array, Array]) -> Interval:
+    def between(value: tuple[FloatArray, FloatArray], slope: tuple[FloatArray, FloatArray]) -> Interval:
         # a turning point within rounding of an end is no higher than the end, to rounding squared
         top = wide | ((slope[0] > 0.0) & (slope[1] < 0.0))
         bottom = wide | ((slope[0] < 0.0) & (slope[1] > 0.0))

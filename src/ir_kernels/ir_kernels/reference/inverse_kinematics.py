@@ -8,17 +8,16 @@ from itertools import product
 
 import numpy as np
 
-from ir_kernels.arguments import Array
-from ir_kernels.data import BoolArray, IntArray
 from ir_kernels.reference.chain import axis_rotation
 from ir_kernels.wrist_geometry import WristGeometry
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 REACH_TOLERANCE = 1e-10  # m: how far out of reach still counts as stretched
 LIMIT_TOLERANCE = 1e-10  # rad: how far beyond a limit still counts as on it
 SINGULAR_WRIST = 1e-10  # sine of the wrist angle below which only q4 +- q6 is determined
 
 
-def arm_branches(geometry: WristGeometry, centre: Array) -> tuple[Array, BoolArray]:
+def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArray, BoolArray]:
     """q1, q2, q3 (N,4,3) for wrist centres (N,3) in the frame of link 0, and which exist (N,4); branches
     00 01 10 11.
 
@@ -57,8 +56,8 @@ def arm_branches(geometry: WristGeometry, centre: Array) -> tuple[Array, BoolArr
 
 
 def wrist_branches(
-    geometry: WristGeometry, arm: Array, hand: Array, free_q4: float
-) -> tuple[Array, BoolArray]:
+    geometry: WristGeometry, arm: FloatArray, hand: FloatArray, free_q4: float
+) -> tuple[FloatArray, BoolArray]:
     """q4, q5, q6 (N,2,3) for arm angles (N,3) and the hand's rotation (N,3,3) in link 0, and which exist
     (N,2).
 
@@ -95,8 +94,8 @@ def turns(angle: float, low: float, high: float) -> list[float]:
 
 
 def solve(
-    geometry: WristGeometry, hand: Array, position_min: Array, position_max: Array
-) -> tuple[Array, IntArray, IntArray]:
+    geometry: WristGeometry, hand: FloatArray, position_min: FloatArray, position_max: FloatArray
+) -> tuple[FloatArray, IntArray, IntArray]:
     """All q (M,6) for poses of link 6 (N,4,4) in link 0, with pose index (M,) and branch (M,), sorted by
     pose, branch, q.
     """

@@ -7,12 +7,12 @@ a superfluous candidate harms no extreme, and a double root is such an end.
 
 import numpy as np
 
-from ir_kernels.arguments import Array
+from ir_msgs_py.arrays import FloatArray
 
 ITERATIONS = 80  # of bisection at most; Newton ends after a handful
 
 
-def evaluate(coefficients: Array, x: Array) -> Array:
+def evaluate(coefficients: FloatArray, x: FloatArray) -> FloatArray:
     """sum_k c_k x^k for coefficients (..., d+1) at x (..., m)."""
     value = coefficients[..., -1:] + 0.0 * x
     for k in reversed(range(coefficients.shape[-1] - 1)):
@@ -20,12 +20,12 @@ def evaluate(coefficients: Array, x: Array) -> Array:
     return np.asarray(value)
 
 
-def derivative(coefficients: Array) -> Array:
+def derivative(coefficients: FloatArray) -> FloatArray:
     """Coefficients (..., d) of the derivative of (..., d+1)."""
     return np.asarray(coefficients[..., 1:] * np.arange(1.0, coefficients.shape[-1]))
 
 
-def _root(p: Array, low: Array, high: Array) -> Array:
+def _root(p: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Root of the polynomials p (..., d+1) in brackets (..., m) on which they are monotonic, or their
     better end.
     """
@@ -48,7 +48,7 @@ def _root(p: Array, low: Array, high: Array) -> Array:
     return x
 
 
-def critical_points(coefficients: Array) -> Array:
+def critical_points(coefficients: FloatArray) -> FloatArray:
     """Where p (..., d+1) can have extremes within [0, 1]: both ends and the roots of p' (..., d+1)."""
     chain = [coefficients]
     while chain[-1].shape[-1] > 2:
@@ -61,7 +61,9 @@ def critical_points(coefficients: Array) -> Array:
     return points
 
 
-def polynomial_extrema(coefficients: Array, durations: Array) -> tuple[Array, Array, Array, Array]:
+def polynomial_extrema(
+    coefficients: FloatArray, durations: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Smallest and largest value (S,n) of p(t) = sum_k c_k t^k on [0, duration], and their times."""
     scale = durations[:, None, None] ** np.arange(coefficients.shape[2])
     scaled = coefficients * scale
@@ -69,7 +71,7 @@ def polynomial_extrema(coefficients: Array, durations: Array) -> tuple[Array, Ar
     values = evaluate(scaled, points)
     lowest, highest = values.argmin(axis=2)[..., None], values.argmax(axis=2)[..., None]
 
-    def pick(array: Array, index: Array) -> Array:
+    def pick(array: FloatArray, index: FloatArray) -> FloatArray:
         return np.asarray(np.take_along_axis(array, index, axis=2)[..., 0])  # type: ignore[arg-type]
 
     times = points * durations[:, None, None]

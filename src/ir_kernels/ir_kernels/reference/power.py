@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ir_kernels.dynamics_data import Array
+from ir_msgs_py.arrays import FloatArray
 
 
 def dc_bus(
-    axis_power: Array, dt: Array, capacity: float, regeneration: str, stored: float
-) -> tuple[Array, Array, Array]:
+    axis_power: FloatArray, dt: FloatArray, capacity: float, regeneration: str, stored: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mains W, burnt W and stored J after each of the N steps; see `ir_kernels.power.dc_bus`."""
     N = len(axis_power)
     mains, burnt, level = np.empty(N), np.zeros(N), np.empty(N)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_kernels.data import FloatArray
 from ir_kernels.scene import Hull
+from ir_msgs_py.arrays import FloatArray
 
 RIM_SAMPLES = 256
 GOLDEN_STEPS = 60

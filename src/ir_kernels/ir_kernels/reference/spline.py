@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ir_kernels.data import FloatArray, IntArray
 from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import collision, dynamics
 from ir_kernels.reference.descent import bending_metric, descend
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from ir_kernels.spline import SplineTerms

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ir_kernels.arguments import Array
 from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.reference import dynamics
 from ir_kernels.reference.interval import Dual, Interval, intersect, interval, power, sine_cosine
 from ir_kernels.reference.limits import derivative, evaluate
+from ir_msgs_py.arrays import FloatArray
 
 FIRST_PIECE = 0.05  # s, longest piece to begin with
 FEWEST_PIECES = 8  # of a segment to begin with
@@ -29,8 +29,8 @@ class Pieces:
     """Times begin..end (K,) within the segments (K,)."""
 
     segment: Any
-    begin: Array
-    end: Array
+    begin: FloatArray
+    end: FloatArray
 
 
 def _horner(a: list[Interval], x: Interval) -> Interval:
@@ -52,11 +52,11 @@ def _smooth_torque(data: DynamicsData, sin: Any, cos: Any, qd: Any, qdd: Any) ->
     return tau
 
 
-def least_limit(data: DynamicsData, joint: int, slowest: Array, fastest: Array) -> Array:
+def least_limit(data: DynamicsData, joint: int, slowest: FloatArray, fastest: FloatArray) -> FloatArray:
     """Smallest torque available (K,) over the speeds slowest..fastest (K,)."""
     speeds, torques = data.envelope_speed[joint], data.envelope_torque[joint]
 
-    def limit(speed: Array) -> Any:
+    def limit(speed: FloatArray) -> Any:
         return np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
 
     least = np.minimum(limit(slowest), limit(fastest))
@@ -65,7 +65,9 @@ def least_limit(data: DynamicsData, joint: int, slowest: Array, fastest: Array) 
     return np.asarray(least)
 
 
-def upper_ratios(data: DynamicsData, coefficients: Array, rests: Array, pieces: Pieces) -> Array:
+def upper_ratios(
+    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, pieces: Pieces
+) -> FloatArray:
     """(K,n): |tau| / limit is nowhere in a piece above this."""
     middle = 0.5 * (pieces.begin + pieces.end)
     step = Interval((interval(pieces.begin) - middle).lo, (interval(pieces.end) - middle).hi)
@@ -105,7 +107,9 @@ def upper_ratios(data: DynamicsData, coefficients: Array, rests: Array, pieces: 
     return ratio
 
 
-def sampled_ratios(data: DynamicsData, coefficients: Array, rests: Array, segment: Any, t: Array) -> Array:
+def sampled_ratios(
+    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, segment: Any, t: FloatArray
+) -> FloatArray:
     """(K,n): |tau| / limit at local times t (K,) of the segments (K,)."""
     c = coefficients[segment]
     motion = []
@@ -121,8 +125,8 @@ def sampled_ratios(data: DynamicsData, coefficients: Array, rests: Array, segmen
 
 
 def torque_bounds(
-    data: DynamicsData, coefficients: Array, durations: Array, tolerance: float, most: int
-) -> tuple[Array, Array, Array, int]:
+    data: DynamicsData, coefficients: FloatArray, durations: FloatArray, tolerance: float, most: int
+) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Upper bound, largest sample, its time (n,), and how many intervals were examined."""
     n = data.n
     upper, sampled, time = np.zeros(n), np.full(n, -1.0), np.zeros(n)

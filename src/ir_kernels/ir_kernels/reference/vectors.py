@@ -8,20 +8,21 @@ them. Constants of the robot are plain floats.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ir_msgs_py.arrays import FloatArray
 
 Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 
 
-def vector(constants: NDArray[np.float64]) -> Vector:
+def vector(constants: FloatArray) -> Vector:
     """The three constants as floats."""
     x, y, z = constants.tolist()
     return x, y, z
 
 
-def matrix(constants: NDArray[np.float64]) -> Matrix:
+def matrix(constants: FloatArray) -> Matrix:
     """The nine constants as rows of floats."""
     return vector(constants[0]), vector(constants[1]), vector(constants[2])
 
@@ -56,9 +57,7 @@ def transpose(m: Matrix) -> Matrix:
     return (m[0][0], m[1][0], m[2][0]), (m[0][1], m[1][1], m[2][1]), (m[0][2], m[1][2], m[2][2])
 
 
-def joint_rotation(
-    origin: NDArray[np.float64], axis: NDArray[np.float64], sin: Number, cos: Number
-) -> Matrix:
+def joint_rotation(origin: FloatArray, axis: FloatArray, sin: Number, cos: Number) -> Matrix:
     """Rotation of the frame after a revolute joint in the frame before it (Rodrigues), entry by entry.
 
     R(q) = E (a a' + cos q (1 - a a') + sin q [a]x) with E = origin[:3, :3] and a = axis.

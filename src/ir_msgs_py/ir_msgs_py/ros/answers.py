@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_msgs_py.checks import FloatArray
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.ros.convert_report import planned_movement_from_msg, planning_info_from_msg, report_from_msg
 from ir_msgs_py.ros.convert_trajectory import trajectory_from_msg, trajectory_given

@@ -15,12 +15,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from ir_msgs.action import ExecuteTrajectory, Plan, RunProgram
-from ir_msgs.srv import GetTrajectory, OptimizeTrajectory, PlanRegionalMovement, SetCell
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.task import Future
 
+from ir_msgs.action import ExecuteTrajectory, Plan, RunProgram
+from ir_msgs.srv import GetTrajectory, OptimizeTrajectory, PlanRegionalMovement, SetCell
 from ir_msgs_py import names
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.options import PlanOptions

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
-from ir_msgs.msg import Status as StatusMsg
 from sensor_msgs.msg import JointState
 
-from ir_msgs_py.checks import FloatArray, read_only
+from ir_msgs.msg import Status as StatusMsg
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.checks import read_only
 from ir_msgs_py.errors import InvalidValueError, JointNamesError
 from ir_msgs_py.status import Status
 

@@ -11,7 +11,8 @@ import numpy as np
 from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from scipy.spatial.transform import Rotation
 
-from ir_msgs_py.checks import FloatArray, read_only
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.checks import read_only
 from ir_msgs_py.errors import PoseError
 from ir_msgs_py.names import WORLD_FRAME
 from ir_msgs_py.ros.convert_basics import point_to_msg

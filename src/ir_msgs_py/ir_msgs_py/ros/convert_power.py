@@ -10,7 +10,6 @@ from ir_msgs.msg import PowerMode as PowerModeMsg
 from ir_msgs.msg import PowerState as PowerStateMsg
 from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
-
 from ir_msgs_py.plc import PlcInputs, PlcOutputs, Signal
 from ir_msgs_py.power import PowerMode, PowerState
 from ir_msgs_py.program import ProgramState

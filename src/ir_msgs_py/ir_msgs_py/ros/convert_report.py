@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+
 from ir_msgs.msg import DistancePair as DistancePairMsg
 from ir_msgs.msg import PlannedMovement as PlannedMovementMsg
 from ir_msgs.msg import PlanningInfo as PlanningInfoMsg
 from ir_msgs.msg import PlanningStage as PlanningStageMsg
 from ir_msgs.msg import Rejection as RejectionMsg
 from ir_msgs.msg import TrajectoryReport as TrajectoryReportMsg
-from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
-
 from ir_msgs_py.report import (
     DistancePair,
     PlannedMovement,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import fields
 
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+
 from ir_msgs.msg import AllowedContact as AllowedContactMsg
 from ir_msgs.msg import IkSolution as IkSolutionMsg
 from ir_msgs.msg import PlanOptions as PlanOptionsMsg
 from ir_msgs.msg import ServiceCandidate as ServiceCandidateMsg
 from ir_msgs.msg import Station as StationMsg
-from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
-
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.convert_basics import configuration_from_msg, configuration_to_msg
 from ir_msgs_py.ros.convert_pose import stamped_pose_from_msg, stamped_pose_to_msg

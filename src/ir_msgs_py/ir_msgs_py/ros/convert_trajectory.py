@@ -9,7 +9,7 @@ from builtin_interfaces.msg import Duration
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from ir_msgs_py.checks import FloatArray, IntArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.errors import TrajectoryError
 from ir_msgs_py.ros.convert_basics import NS_PER_S, float_array, time_to_msg
 from ir_msgs_py.trajectory import JointTrajectory

@@ -10,16 +10,16 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from ir_msgs.action import ExecuteTrajectory
-from ir_msgs.msg import PowerState as PowerStateMsg
-from ir_msgs.srv import QueryModes
-from ir_msgs.srv import SetLoad as SetLoadSrv
-from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import PowerState as PowerStateMsg
+from ir_msgs.srv import QueryModes
+from ir_msgs.srv import SetLoad as SetLoadSrv
+from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
 from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.ros.conversions import power_mode_from_msg, status_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.waiting import Waiting

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ir_msgs.srv import GetProgram, GetTrajectory
 from rclpy.node import Node
 
+from ir_msgs.srv import GetProgram, GetTrajectory
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import planned_movement_from_msg, status_from_msg, trajectory_from_msg

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from ir_msgs_py.names import JOINT_NAMES, LOAD_SEPARATOR
 
 from ir_description import Cell, DescriptionError, Load, cell_from_yaml, load_power_data
 from ir_kernels import KernelError
+from ir_msgs_py.names import JOINT_NAMES, LOAD_SEPARATOR
 from ir_recorder.analysis.clearance import StepClearance, held_part, step_clearances
 from ir_recorder.analysis.grid import check_grid
 from ir_recorder.analysis.indirect import IndirectMeter

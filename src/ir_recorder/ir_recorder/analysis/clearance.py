@@ -10,15 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ir_description.program import PartPlaces
-from ir_msgs_py.names import LOAD_SEPARATOR
-from numpy.typing import NDArray
 
 from ir_description import Cell
+from ir_description.program import PartPlaces
 from ir_kernels import Chain, CollisionModel
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.names import LOAD_SEPARATOR
 from ir_recorder.analysis.loads import normal
 from ir_recorder.analysis.steps import ExecutedStep
-from ir_recorder.read.cdr import Numbers
 from ir_recorder.read.recording import JointSeries
 
 COARSE = 0.02  # s between samples of the profile: 4 cm of tool path. Near its minimum all joint states count
@@ -32,10 +31,10 @@ class StepClearance:
     least excess of an allowed pair over its own safety distance (inf: no such pair).
     """
 
-    time: Numbers
-    distance: Numbers
-    point_a: Numbers
-    point_b: Numbers
+    time: FloatArray
+    distance: FloatArray
+    point_a: FloatArray
+    point_b: FloatArray
     pairs: tuple[str, ...]
     least: float
     least_pair: str
@@ -116,12 +115,12 @@ def _along(cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlac
     )
 
 
-def _stride(time: Numbers) -> int:
+def _stride(time: FloatArray) -> int:
     """How many joint states lie between two coarse samples."""
     return max(1, round(COARSE / max(float(np.median(np.diff(time))), 1e-4))) if len(time) > 1 else 1
 
 
-def _allowed(cell: Cell, step: ExecutedStep, model: CollisionModel) -> NDArray[np.float64]:
+def _allowed(cell: Cell, step: ExecutedStep, model: CollisionModel) -> FloatArray:
     """Own safety distance (Z,) of pairs that the step's stations allow to touch, NaN for all others."""
     own = np.full(len(model.pairs), np.nan)
     ends = (step.movement.from_station, step.movement.to_station)
@@ -134,7 +133,7 @@ def _allowed(cell: Cell, step: ExecutedStep, model: CollisionModel) -> NDArray[n
     return own
 
 
-def _contact_margin(model: CollisionModel, q: Numbers, own: NDArray[np.float64]) -> float:
+def _contact_margin(model: CollisionModel, q: FloatArray, own: FloatArray) -> float:
     allowed = ~np.isnan(own)
     if not allowed.any():
         return float("inf")

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ir_msgs_py.report import TrajectoryReport
-
 from ir_recorder.analysis.plateaus import Plateau
 from ir_recorder.analysis.results import Analysis, StepResult
 

@@ -6,8 +6,8 @@ from bisect import bisect_right
 from collections.abc import Iterator
 
 import numpy as np
-from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 
+from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.steps import STARTED
 from ir_recorder.read.recording import PowerSeries, Recording
 

@@ -7,9 +7,8 @@ them.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ir_recorder.read.cdr import Numbers
+from ir_msgs_py.arrays import FloatArray
 from ir_recorder.read.recording import PowerSeries
 
 
@@ -37,7 +36,7 @@ class Meter:
         """J dissipated in the brake resistor."""
         return self._between(self._dissipated, start, end)
 
-    def joints(self, start: float, end: float) -> Numbers:
+    def joints(self, start: float, end: float) -> FloatArray:
         """J per joint (n,) at the DC bus, signed."""
         return np.array([self._between(column, start, end) for column in self._joints.T])
 
@@ -46,6 +45,6 @@ class Meter:
         inside = (self.time > start) & (self.time <= end + 1e-6)
         return float(self.power[inside].max()) if inside.any() else float("nan")
 
-    def _between(self, cumulative: Numbers, start: float, end: float) -> float:
-        ends: NDArray[np.float64] = np.interp([start, end], self.time, cumulative)
+    def _between(self, cumulative: FloatArray, start: float, end: float) -> float:
+        ends: FloatArray = np.interp([start, end], self.time, cumulative)
         return float(ends[1] - ends[0])

@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
-from ir_msgs_py.power import REST_MODES, Mode
-from numpy.typing import NDArray
 
 from ir_description import Cell, PowerData
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
+from ir_msgs_py.power import REST_MODES, Mode
 from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.meter import Meter
-from ir_recorder.read.cdr import Numbers
 from ir_recorder.read.recording import PowerSeries, Recording
 
 AT_HOME = 0.005  # rad: gravity torque changes by less than 0.1 % within it
@@ -81,7 +80,7 @@ def _stays(
             yield float(power.time[first]), float(power.time[last - 1]), int(power.mode[first])
 
 
-def _at_home(recording: Recording, cell: Cell, times: Numbers) -> NDArray[np.bool_]:
+def _at_home(recording: Recording, cell: Cell, times: FloatArray) -> BoolArray:
     """Whether the robot stood at machine home at `times` (N,); while nothing is published it stays where it
     was.
     """

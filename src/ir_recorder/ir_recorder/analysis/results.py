@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ir_description import Cell
+from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.grid import GridCheck
 from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.plateaus import Plateau
 from ir_recorder.analysis.steps import ExecutedStep
-from ir_recorder.read.cdr import Numbers
 from ir_recorder.read.recording import Recording
 
 
@@ -25,7 +25,7 @@ class StepResult:
 
     step: ExecutedStep
     energy: float
-    joint_energy: Numbers
+    joint_energy: FloatArray
     base_energy: float
     dissipated_energy: float
     peak_power: float

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ir_msgs_py.report import MovementKind, PlannedMovement
 
-from ir_recorder.read.cdr import Numbers
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_recorder.read.recording import ControllerSeries, ProgramEvent, Recording
 
 STARTED = "started"
@@ -89,7 +89,7 @@ class _Runs:
     """When each trajectory was run, from the executor's path time: in the robot's own time."""
 
     def __init__(self, controller: ControllerSeries | None) -> None:
-        self._runs: dict[str, list[tuple[Numbers, Numbers]]] = {}
+        self._runs: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
         if controller is None:
             return
         ids = np.array(controller.trajectory_id, dtype=object)
@@ -116,7 +116,7 @@ class _Runs:
         return start, end if end - time[-1] <= 2.0 * (last[0][-1] - last[0][0]) else float(time[-1])
 
 
-def _extrapolated(time: Numbers, path: Numbers, at: float) -> float:
+def _extrapolated(time: FloatArray, path: FloatArray, at: float) -> float:
     """Time [s] at which the path time reaches `at`, by the mean speed of these samples."""
     moved = path[-1] - path[0]
     if moved <= 0.0:

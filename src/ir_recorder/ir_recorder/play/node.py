@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-from ir_msgs_py.ros.running import run_node
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 
+from ir_msgs_py.ros.running import run_node
 from ir_recorder.errors import RecorderError
 from ir_recorder.format.qos import offers_from_yaml
 from ir_recorder.play.player import Player

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_recorder.errors import ReadError
 from ir_recorder.format.definition import Field, definitions_of, short_name
 
@@ -24,8 +25,6 @@ _DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"
 _HEADER = 4  # bytes: encapsulation kind and options
 _LITTLE_ENDIAN = 1  # kind CDR_LE
 _LENGTH = struct.Struct("<I")
-
-Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Columns:
     def __init__(self, messages: Sequence[bytes], type_name: str, schema: str) -> None:
         definitions = definitions_of(type_name, schema)
         self.count = len(messages)
-        self._groups: list[tuple[NDArray[np.int64], NDArray[np.uint8], _Layout]] = []
+        self._groups: list[tuple[IntArray, NDArray[np.uint8], _Layout]] = []
         sizes = np.array([len(message) for message in messages], dtype=np.int64)
         for size in np.unique(sizes):
             open_rows = np.flatnonzero(sizes == size)
@@ -64,7 +63,7 @@ class Columns:
                 self._groups.append((open_rows[same], block[same], layout))
                 open_rows, block = open_rows[~same], block[~same]
 
-    def numbers(self, path: str, width: int | None = None) -> Numbers:
+    def numbers(self, path: str, width: int | None = None) -> FloatArray:
         """A numeric field as (N,), or (N, width) for an array; missing values are NaN."""
         out = np.full(self.count if width is None else (self.count, width), np.nan)
         for rows, block, layout in self._groups:
@@ -79,7 +78,7 @@ class Columns:
                 out[rows, :used] = values[:, :used]
         return out
 
-    def integers(self, path: str) -> NDArray[np.int64]:
+    def integers(self, path: str) -> IntArray:
         """A whole-number field as (N,); 0 where it is missing."""
         out = np.zeros(self.count, dtype=np.int64)
         for rows, block, layout in self._groups:
@@ -100,7 +99,7 @@ class Columns:
                 out[row] = data.tobytes().rstrip(b"\0").decode(errors="replace")
         return out
 
-    def stamps(self, path: str = "header.stamp") -> NDArray[np.int64]:
+    def stamps(self, path: str = "header.stamp") -> IntArray:
         """A time field as (N,) nanoseconds."""
         return self.integers(f"{path}.sec") * 1_000_000_000 + self.integers(f"{path}.nanosec")
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
-from numpy.typing import NDArray
 
 
 def movement_from(message: Any) -> PlannedMovement:
@@ -64,5 +65,5 @@ def _pair_from(message: Any) -> DistancePair:
     )
 
 
-def _point(point: Any) -> NDArray[np.float64]:
+def _point(point: Any) -> FloatArray:
     return np.array([point.x, point.y, point.z], dtype=np.float64)

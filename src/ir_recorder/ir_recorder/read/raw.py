@@ -15,8 +15,8 @@ import numpy as np
 from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
-from numpy.typing import NDArray
 
+from ir_msgs_py.arrays import IntArray
 from ir_recorder.errors import ReadError
 
 
@@ -30,7 +30,7 @@ class RawChannel:
     schema_encoding: str
     schema_text: str
     qos: str
-    log_time: NDArray[np.int64]
+    log_time: IntArray
     messages: tuple[bytes, ...]
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
-from numpy.typing import NDArray
 
 from ir_msgs_py import names
+from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.read.cdr import Columns
@@ -106,7 +106,7 @@ class _Reader:
             self._problems.append(f"{channel.topic} can't be read: {error}")
             return None
 
-    def _seconds(self, stamps: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _seconds(self, stamps: IntArray) -> FloatArray:
         return np.asarray((stamps - self._start) * 1e-9, dtype=np.float64)
 
     def _joints(self, columns: Columns, channel: RawChannel) -> JointSeries:

@@ -6,10 +6,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from ir_msgs_py.report import PlannedMovement
-from numpy.typing import NDArray
 
-from ir_recorder.read.cdr import Numbers
+from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.report import PlannedMovement
 
 
 class _ReadOnlyArrays:
@@ -39,11 +38,11 @@ class JointSeries(_ReadOnlyArrays):
     """
 
     names: tuple[str, ...]
-    stamp_ns: NDArray[np.int64]
-    time: Numbers
-    position: Numbers
-    velocity: Numbers
-    effort: Numbers
+    stamp_ns: IntArray
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    effort: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +54,16 @@ class PowerSeries(_ReadOnlyArrays):
     A power is the mean since the reading before.
     """
 
-    time: Numbers
-    mode: NDArray[np.int64]
-    target_mode: NDArray[np.int64]
-    power: Numbers
-    energy: Numbers
-    base_power: Numbers
-    bus_voltage: Numbers
-    burnt_power: Numbers
-    joint_power: Numbers
-    joint_torque: Numbers
+    time: FloatArray
+    mode: IntArray
+    target_mode: IntArray
+    power: FloatArray
+    energy: FloatArray
+    base_power: FloatArray
+    bus_voltage: FloatArray
+    burnt_power: FloatArray
+    joint_power: FloatArray
+    joint_torque: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +72,20 @@ class ControllerSeries(_ReadOnlyArrays):
     trajectory, speed_scaling (N,), tool_deviation (N,) m between commanded and simulated tcp.
     """
 
-    time: Numbers
+    time: FloatArray
     trajectory_id: tuple[str, ...]
-    path_time: Numbers
-    speed_scaling: Numbers
-    tool_deviation: Numbers
+    path_time: FloatArray
+    speed_scaling: FloatArray
+    tool_deviation: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class BitSeries(_ReadOnlyArrays):
     """Levels by name: names (B,), levels (N, B)."""
 
-    time: Numbers
+    time: FloatArray
     names: tuple[str, ...]
-    levels: NDArray[np.int64]
+    levels: IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ir_kernels import Chain
+from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.shares import mode_name
 from ir_recorder.errors import PathError, RecorderError
-from ir_recorder.read.cdr import Numbers
 from ir_recorder.read.recording import PowerSeries
 from ir_recorder.report.series import envelope
 from ir_recorder.report.words import joules, mode_words
@@ -121,7 +121,7 @@ def _path(axes: Axes, analysis: Analysis) -> None:
     axes.plot(*cell.base_pose[:2, 3], marker="o", color="#39434f", markersize=9)
 
 
-def _power_at(analysis: Analysis, time: Numbers) -> Numbers:
+def _power_at(analysis: Analysis, time: FloatArray) -> FloatArray:
     power = analysis.recording.power
     return np.interp(time, power.time, power.power) if power is not None else np.zeros(len(time))
 

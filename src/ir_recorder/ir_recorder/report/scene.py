@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from ir_description.program import PartPlaces
 
 from ir_description import Cell
+from ir_description.program import PartPlaces
+from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import places_after
-from ir_recorder.read.cdr import Numbers
 from ir_recorder.report.series import Json, floats, indices, quantised
 from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh
 
@@ -48,13 +48,13 @@ def scene(analysis: Analysis) -> dict[str, Json] | None:
     }
 
 
-def _frames(time: Numbers) -> Numbers:
+def _frames(time: FloatArray) -> FloatArray:
     span = float(time[-1] - time[0])
     count = int(np.clip(span * RATE, 2, MOST_FRAMES))
     return np.linspace(time[0], time[-1], count)
 
 
-def _power(analysis: Analysis, time: Numbers) -> Numbers:
+def _power(analysis: Analysis, time: FloatArray) -> FloatArray:
     power = analysis.recording.power
     if power is None or not len(power.time):
         return np.zeros(len(time))
@@ -174,6 +174,6 @@ def _mesh(mesh: Mesh) -> dict[str, Json]:
     }
 
 
-def _matrix(pose: Numbers) -> list[float]:
+def _matrix(pose: FloatArray) -> list[float]:
     """Column-major, as WebGL wants it."""
     return [round(float(x), 6) for x in np.asarray(pose).T.ravel()]

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ir_recorder.read.cdr import Numbers
+from ir_msgs_py.arrays import FloatArray
 
 Json: TypeAlias = "Mapping[str, Json] | Sequence[Json] | str | float | bool | None"
 
@@ -19,12 +19,12 @@ Json: TypeAlias = "Mapping[str, Json] | Sequence[Json] | str | float | bool | No
 class Envelope:
     """Lowest and highest value per stretch: time (M,) of its middle, low (M,), high (M,)."""
 
-    time: Numbers
-    low: Numbers
-    high: Numbers
+    time: FloatArray
+    low: FloatArray
+    high: FloatArray
 
 
-def envelope(time: Numbers, value: Numbers, most: int) -> Envelope:
+def envelope(time: FloatArray, value: FloatArray, most: int) -> Envelope:
     """A series (N,) as at most `most` stretches of equal count, every peak kept; a short one unchanged."""
     if len(time) <= most:
         return Envelope(time, value, value)

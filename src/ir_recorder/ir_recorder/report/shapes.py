@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ir_description.body import Body
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from ir_description import Capsule
-from ir_recorder.read.cdr import Numbers
+from ir_description.body import Body
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 SEGMENTS = 28  # around an axis: looks round, and volumes are right to 1 %
 RINGS = 7  # from the rim of a half sphere to its pole, as wide as the segments
@@ -20,9 +19,9 @@ RINGS = 7  # from the rim of a half sphere to its pole, as wide as the segments
 class Mesh:
     """points (V, 3) [m], normals (V, 3), triangles (T, 3) of indices, seen from outside counter-clockwise."""
 
-    points: Numbers
-    normals: Numbers
-    triangles: NDArray[np.int64]
+    points: FloatArray
+    normals: FloatArray
+    triangles: IntArray
 
 
 def body_mesh(body: Body) -> Mesh | None:
@@ -50,9 +49,9 @@ def capsule_mesh(capsule: Capsule) -> Mesh:
     return Mesh(mesh.points @ rotation.T + centre, mesh.normals @ rotation.T, mesh.triangles)
 
 
-def _box(size: Numbers) -> Mesh:
-    points: list[Numbers] = []
-    normals: list[Numbers] = []
+def _box(size: FloatArray) -> Mesh:
+    points: list[FloatArray] = []
+    normals: list[FloatArray] = []
     triangles: list[list[int]] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
@@ -68,7 +67,7 @@ def _box(size: Numbers) -> Mesh:
     return Mesh(np.array(points), np.array(normals), np.array(triangles))
 
 
-def _revolved(radii: Numbers, heights: Numbers, normals: Numbers) -> Mesh:
+def _revolved(radii: FloatArray, heights: FloatArray, normals: FloatArray) -> Mesh:
     """A profile (K,) of radii and heights turned about z; its normals (K, 2) are radial and axial."""
     angle = np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1)
     round_ = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -107,7 +106,7 @@ def _rounded(radius: float, length: float) -> Mesh:
     return _revolved(radius * normals[:, 0], radius * normals[:, 1] + shift, normals)
 
 
-def _hull(vertices: Numbers) -> Mesh:
+def _hull(vertices: FloatArray) -> Mesh:
     hull = ConvexHull(vertices)
     corners = vertices[hull.simplices]
     outward = hull.equations[:, :3]
@@ -119,7 +118,7 @@ def _hull(vertices: Numbers) -> Mesh:
     return Mesh(corners.reshape(-1, 3), np.repeat(outward, 3, axis=0), np.arange(3 * count).reshape(-1, 3))
 
 
-def _to_axis(axis: Numbers) -> Numbers:
+def _to_axis(axis: FloatArray) -> FloatArray:
     """A rotation (3, 3) that takes z to the axis."""
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = np.cross(other, axis)

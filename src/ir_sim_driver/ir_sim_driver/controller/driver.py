@@ -12,10 +12,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_msgs_py.power import PowerState
-
-from ir_sim_driver.arrays import Array
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.executor import Following
@@ -36,9 +35,9 @@ class Frame:
     """
 
     stamp_ns: int
-    q: Array | None
-    qd: Array | None
-    torque: Array | None
+    q: FloatArray | None
+    qd: FloatArray | None
+    torque: FloatArray | None
     power: PowerState | None
     following: Following | None
     outputs: PlcOutputs | None

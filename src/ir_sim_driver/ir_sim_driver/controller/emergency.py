@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.executor import Executor
 from ir_sim_driver.motion.path import Path
 from ir_sim_driver.motion.tool_point import ToolPoint
@@ -62,14 +62,14 @@ class Excursion:
     ahead.
     """
 
-    def __init__(self, tool: ToolPoint, path: Path | None, s: float, q: Array) -> None:
+    def __init__(self, tool: ToolPoint, path: Path | None, s: float, q: FloatArray) -> None:
         self._tool = tool
         instants = np.linspace(s, s + _AHEAD, _SAMPLES) if path is not None else np.empty(0)
         points = [path.position(float(t)) for t in instants] if path is not None else [q]
         self._path = tool.positions(np.array(points))
         self._visited = [q]
 
-    def add(self, q: Array) -> None:
+    def add(self, q: FloatArray) -> None:
         """Count a configuration (n,)."""
         self._visited.append(q)
 

@@ -14,7 +14,6 @@ from itertools import pairwise
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.power import Mode, PowerMode
 from ir_msgs_py.status import StatusCode
-
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc.inputs import Plc
 from ir_sim_driver.power.power_modes import PowerModes, Rest

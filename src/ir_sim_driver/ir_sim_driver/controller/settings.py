@@ -9,7 +9,6 @@ from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.power import REST_MODES, Mode
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.plant.control import ControlSettings
 from ir_sim_driver.plc.inputs import PlcSettings

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+
 from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.power import Mode
 from ir_msgs_py.status import StatusCode
-
-from ir_sim_driver.arrays import Array
 from ir_sim_driver.controller.emergency import EmergencyStop
 from ir_sim_driver.controller.pause import Pauses
 from ir_sim_driver.controller.settings import SimulationSettings
@@ -209,7 +209,7 @@ class Simulation:
         self._recover = self.modes.mode is Mode.EMERGENCY_STOP
         return "the brakes open where the robot stands; nothing resumes"
 
-    def disturb(self, torque: Array | None) -> None:
+    def disturb(self, torque: FloatArray | None) -> None:
         """Let an outside torque (n,) [Nm] act on the joints until the next call; None ends it."""
         self.backend.disturbance = torque
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.motion.lead_in import Route
@@ -46,8 +46,8 @@ class Following:
     """Command and robot side by side: positions (n,), velocities (n,), the command's accelerations (n,)."""
 
     command: Motion
-    q: Array
-    qd: Array
+    q: FloatArray
+    qd: FloatArray
     label: str
     path_time: float
     path_speed: float
@@ -61,16 +61,22 @@ class Executor:
     """
 
     def __init__(
-        self, robot: Any, dynamics: Any, tool: ToolPoint, settings: ExecutionSettings, dt: float, q: Array
+        self,
+        robot: Any,
+        dynamics: Any,
+        tool: ToolPoint,
+        settings: ExecutionSettings,
+        dt: float,
+        q: FloatArray,
     ) -> None:
         self._names: tuple[str, ...] = tuple(robot.joint_names)
         self._settings, self._dt, self._tool = settings, dt, tool
         self._speed = PathSpeed(dynamics, np.array(robot.acceleration_max), settings.stop_time, dt)
-        self._still: Array = np.zeros(len(q))
+        self._still: FloatArray = np.zeros(len(q))
         self._run: _Run | None = None
         self._fresh = False
         self._outcomes: list[Outcome] = []
-        self.command: Array = np.array(q)
+        self.command: FloatArray = np.array(q)
         self.deviation = 0.0
 
     @property
@@ -130,7 +136,7 @@ class Executor:
         path = run.route.path.motion(run.s)
         return Motion(self.command, path.qd * v, path.qdd * v**2)
 
-    def following(self, q: Array, qd: Array) -> Following:
+    def following(self, q: FloatArray, qd: FloatArray) -> Following:
         """How the robot at q, qd (n,) follows."""
         return Following(self.motion(), q, qd, self.label, self.path_time, self.path_speed, self.deviation)
 
@@ -173,7 +179,7 @@ class Executor:
                 self._will_end(ErrorCode.INVALID_GOAL, sentence, canceled=False)
             self._finish()
 
-    def hold(self, q: Array) -> None:
+    def hold(self, q: FloatArray) -> None:
         """Command to stay at q (n,). Only while no goal is executed."""
         self.command = np.array(q)
         self.deviation = 0.0
@@ -183,7 +189,7 @@ class Executor:
         outcomes, self._outcomes = self._outcomes, []
         return outcomes
 
-    def advance(self, scaling: float, ready: bool = True) -> Array:
+    def advance(self, scaling: float, ready: bool = True) -> FloatArray:
         """Command (n,) for the end of this step. scaling in [0, 1]; not ready: the robot cannot move yet."""
         run = self._run
         if run is None:
@@ -226,7 +232,7 @@ class Executor:
             elif run.s >= run.route.path.duration and run.wait == 0:
                 self._settle(run, error, robot)
 
-    def _broken(self, run: _Run, error: Array, robot: Backend) -> str:
+    def _broken(self, run: _Run, error: FloatArray, robot: Backend) -> str:
         if self.deviation > self._settings.tube:
             return (
                 f"the tool is {self.deviation * 1e3:.2f} mm from the commanded path at "
@@ -239,7 +245,7 @@ class Executor:
             sentence = run.path_tolerance.broken_velocity(self._names, self.motion().qd - robot.qd)
         return f"{sentence} at {self.path_time:.3f} s; stopped on the path" if sentence else ""
 
-    def _settle(self, run: _Run, error: Array, robot: Backend) -> None:
+    def _settle(self, run: _Run, error: FloatArray, robot: Backend) -> None:
         sentence = run.goal_tolerance.broken_position(self._names, error)
         if not sentence and run.goal_tolerance.has_velocity:
             sentence = run.goal_tolerance.broken_velocity(self._names, robot.qd)

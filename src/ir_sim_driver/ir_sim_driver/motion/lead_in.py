@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.trajectory import JointTrajectory
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode
@@ -36,7 +36,7 @@ class Route:
 
 
 def route_onto(
-    trajectory: JointTrajectory, now: Motion, acceleration_max: Array, settings: ExecutionSettings
+    trajectory: JointTrajectory, now: Motion, acceleration_max: FloatArray, settings: ExecutionSettings
 ) -> Route:
     """Path from the commanded motion `now` onto and along the trajectory. Raises TrajectoryRefusedError."""
     coefficients, durations = trajectory.coefficients()
@@ -64,7 +64,7 @@ def route_onto(
     return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
 
 
-def _path(coefficients: list[Array], durations: list[Array], rest: Array) -> Path:
+def _path(coefficients: list[FloatArray], durations: list[FloatArray], rest: FloatArray) -> Path:
     return Path(np.concatenate(coefficients), np.concatenate(durations), rest)
 
 
@@ -84,7 +84,7 @@ def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
 
 
 def _check_start(
-    trajectory: JointTrajectory, now: Motion, acceleration_max: Array, settings: ExecutionSettings
+    trajectory: JointTrajectory, now: Motion, acceleration_max: FloatArray, settings: ExecutionSettings
 ) -> None:
     delta = trajectory.positions[0] - now.q
     j = int(np.abs(delta).argmax())

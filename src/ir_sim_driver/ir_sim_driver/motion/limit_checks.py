@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode
@@ -19,8 +19,8 @@ _SAMPLES_MAX = 400_000
 
 
 def check_limits(
-    coefficients: Array,
-    durations: Array,
+    coefficients: FloatArray,
+    durations: FloatArray,
     start: float,
     robot: Any,
     dynamics: Any,
@@ -60,8 +60,8 @@ def check_limits(
 
 
 def _samples(
-    coefficients: Array, durations: Array, start: float, dt: float
-) -> Iterator[tuple[Array, Array, Array, Array]]:
+    coefficients: FloatArray, durations: FloatArray, start: float, dt: float
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
     """Times (M,), q, qd, qdd (M, n) of stretches of the path, ends of segments included."""
     dt = max(dt, float(durations.sum()) / _SAMPLES_MAX)
     for c, length in zip(coefficients, durations.tolist(), strict=True):
@@ -78,7 +78,14 @@ def _samples(
 
 
 def _refuse_first(
-    robot: Any, t: Array, value: Array, bound: Array, over: Array, excess: Array, verb: str, unit: str
+    robot: Any,
+    t: FloatArray,
+    value: FloatArray,
+    bound: FloatArray,
+    over: FloatArray,
+    excess: FloatArray,
+    verb: str,
+    unit: str,
 ) -> None:
     bad = over > 0.0
     if not bad.any():
@@ -94,7 +101,7 @@ def _refuse_first(
 
 
 def check_jumps(
-    coefficients: Array, durations: Array, start: float, robot: Any, settings: ExecutionSettings
+    coefficients: FloatArray, durations: FloatArray, start: float, robot: Any, settings: ExecutionSettings
 ) -> None:
     """Velocity may jump at a point, and at the end, only by what the drives can follow at once."""
     c, T = coefficients, durations[:, None]

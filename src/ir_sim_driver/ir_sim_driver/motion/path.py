@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 
 _DERIVATIVE = np.arange(6.0)
 
@@ -15,9 +15,9 @@ _DERIVATIVE = np.arange(6.0)
 class Motion(NamedTuple):
     """Position (n,) [rad] and its first two derivatives by path time."""
 
-    q: Array
-    qd: Array
-    qdd: Array
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
 
 
 class Path:
@@ -26,22 +26,24 @@ class Path:
     A path without segments stands at `rest` (n,).
     """
 
-    def __init__(self, coefficients: Array, durations: Array, rest: Array) -> None:
+    def __init__(self, coefficients: FloatArray, durations: FloatArray, rest: FloatArray) -> None:
         self._c = np.ascontiguousarray(np.swapaxes(coefficients, 1, 2))  # (S, 6, n)
         self._starts = np.concatenate(([0.0], np.cumsum(durations)[:-1])).tolist() if len(durations) else []
         self._lengths = durations.tolist()
         self.duration = float(np.sum(durations))
         self.coefficients, self.durations = coefficients, durations
-        self.start: Array = rest.copy() if not self._starts else coefficients[0, :, 0].copy()
-        self.end: Array = rest.copy() if not self._starts else self._at(len(durations) - 1, self._lengths[-1])
+        self.start: FloatArray = rest.copy() if not self._starts else coefficients[0, :, 0].copy()
+        self.end: FloatArray = (
+            rest.copy() if not self._starts else self._at(len(durations) - 1, self._lengths[-1])
+        )
 
-    def _at(self, segment: int, t: float) -> Array:
+    def _at(self, segment: int, t: float) -> FloatArray:
         t2 = t * t
         powers = np.array((1.0, t, t2, t2 * t, t2 * t2, t2 * t2 * t))
-        value: Array = np.dot(powers, self._c[segment])  # half the time of @ on arrays this small
+        value: FloatArray = np.dot(powers, self._c[segment])  # half the time of @ on arrays this small
         return value
 
-    def position(self, s: float) -> Array:
+    def position(self, s: float) -> FloatArray:
         """Position (n,) at path time s [s]."""
         if s <= 0.0:
             return self.start
@@ -68,7 +70,7 @@ class Path:
         return Motion(powers @ c, once @ c, twice @ c)
 
 
-def quintic(before: Motion, after: Motion, duration: float) -> Array:
+def quintic(before: Motion, after: Motion, duration: float) -> FloatArray:
     """Coefficients (1, n, 6) of the polynomial that leads from one motion to another in `duration` [s]."""
     T = duration
     q0, v0, a0 = before

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.path import Motion
 
 _TINY = 1e-12
@@ -23,7 +23,7 @@ class PathSpeed:
     full speed.
     """
 
-    def __init__(self, dynamics: Any, acceleration_max: Array, stop_time: float, dt: float) -> None:
+    def __init__(self, dynamics: Any, acceleration_max: FloatArray, stop_time: float, dt: float) -> None:
         self.dynamics = dynamics
         self._limit = acceleration_max
         self._rate = 1.0 / stop_time
@@ -63,7 +63,7 @@ class PathSpeed:
         return (-self._rate, -self._rate) if braking else (0.0, 0.0)
 
 
-def _range(slope: Array, base: Array, limit: Array) -> tuple[float, float]:
+def _range(slope: FloatArray, base: FloatArray, limit: FloatArray) -> tuple[float, float]:
     """Interval of x with |base + slope x| <= limit for all components."""
     low, high = -math.inf, math.inf
     for k, b, bound in zip(slope.tolist(), base.tolist(), limit.tolist(), strict=True):

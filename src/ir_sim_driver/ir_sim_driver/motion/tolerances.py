@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.goal import JointTolerance
 
 
@@ -15,8 +15,8 @@ from ir_sim_driver.motion.goal import JointTolerance
 class Tolerances:
     """Largest errors (n,) of position [rad] and speed [rad/s]; infinite where unbounded."""
 
-    position: Array
-    velocity: Array
+    position: FloatArray
+    velocity: FloatArray
     has_velocity: bool
 
     @classmethod
@@ -32,16 +32,16 @@ class Tolerances:
                 velocity[j] = tolerance.velocity
         return cls(position, velocity, bool(np.isfinite(velocity).any()))
 
-    def broken_position(self, joint_names: Sequence[str], error: Array) -> str:
+    def broken_position(self, joint_names: Sequence[str], error: FloatArray) -> str:
         """Sentence about the worst position error (n,) [rad]; "" when all are within."""
         return _worst(joint_names, error, self.position, "position", "rad")
 
-    def broken_velocity(self, joint_names: Sequence[str], error: Array) -> str:
+    def broken_velocity(self, joint_names: Sequence[str], error: FloatArray) -> str:
         """Sentence about the worst speed error (n,) [rad/s]; "" when all are within."""
         return _worst(joint_names, error, self.velocity, "velocity", "rad/s") if self.has_velocity else ""
 
 
-def _worst(names: Sequence[str], error: Array, bound: Array, what: str, unit: str) -> str:
+def _worst(names: Sequence[str], error: FloatArray, bound: FloatArray, what: str, unit: str) -> str:
     size = np.abs(error)
     if (size <= bound).all():
         return ""

@@ -7,9 +7,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from ir_kernels.chain import Chain
 
-from ir_sim_driver.arrays import Array
+from ir_kernels.chain import Chain
+from ir_msgs_py.arrays import FloatArray
 
 EXACT_FROM = 1e-4
 """Bound [m] below which the exact deviation is not worth its time."""
@@ -18,37 +18,38 @@ EXACT_FROM = 1e-4
 class ToolPoint:
     """The tcp (4, 4 in the last link's frame) of `robot` standing at `base_pose` (4, 4)."""
 
-    def __init__(self, robot: Any, base_pose: Array, tcp: Array) -> None:
+    def __init__(self, robot: Any, base_pose: FloatArray, tcp: FloatArray) -> None:
         self.chain = Chain(robot, base_pose, tcp)
         arms = np.linalg.norm(np.array(robot.joint_origin)[1:, :3, 3], axis=1)
         lengths = np.concatenate((arms, [np.linalg.norm(tcp[:3, 3])]))
-        self._reach: Array = np.cumsum(lengths[::-1])[::-1].copy()  # (n,) farthest the tcp gets from axis i
+        # (n,) farthest the tcp gets from axis i
+        self._reach: FloatArray = np.cumsum(lengths[::-1])[::-1].copy()
 
-    def position(self, q: Array) -> Array:
+    def position(self, q: FloatArray) -> FloatArray:
         """Position (3,) [m] in the world at q (n,)."""
-        position: Array = self.chain.tcp_poses(q[None])[0, :3, 3]
+        position: FloatArray = self.chain.tcp_poses(q[None])[0, :3, 3]
         return position
 
-    def positions(self, q: Array) -> Array:
+    def positions(self, q: FloatArray) -> FloatArray:
         """Positions (N, 3) at q (N, n)."""
-        positions: Array = self.chain.tcp_poses(q)[:, :3, 3]
+        positions: FloatArray = self.chain.tcp_poses(q)[:, :3, 3]
         return positions
 
-    def bound(self, error: Array) -> float:
+    def bound(self, error: FloatArray) -> float:
         """Upper bound [m] of the tool's deviation when the joints are off by error (n,)."""
         return float(self._reach @ np.abs(error))
 
-    def quiet_bound(self, tolerance: Array) -> float:
+    def quiet_bound(self, tolerance: FloatArray) -> float:
         """Bound [m] below which no joint can be off by more than its tolerance (n,)."""
         return float((self._reach * tolerance).min())
 
-    def deviation(self, commanded: Array, q: Array) -> float:
+    def deviation(self, commanded: FloatArray, q: FloatArray) -> float:
         """Distance [m] of the tcp at q from that at `commanded` (n,)."""
         both = self.positions(np.array((commanded, q)))
         return float(np.linalg.norm(both[0] - both[1]))
 
-    def speeds(self, q: Array, qd: Array) -> Array:
+    def speeds(self, q: FloatArray, qd: FloatArray) -> FloatArray:
         """Speeds (N,) [m/s] of the tcp at q, qd (N, n)."""
         linear = self.chain.jacobian(q)[:, :3]
-        speeds: Array = np.linalg.norm(np.einsum("kij,kj->ki", linear, qd), axis=1)
+        speeds: FloatArray = np.linalg.norm(np.einsum("kij,kj->ki", linear, qd), axis=1)
         return speeds

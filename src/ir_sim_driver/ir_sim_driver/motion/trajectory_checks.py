@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
+
 from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import JointNamesError, TrajectoryError
 from ir_msgs_py.ros.conversions import (
     duration_to_msg,
@@ -13,8 +14,6 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
     trajectory_from_msg,
 )
-
-from ir_sim_driver.arrays import Array
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.executor import Following
 from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal
@@ -54,7 +53,7 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
     )
 
 
-def fill_joint_state(msg: Any, stamp_ns: int, q: Array, qd: Array, torque: Array) -> None:
+def fill_joint_state(msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, torque: FloatArray) -> None:
     """Write a state into a message that is used again and again."""
     msg.header.stamp.sec, msg.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
     msg.position = float_array(q)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from rclpy.node import Node
+
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.transitions import PREFIX
-from rclpy.node import Node
-
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings

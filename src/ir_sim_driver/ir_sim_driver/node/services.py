@@ -10,11 +10,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.ros.conversions import plc_inputs_to_msg, power_mode_to_msg, status_to_msg
 from ir_msgs_py.status import Status, StatusCode
-
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import DriverError, RequestRefusedError

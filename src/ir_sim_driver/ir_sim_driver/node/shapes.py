@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 
 _SHORTEST = 1e-6  # m; a cylinder of no length is no marker
 
@@ -17,14 +17,14 @@ class Shape(NamedTuple):
     its axis z.
     """
 
-    ends: Array
+    ends: FloatArray
     radius: float
     length: float
-    centre: Array
-    quaternion: Array
+    centre: FloatArray
+    quaternion: FloatArray
 
 
-def shapes_of(capsules: Sequence[Any], link_poses: Array) -> list[Shape]:
+def shapes_of(capsules: Sequence[Any], link_poses: FloatArray) -> list[Shape]:
     """Shapes of capsules on links that stand at link_poses (n+1, 4, 4)."""
     shapes = []
     for capsule in capsules:
@@ -44,7 +44,7 @@ def shapes_of(capsules: Sequence[Any], link_poses: Array) -> list[Shape]:
     return shapes
 
 
-def turn_z_to(direction: Array, length: float) -> Array:
+def turn_z_to(direction: FloatArray, length: float) -> FloatArray:
     """Quaternion xyzw (4,) of the shortest turn of +z into a direction (3,) of that length."""
     if length < _SHORTEST:
         return np.array((0.0, 0.0, 0.0, 1.0))
@@ -52,5 +52,5 @@ def turn_z_to(direction: Array, length: float) -> Array:
     if z < -1.0 + 1e-9:
         return np.array((1.0, 0.0, 0.0, 0.0))
     quaternion = np.array((-y, x, 0.0, 1.0 + z))
-    unit: Array = quaternion / np.linalg.norm(quaternion)
+    unit: FloatArray = quaternion / np.linalg.norm(quaternion)
     return unit

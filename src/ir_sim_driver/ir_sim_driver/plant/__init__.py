@@ -1,4 +1,4 @@
-"""The robot that is controlled: a port with its backends, drives, what the flange carries, the mains meter."""
+"""The robot that is controlled: a port with its backends, drives, what the flange carries, mains meter."""
 
 from ir_sim_driver.plant.backend import STANDING, Backend, Work
 from ir_sim_driver.plant.control import ControlSettings

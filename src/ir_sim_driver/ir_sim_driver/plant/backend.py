@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 
 STANDING = 1e-3
 """Speed [rad/s] below which a joint stands."""
@@ -20,8 +20,8 @@ class Work(NamedTuple):
     the joint.
     """
 
-    speed: Array
-    torque: Array
+    speed: FloatArray
+    torque: FloatArray
 
 
 class Backend(Protocol):
@@ -31,11 +31,11 @@ class Backend(Protocol):
     disturbance (n,) or None: outside torque [Nm] that acts in every step until it is changed.
     """
 
-    q: Array
-    disturbance: Array | None
+    q: FloatArray
+    disturbance: FloatArray | None
 
     @property
-    def qd(self) -> Array:
+    def qd(self) -> FloatArray:
         """Present speed (n,) [rad/s]."""
 
     @property
@@ -43,16 +43,16 @@ class Backend(Protocol):
         """Whether no joint moves faster than STANDING."""
 
     @property
-    def torque(self) -> Array:
+    def torque(self) -> FloatArray:
         """Motor torque (n,) [Nm] of the last step."""
 
-    def reset(self, q: Array) -> None:
+    def reset(self, q: FloatArray) -> None:
         """Stand still at q (n,), commanded to stay there."""
 
     def set_load(self, loads: Sequence[Any]) -> None:
         """Carry these loads (ir_description Load, in the last link's frame) from now on."""
 
-    def track(self, q_next: Array) -> None:
+    def track(self, q_next: FloatArray) -> None:
         """Make a step of dt: the motors follow the command, which is q_next (n,) at the end of the step."""
 
     def brake(self) -> None:

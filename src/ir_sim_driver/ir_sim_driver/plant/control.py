@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.settings import check_settings, setting
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.settings import check_settings, setting
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,15 @@ class CommandFollower:
         self._kp = settings.natural_frequency**2
         self._kd = 2.0 * settings.damping * settings.natural_frequency
 
-    def reset(self, q: Array) -> None:
+    def reset(self, q: FloatArray) -> None:
         """Start over with a command that stands at q."""
-        self.command: Array = q.copy()
-        self._speed: Array = np.zeros(len(q))
+        self.command: FloatArray = q.copy()
+        self._speed: FloatArray = np.zeros(len(q))
 
-    def acceleration(self, q_next: Array, q: Array, qd: Array) -> Array:
+    def acceleration(self, q_next: FloatArray, q: FloatArray, qd: FloatArray) -> FloatArray:
         """Acceleration (n,) for the step that ends with the command q_next; the robot is at q, qd now."""
         speed = (q_next - self.command) * self._per_dt
-        wanted: Array = (
+        wanted: FloatArray = (
             (speed - self._speed) * self._per_dt
             + self._kd * (self._speed - qd)
             + self._kp * (self.command - q)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 
 FRICTION_SMOOTHING = 1e-3
 """Speed [rad/s] over which Coulomb friction changes its sign: 1/1000 of working speed, and zero at rest, so
@@ -26,9 +26,9 @@ class Drivetrain:
     """
 
     def __init__(self, robot: Any, smoothing: float = FRICTION_SMOOTHING) -> None:
-        self.rotor_inertia: Array = np.array(robot.reflected_inertia)
-        self._viscous: Array = np.array(robot.friction_viscous)
-        self._coulomb: Array = np.array(robot.friction_coulomb)
+        self.rotor_inertia: FloatArray = np.array(robot.reflected_inertia)
+        self._viscous: FloatArray = np.array(robot.friction_viscous)
+        self._coulomb: FloatArray = np.array(robot.friction_coulomb)
         self._per_smoothing = 1.0 / smoothing
         c = robot.counterbalance
         self._gas_joint = -1 if c is None else c.joint
@@ -51,11 +51,11 @@ class Drivetrain:
         )
         self._speeds: list[list[float]] = np.array(robot.envelope_speed).tolist()
         self._torques: list[list[float]] = np.array(robot.envelope_torque).tolist()
-        self._least: Array = np.array(robot.envelope_torque)[:, -1]
+        self._least: FloatArray = np.array(robot.envelope_torque)[:, -1]
 
-    def resistance(self, q: Array, qd: Array) -> Array:
+    def resistance(self, q: FloatArray, qd: FloatArray) -> FloatArray:
         """Friction less counterbalance (n,) [Nm]: what the motor has to add to H qdd + h."""
-        torque: Array = self._viscous * qd + self._coulomb * np.tanh(qd * self._per_smoothing)
+        torque: FloatArray = self._viscous * qd + self._coulomb * np.tanh(qd * self._per_smoothing)
         if self._gas_spring is not None:
             torque[self._gas_joint] -= self.counterbalance_torque(float(q[self._gas_joint]))
         return torque
@@ -72,7 +72,7 @@ class Drivetrain:
         force: float = area * pressure * (gas_volume / volume) ** exponent
         return force * (pz * (bx - px) - px * (bz - pz)) / length
 
-    def limited(self, torque: Array, qd: Array) -> tuple[Array, bool]:
+    def limited(self, torque: FloatArray, qd: FloatArray) -> tuple[FloatArray, bool]:
         """Torque (n,) within the envelope at the speeds qd, and whether anything was cut off."""
         size = np.abs(torque)
         critical = (size > self._least).nonzero()[0].tolist()
@@ -87,7 +87,7 @@ class Drivetrain:
                 result[j] = limit if torque[j] > 0.0 else -limit
         return result, result is not torque
 
-    def limit(self, qd: Array) -> Array:
+    def limit(self, qd: FloatArray) -> FloatArray:
         """Torque (n,) [Nm] available at the speeds |qd|."""
         return np.array([self._limit_of(j, speed) for j, speed in enumerate(np.abs(qd).tolist())])
 

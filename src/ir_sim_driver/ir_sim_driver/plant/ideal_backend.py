@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from ir_kernels.dynamics import DynamicsModel
 
-from ir_sim_driver.arrays import Array
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.plant.backend import STANDING, Work
 
 BRAKE_FACTOR = 2.0
@@ -21,25 +21,25 @@ BRAKE_FACTOR = 2.0
 class IdealBackend:
     """Implements Backend without physics, for `robot` standing at `base_pose` (4, 4)."""
 
-    def __init__(self, robot: Any, dt: float, base_pose: Array | None = None) -> None:
+    def __init__(self, robot: Any, dt: float, base_pose: FloatArray | None = None) -> None:
         self._robot, self._dt = robot, dt
         self._base_pose = np.eye(4) if base_pose is None else base_pose
-        self._brake_step: Array = BRAKE_FACTOR * dt * np.array(robot.acceleration_max)
-        self.disturbance: Array | None = None
+        self._brake_step: FloatArray = BRAKE_FACTOR * dt * np.array(robot.acceleration_max)
+        self.disturbance: FloatArray | None = None
         n = len(robot.joint_names)
         self._done = Work(np.empty((0, n)), np.empty((0, n)))
-        self._last: Array = np.zeros(n)
+        self._last: FloatArray = np.zeros(n)
         self._dynamics = DynamicsModel(robot, (), self._base_pose)
-        self._path: list[Array] = []  # two positions more than unsettled steps
+        self._path: list[FloatArray] = []  # two positions more than unsettled steps
         self._driven: list[bool] = []
         self.reset(np.array(robot.machine_home))
 
-    def reset(self, q: Array) -> None:
+    def reset(self, q: FloatArray) -> None:
         """Stand still at q."""
         self._settle()
-        self.q: Array = np.array(q, dtype=np.float64)
-        self._before: Array = self.q  # one and two steps ago
-        self._earlier: Array = self.q
+        self.q: FloatArray = np.array(q, dtype=np.float64)
+        self._before: FloatArray = self.q  # one and two steps ago
+        self._earlier: FloatArray = self.q
         self._path = [self.q, self.q]
 
     def set_load(self, loads: Sequence[Any]) -> None:
@@ -48,7 +48,7 @@ class IdealBackend:
         self._dynamics = DynamicsModel(self._robot, tuple(loads), self._base_pose)
 
     @property
-    def qd(self) -> Array:
+    def qd(self) -> FloatArray:
         """Speed now: the last difference and half of its change."""
         last, change = self.q - self._before, self.q - 2.0 * self._before + self._earlier
         return (last + 0.5 * change) / self._dt
@@ -60,7 +60,7 @@ class IdealBackend:
             return True
         return bool(np.abs(self.q - self._before).max() < STANDING * self._dt)
 
-    def track(self, q_next: Array) -> None:
+    def track(self, q_next: FloatArray) -> None:
         """Be at q_next after the step."""
         self._go(q_next, True)
 
@@ -75,7 +75,7 @@ class IdealBackend:
         self._go(self.q, False)
 
     @property
-    def torque(self) -> Array:
+    def torque(self) -> FloatArray:
         """Motor torque of the last step."""
         self._settle()
         return self._last
@@ -87,7 +87,7 @@ class IdealBackend:
         self._done = Work(empty, empty)
         return done
 
-    def _go(self, q_next: Array, driven: bool) -> None:
+    def _go(self, q_next: FloatArray, driven: bool) -> None:
         self._earlier, self._before, self.q = self._before, self.q, q_next
         self._path.append(q_next)
         self._driven.append(driven)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from ir_description.load import Load
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
-
-from ir_sim_driver.arrays import Array
 from ir_sim_driver.errors import RequestRefusedError
 
 CUSTOM = "custom"
@@ -63,7 +63,7 @@ def carried(cell: Any, text: str) -> Carried:
 
 
 def custom_load(
-    cell: Any, mass: float, com: Array, inertia: Array, always: float, drive_bus: float
+    cell: Any, mass: float, com: FloatArray, inertia: FloatArray, always: float, drive_bus: float
 ) -> Carried:
     """A load from numbers [kg, m, kg m^2 (ixx ixy ixz iyy iyz izz or none), W]. Raises
     RequestRefusedError.

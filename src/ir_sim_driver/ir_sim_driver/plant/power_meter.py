@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
-from ir_msgs_py.power import Mode
 
-from ir_sim_driver.arrays import Array
+from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.power import Mode
 from ir_sim_driver.plant.backend import Work
 
 
@@ -51,12 +51,12 @@ class MeterReading:
     energy: float
     burnt_energy: float
     base_energy: float
-    axis_energy: Array
+    axis_energy: FloatArray
     capacitor_energy: float
     base_power: float
     bus_voltage: float
-    joint_power: Array
-    joint_torque: Array
+    joint_power: FloatArray
+    joint_torque: FloatArray
 
 
 class PowerMeter:
@@ -64,7 +64,7 @@ class PowerMeter:
 
     def __init__(self, robot: Any, data: Any, dt: float, regeneration: Regeneration = "shared") -> None:
         self._dt = dt
-        self._copper: Array = np.array(robot.copper_loss) / np.array(robot.gear_ratio) ** 2
+        self._copper: FloatArray = np.array(robot.copper_loss) / np.array(robot.gear_ratio) ** 2
         self._bus = DcBusParameters(data.dc_link_capacity_energy, regeneration)
         self._voltage, self._capacitance = data.dc_link.voltage, data.dc_link.capacitance
         n = len(robot.joint_names)
@@ -72,9 +72,9 @@ class PowerMeter:
         self._steps = 0
         self._stored = 0.0
         self._energy = self._burnt = self._base_energy = 0.0
-        self._axes: Array = np.zeros(n)
-        self._power: Array = np.zeros(n)
-        self._torque: Array = np.zeros(n)
+        self._axes: FloatArray = np.zeros(n)
+        self._power: FloatArray = np.zeros(n)
+        self._torque: FloatArray = np.zeros(n)
         self._last_base = 0.0
 
     def add(self, base_power: float) -> None:

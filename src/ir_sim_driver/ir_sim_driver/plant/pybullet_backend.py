@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_sim_driver.arrays import Array
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import BackendError
 from ir_sim_driver.plant.backend import STANDING, Work
 from ir_sim_driver.plant.control import CommandFollower, ControlSettings
@@ -40,27 +40,27 @@ class PyBulletBackend:
         robot: Any,
         dt: float,
         urdf: Callable[[Any, Any], str],
-        base_pose: Array | None = None,
+        base_pose: FloatArray | None = None,
         control: ControlSettings | None = None,
     ) -> None:
         # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no base pose
-        self._base: Array = np.eye(4) if base_pose is None else np.array(base_pose)
+        self._base: FloatArray = np.eye(4) if base_pose is None else np.array(base_pose)
         self._gravity = (self._base[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
         self._bullet, self._client = _pybullet(), -1
         self._robot, self._dt, self._urdf = robot, dt, urdf
         self._n = len(robot.joint_names)
         self._drives = Drivetrain(robot)
         self._follower = CommandFollower(dt, control)
-        self._brake_torque: Array = BRAKE_FACTOR * np.array(robot.envelope_torque)[:, 0]
+        self._brake_torque: FloatArray = BRAKE_FACTOR * np.array(robot.envelope_torque)[:, 0]
         self._zeros = [0.0] * self._n
-        self._still: Array = np.zeros(self._n)
-        self.disturbance: Array | None = None
+        self._still: FloatArray = np.zeros(self._n)
+        self.disturbance: FloatArray | None = None
         self.torque = self._still
-        self.q: Array = np.array(robot.machine_home, dtype=np.float64)
+        self.q: FloatArray = np.array(robot.machine_home, dtype=np.float64)
         self.qd = self._still
-        self._speed: Array = self._still
-        self._speeds: list[Array] = []
-        self._torques: list[Array] = []
+        self._speed: FloatArray = self._still
+        self._speeds: list[FloatArray] = []
+        self._torques: list[FloatArray] = []
         self._loads: tuple[Any, ...] = ()
         self._stale = False  # whether Bullet's state is older than ours
         self.set_load(())
@@ -75,7 +75,7 @@ class PyBulletBackend:
         """Whether the robot stands."""
         return all(-STANDING < x < STANDING for x in self.qd.tolist())
 
-    def reset(self, q: Array) -> None:
+    def reset(self, q: FloatArray) -> None:
         """Stand still at q; starts the physics server again when it is gone."""
         if not self._bullet.isConnected(self._client):
             self.set_load(self._loads)
@@ -115,7 +115,7 @@ class PyBulletBackend:
             )
         self._write_state()
 
-    def track(self, q_next: Array) -> None:
+    def track(self, q_next: FloatArray) -> None:
         """Follow the command with the torque that the envelope allows."""
         if self._stale:
             self._write_state()
@@ -161,16 +161,16 @@ class PyBulletBackend:
         self._torques.clear()
         return work
 
-    def mass_matrix(self) -> Array:
+    def mass_matrix(self) -> FloatArray:
         """H (n, n) at the present state, without rotor inertia."""
         H = self._call(self._bullet.calculateMassMatrix, self._body, self.q.tolist())
         return np.array(H, dtype=np.float64)
 
-    def bias(self) -> Array:
+    def bias(self) -> FloatArray:
         """h = C qd + g (n,) at the present state."""
         return self._inverse_dynamics(self._still)
 
-    def link_com_position(self, link: int) -> Array:
+    def link_com_position(self, link: int) -> FloatArray:
         """Centre of mass (3,) of link 1..n in the world [m].
 
         Bullet keeps this frame in double precision, the link frame itself only in single.
@@ -178,10 +178,10 @@ class PyBulletBackend:
         state = self._bullet.getLinkState(
             self._body, self._joints[link - 1], computeForwardKinematics=True, physicsClientId=self._client
         )
-        position: Array = self._base[:3, :3] @ np.array(state[0]) + self._base[:3, 3]
+        position: FloatArray = self._base[:3, :3] @ np.array(state[0]) + self._base[:3, 3]
         return position
 
-    def _driven(self, torque: Array, resistance: Array) -> tuple[Array, Array]:
+    def _driven(self, torque: FloatArray, resistance: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Torque on the links and acceleration under motor torque and disturbance."""
         H, h = self.mass_matrix(), self.bias()
         outer = torque - h - resistance
@@ -190,7 +190,7 @@ class PyBulletBackend:
         qdd = np.asarray(np.linalg.solve(H + np.diag(self._drives.rotor_inertia), outer), dtype=np.float64)
         return H @ qdd + h, qdd
 
-    def _inverse_dynamics(self, qdd: Array) -> Array:
+    def _inverse_dynamics(self, qdd: FloatArray) -> FloatArray:
         result = self._call(
             self._bullet.calculateInverseDynamics,
             self._body,
@@ -206,7 +206,7 @@ class PyBulletBackend:
         except self._bullet.error as error:
             raise BackendError(f"PyBullet failed: {error}") from error
 
-    def _advance(self, links: Array) -> None:
+    def _advance(self, links: FloatArray) -> None:
         bullet, call = self._bullet, self._call
         call(
             bullet.setJointMotorControlArray,

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
 from ir_msgs_py.power import Mode
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_sim_driver.notices import Level, Notices
 
 TOPIC, MODBUS, SERVICE = "topic", "modbus", "service"

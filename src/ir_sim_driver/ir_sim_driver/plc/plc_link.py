@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.status import StatusCode
-
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import RequestRefusedError

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from ir_msgs_py.power import Mode
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_sim_driver.errors import SettingsError
 
 _WEEK = 604_800.0
