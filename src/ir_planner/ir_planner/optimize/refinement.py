@@ -10,7 +10,7 @@ comes too near gets more room and the descent goes on from there.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
