@@ -13,17 +13,9 @@ from ir_description import load_power_data
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.errors import PathError
 from ir_recorder.format.contents import OWN_FACTS
-from ir_recorder.report.bars import joule_bars
+from ir_recorder.report.charts import CHARTS
 from ir_recorder.report.data import page_data
-from ir_recorder.report.tables import (
-    check_table,
-    fact_table,
-    mode_table,
-    problem_list,
-    station_table,
-    step_table,
-    table_2,
-)
+from ir_recorder.report.tables import check_table
 from ir_recorder.report.words import joules, millimetres, number, percent, seconds, text, watts
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
@@ -56,19 +48,13 @@ def report_html(analysis: Analysis, checks: Sequence[Finding], tolerances: Toler
         "subtitle": _subtitle(analysis),
         "verdict": _verdict(checks),
         "notes": _notes(analysis),
-        "problems": problem_list(analysis.problems),
         "tiles": _tiles(analysis, checks),
-        "bars": joule_bars(analysis.movements),
-        "steps": step_table(analysis.steps),
         "capacity": text(joules(load_power_data().dc_link_capacity_energy)),
-        "stations": station_table(analysis),
-        "modes": mode_table(analysis),
-        "table2": table_2(analysis),
         "checks": check_table(checks),
-        "facts": fact_table(analysis),
         "style": _asset("page.css"),
         "data": page_data(analysis, bounds.safety_distance),
         "script": "\n".join(_asset(script) for script in SCRIPTS),
+        **{name: chart(analysis) for name, chart in CHARTS.items()},
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _asset("page.html"))
 

@@ -1,0 +1,25 @@
+"""Charts and tables that the page shows of an analysis: a new one is a function, and a line here.
+
+The page (assets/page.html) holds the place of each as {{name}}.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ir_recorder.analysis import Analysis
+from ir_recorder.report.bars import joule_bars
+from ir_recorder.report.tables import fact_table, mode_table, problem_list, station_table, step_table, table_2
+
+Chart = Callable[[Analysis], str]
+"""HTML or SVG of an analysis, whatever is missing in it; texts of the recording are escaped."""
+
+CHARTS: Mapping[str, Chart] = {
+    "problems": lambda analysis: problem_list(analysis.problems),
+    "bars": lambda analysis: joule_bars(analysis.movements),
+    "steps": lambda analysis: step_table(analysis.steps),
+    "stations": station_table,
+    "modes": mode_table,
+    "table2": table_2,
+    "facts": fact_table,
+}
