@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -140,11 +141,11 @@ def tracked_names() -> frozenset[str]:
 
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name not in HISTORY], ids=name_of)
 def test_files_that_are_named_exist(page: Path) -> None:
-    """A path from the root or from the page; a bare `name.py` anywhere; nothing in out/."""
+    """A path from the root or from the page; a bare `name.py` anywhere. NAME is the newcomer's, out/ is made."""
     missing = []
     for code in code_spans(page):
         name = code.split()[0]
-        if not FILE.match(name) or name.startswith(("out/", ".venv/", "ros_ws/install")):
+        if not FILE.match(name) or "NAME" in name or name.startswith(("out/", ".venv/", "ros_ws/install")):
             continue
         top = name.partition("/")[0]
         if "/" not in name:
@@ -187,3 +188,13 @@ def test_the_architecture_shows_every_room_with_its_first_line() -> None:
     for package, section in sections:
         shown = dict(re.findall(r"^\| `(\w+)` \| (.+?) \|", section, re.MULTILINE))
         assert shown == rooms_of(package), package
+
+
+def test_the_citation_names_version_and_licence_of_the_packages() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    setups = [path.read_text("utf-8") for path in (ROOT / "src").glob("*/setup.py")]
+    assert setups
+    for setup in setups:
+        assert f'version="{citation["version"]}"' in setup
+        assert f'license="{citation["license"]}"' in setup
