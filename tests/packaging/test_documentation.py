@@ -141,7 +141,7 @@ def tracked_names() -> frozenset[str]:
 
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name not in HISTORY], ids=name_of)
 def test_files_that_are_named_exist(page: Path) -> None:
-    """A path from the root or from the page; a bare `name.py` anywhere. NAME is the newcomer's, out/ is made."""
+    """A path from the root or from the page; a bare `name.py` anywhere; not NAME, not out/."""
     missing = []
     for code in code_spans(page):
         name = code.split()[0]
