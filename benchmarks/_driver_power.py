@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell, load_power_data
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.driver import Driver

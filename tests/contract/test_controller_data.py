@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ir_description import PowerData, load_power_data
-from ir_msgs_py.power import REST_MODES, Mode
+from ir_msgs_py.modes import REST_MODES, Mode
 from ir_planner import Planner
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from ir_description import Load, load_power_data
 from ir_kernels.chain import Chain
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.plant.drivetrain import Drivetrain

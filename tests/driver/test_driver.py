@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.driver import NO_GOAL, QUEUE_MAX, Driver
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError

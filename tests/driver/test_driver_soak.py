@@ -7,7 +7,7 @@ import resource
 import numpy as np
 import pytest
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.driver import Driver
 
 HOUR = 360_000  # ticks of 10 ms

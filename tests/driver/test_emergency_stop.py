@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.diagnostics import report
 from ir_sim_driver.errors import BackendError, RequestRefusedError
 from ir_sim_driver.motion.goal import ErrorCode

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode
-from ir_msgs_py.power import Mode
 from ir_sim_driver.controller.pause import best_mode, energy_of
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import RequestRefusedError

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
-from ir_msgs_py.power import Mode
 from ir_sim_driver.notices import Notices
 from ir_sim_driver.plc.inputs import Plc, PlcSettings
 

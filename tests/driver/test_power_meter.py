@@ -7,7 +7,7 @@ import pytest
 
 from ir_description import load_power_data
 from ir_kernels.power import DcBusParameters, dc_bus
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant.backend import Work
 from ir_sim_driver.plant.power_meter import BasePower, PowerMeter
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.power.power_modes import NO_WISH, PowerModes, TransitionSettings, Wish
 

@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 
 from ir_msgs_py import options, plc, power, program, report, stations
 from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
+from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import conversions
 from ir_msgs_py.status import Status, StatusCode
@@ -119,11 +120,11 @@ pauses = st.builds(
     kind=st.just("pause"),
     from_station=texts,
     duration=lengths,
-    power_mode=st.sampled_from(["", *power.REST_MODES]),
+    power_mode=st.sampled_from(["", *REST_MODES]),
 )
 modes = st.builds(
     power.PowerMode,
-    mode=st.sampled_from(power.Mode),
+    mode=st.sampled_from(Mode),
     pe_mode_id=st.integers(0, 255),
     power=numbers,
     time_min_pause=lengths,
@@ -137,8 +138,8 @@ modes = st.builds(
 power_states = st.builds(
     power.PowerState,
     stamp_ns=stamps,
-    mode=st.sampled_from(power.Mode),
-    target_mode=st.sampled_from(power.Mode),
+    mode=st.sampled_from(Mode),
+    target_mode=st.sampled_from(Mode),
     time_to_target=lengths,
     power=numbers,
     energy=numbers,
@@ -401,6 +402,6 @@ def test_the_defaults_of_options_are_those_of_the_message():
 def test_the_mode_and_code_numbers_are_those_of_the_messages():
     from ir_msgs.msg import PlcInputs, PowerMode, Status
 
-    assert all(getattr(PowerMode, mode.name) == mode for mode in power.Mode)
+    assert all(getattr(PowerMode, mode.name) == mode for mode in Mode)
     assert all(getattr(Status, code.name) == code for code in StatusCode)
     assert all(getattr(PlcInputs, mode.name) == mode for mode in plc.OperatingMode)

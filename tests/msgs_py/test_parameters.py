@@ -42,6 +42,13 @@ def test_the_defaults_are_those_of_the_class_and_described(node):
     assert node.describe_parameter("search.address").read_only
 
 
+def test_a_node_may_fix_all_settings_at_the_start(node):
+    parameters = Parameters(node, Search, read_only=True)
+    assert node.describe_parameter("speed").read_only
+    assert not node.set_parameters([Parameter("speed", value=1.5)])[0].successful
+    assert parameters.value == Search()
+
+
 def test_a_good_change_is_taken_and_told(node):
     told = []
     parameters = Parameters(node, Search, on_change=told.append)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_msgs_py import plc, power, program, report, stations
+from ir_msgs_py import modes, plc, power, program, report, stations
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
@@ -50,12 +50,12 @@ NAN = float("nan")
             lambda: report.PlanningInfo(start=np.zeros(2), start_names=("a",)),
             "start has 2 values for 1 joint names",
         ),
-        (lambda: power.checked_mode(7), "power mode is 7: known are 0 STAND_ON_MOTORS"),
+        (lambda: modes.checked_mode(7), "power mode is 7: known are 0 STAND_ON_MOTORS"),
         (
-            lambda: power.PowerMode(mode=power.Mode.MOVING, time_to_pause=-1.0),
+            lambda: power.PowerMode(mode=modes.Mode.MOVING, time_to_pause=-1.0),
             "time_to_pause of MOVING is -1 s",
         ),
-        (lambda: power.PowerMode(mode=power.Mode.MOVING, break_even=NAN), "break_even of MOVING is nan"),
+        (lambda: power.PowerMode(mode=modes.Mode.MOVING, break_even=NAN), "break_even of MOVING is nan"),
         (lambda: plc.Signal("", True), "name of a signal is ''"),
         (lambda: plc.Signal("a\nb", True), "1 to 256 printable characters"),
         (lambda: plc.Signal.parse("door=2"), 'signal "door=2" has level "2": known are 0, 1'),

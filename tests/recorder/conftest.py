@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 from ir_description import cell_from_yaml, load_power_data
 from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
 from ir_msgs.msg import ControllerState, PlannedMovement, PlcOutputs, PowerState, ProgramState
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary

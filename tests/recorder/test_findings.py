@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ir_msgs.msg import PlannedMovement
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, Tolerances, analyse, findings, read_recording
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_recorder import read_recording
 from ir_recorder.analysis.loads import LoadTimeline, after, load_timeline
 from ir_recorder.read.recording import TextEvent

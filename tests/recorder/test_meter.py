@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_recorder import read_recording
 from ir_recorder.analysis.meter import Meter
 

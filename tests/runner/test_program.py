@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

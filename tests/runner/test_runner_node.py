@@ -18,8 +18,8 @@ from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, ProgramState, Status
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes, SetLoad, SetPlcInput
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES
-from ir_msgs_py.power import Mode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import planned_movement_to_msg, power_mode_to_msg, trajectory_to_msg
@@ -27,9 +27,9 @@ from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.wake_on_lan import magic_packet
 from ir_program_runner.machines import Machines
 from ir_program_runner.node import ProgramRunnerNode
-from ir_program_runner.wake_on_lan import magic_packet
 
 MAC = "02:00:00:00:00:01"
 TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**7], np.zeros((2, 6)))

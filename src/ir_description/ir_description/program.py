@@ -12,11 +12,12 @@ from typing import Literal, get_args
 
 from ir_description.arrays import in_range
 from ir_description.errors import InvalidValueError, UnknownNameError
+from ir_msgs_py.modes import REST_MODES
 
 StepKind = Literal["STATION", "POSTURE", "PAUSE"]
 POSTURES = ("home", "park")
 AUTO = "AUTO"
-PAUSE_POWER_MODES = (AUTO, "STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
+PAUSE_POWER_MODES = (AUTO, *REST_MODES)
 PAUSE_MAX = 604_800.0
 """Longest pause or dwell [s]: a week."""
 

@@ -1,36 +1,15 @@
-"""Power modes of the robot, in the terms of PROFIenergy, and the reading of the mains meter."""
+"""What a power mode costs, in the terms of PROFIenergy, and the reading of the mains meter."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import IntEnum
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.checks import at_least, finite, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
-
-
-class Mode(IntEnum):
-    """Modes and the transitions between them; numbers of ir_msgs/PowerMode."""
-
-    STAND_ON_MOTORS = 0
-    MOVING = 1
-    STAND_ON_BRAKES = 2
-    BUS_POWER_OFF = 3
-    HIBERNATION = 4
-    TO_BRAKES = 10
-    FROM_BRAKES = 11
-    TO_BUS_POWER_OFF = 12
-    FROM_BUS_POWER_OFF = 13
-    TO_HIBERNATION = 14
-    FROM_HIBERNATION = 15
-    EMERGENCY_STOP = 20
-
-
-# modes that a pause can be spent in, shallow to deep; the names that people type
-REST_MODES = ("STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
+from ir_msgs_py.modes import Mode, checked_mode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,12 +75,3 @@ class PowerState:
             set_field(self, name, finite(getattr(self, name), name))
         set_field(self, "joint_power", read_only(self.joint_power, "joint_power", (None,)))
         set_field(self, "joint_torque", read_only(self.joint_torque, "joint_torque", (None,)))
-
-
-def checked_mode(number: int) -> Mode:
-    """Return the mode of the number; an unknown one lists the known."""
-    try:
-        return Mode(number)
-    except ValueError as error:
-        known = ", ".join(f"{mode.value} {mode.name}" for mode in Mode)
-        raise InvalidValueError(f"power mode is {number}: known are {known}") from error

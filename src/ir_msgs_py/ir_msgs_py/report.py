@@ -10,7 +10,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.checks import at_least, finite, not_nan, one_of, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.power import REST_MODES
+from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.trajectory import JointTrajectory
 
 

@@ -99,11 +99,11 @@ def check_settings(settings: Any) -> None:
         each.check(getattr(settings, each.name))
 
 
-def settings_table(settings_class: type[Any], prefix: str = "") -> str:
-    """Write the settings as a Markdown table for the documentation."""
+def settings_table(settings_class: type[Any], prefix: str = "", *, read_only: bool = False) -> str:
+    """Write the settings as a Markdown table for the documentation; read_only: all are fixed at the start."""
     rows = ["| Parameter | Default | Unit | Range | Meaning |", "|---|---|---|---|---|"]
     for each in describe(settings_class):
-        fixed = " Fixed at start." if each.read_only else ""
+        fixed = " Fixed at start." if read_only or each.read_only else ""
         default = str(each.default).lower() if isinstance(each.default, bool) else str(each.default)
         rows.append(
             f"| `{prefix}{each.name}` | {default} | {each.unit} | {each.bounds} | {each.sentence}{fixed} |"

@@ -1,4 +1,4 @@
-"""Times of the ways into and out of the power modes, and the shortest stay in each.
+"""Times into and out of the power modes, and the shortest stay in each.
 
 Planner, driver and program runner have one parameter for each, under the same name: PREFIX and the field's.
 """
@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.modes import Mode
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.settings import check_settings, setting
 
 PREFIX = "transitions."  # of the parameters

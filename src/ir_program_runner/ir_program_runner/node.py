@@ -35,6 +35,7 @@ from ir_msgs_py.ros.planner import Planner
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_program_runner.checks import check_program
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
@@ -44,7 +45,6 @@ from ir_program_runner.program import Program, ProgramResult
 from ir_program_runner.progress import Progress
 from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings
-from ir_program_runner.wake_on_lan import magic_packet, send_packet
 
 _KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SIGNALS = QoSProfile(depth=100)  # all signals of a cell may change at once

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
-from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.modes import READY, RESTS, Mode
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.transitions import TransitionTimes
@@ -27,12 +28,11 @@ from ir_program_runner.requests import (
 from ir_program_runner.settings import ProgramSettings
 
 Requests = Generator[Request, Outcome, Outcome]
-READY = (Mode.STAND_ON_MOTORS, Mode.MOVING)
 _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION)
 _AWAKE = (Mode.FROM_HIBERNATION, *READY, Mode.STAND_ON_BRAKES)
 _ROUNDING = 1e-6  # s; a plan may use the shortest pause exactly
 _LATE = 0.1  # s; a shorter delay is not reported: readings and answers take as long
-_BIT = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib", Mode.STAND_ON_BRAKES: "drives_off"}
+_BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
 
 
 class Pause:

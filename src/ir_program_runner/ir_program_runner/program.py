@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import Mode
 from ir_msgs_py.program import Event
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode

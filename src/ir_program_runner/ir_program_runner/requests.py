@@ -5,10 +5,12 @@ The program never waits, sends or looks at a clock itself: it yields a request a
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.program import Event
 from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
@@ -84,7 +86,7 @@ class AskModes:
 class WaitForMode:
     """Wait until the power mode is one of these; TIMED_OUT after `timeout` [s]."""
 
-    modes: tuple[Mode, ...]
+    modes: Collection[Mode]
     timeout: float
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 from ir_msgs_py.settings import check_settings, setting
+from ir_msgs_py.wake_on_lan import mac_bytes
 
 _HOUR = 3600.0
 
@@ -85,5 +85,4 @@ class LinkSettings:
 
     def __post_init__(self) -> None:
         check_settings(self)
-        if not re.fullmatch(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}", self.mac):
-            raise ValueError(f"mac is {self.mac[:80]!r}: it must be six hex bytes like 02:00:00:c4:02:10")
+        mac_bytes(self.mac)

@@ -20,8 +20,8 @@ from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.answers import ProgramPlan
 from ir_msgs_py.ros.client import Client
+from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_program_runner.settings import LinkSettings
-from ir_program_runner.wake_on_lan import magic_packet, send_packet
 
 from .outcome import Outcome, examine
 from .power_tour import PowerWatch, tour

@@ -20,13 +20,12 @@ from ir_msgs.msg import PowerState as PowerStateMsg
 from ir_msgs.srv import QueryModes
 from ir_msgs.srv import SetLoad as SetLoadSrv
 from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
-from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.ros.conversions import power_mode_from_msg, status_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
-_OFF_THE_NETWORK = (Mode.HIBERNATION, Mode.FROM_HIBERNATION)
 
 
 class Driver:
@@ -71,7 +70,7 @@ class Driver:
     @property
     def off_the_network(self) -> bool:
         """Whether the controller hibernates, so that it answers nothing."""
-        return self.mode in _OFF_THE_NETWORK
+        return self.mode in OFF_THE_NETWORK
 
     def state(self) -> Status:
         """Say whether the driver can be talked to."""

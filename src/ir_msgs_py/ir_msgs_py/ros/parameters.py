@@ -26,9 +26,9 @@ _INT64 = 2**63
 class Parameters(Generic[T]):
     """The parameters of one settings class on a node; `value` is what they say now.
 
-    prefix: put before each name ("search."). refuse: asked with the names to be changed, returns the reason
-    why not now ("" = go on), for changes that must wait until the robot stands. on_change: called with the
-    new settings.
+    prefix: put before each name ("search."). read_only: all are fixed at the start, also those that the class
+    lets change. refuse: asked with the names to be changed, returns the reason why not now ("" = go on), for
+    changes that must wait until the robot stands. on_change: called with the new settings.
 
     Raises ParameterError when a value that the node was started with is refused.
     """
@@ -39,13 +39,17 @@ class Parameters(Generic[T]):
         settings_class: type[T],
         *,
         prefix: str = "",
+        read_only: bool = False,
         refuse: Callable[[tuple[str, ...]], str] = lambda names: "",
         on_change: Callable[[T], None] = lambda settings: None,
     ) -> None:
         self._prefix = prefix
         self._refuse = refuse
         self._on_change = on_change
-        self._settings = {each.name: each for each in describe(settings_class)}
+        self._settings = {
+            each.name: replace(each, read_only=read_only or each.read_only)
+            for each in describe(settings_class)
+        }
         started_with = {each.name: self._declare(node, each) for each in self._settings.values()}
         self._value = settings_class(**started_with)
         self._check(started_with.items())

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.power import REST_MODES, Mode, PowerMode
+from ir_msgs_py.modes import REST_MODES, Mode
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.transitions import TransitionTimes
 

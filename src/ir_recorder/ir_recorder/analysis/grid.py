@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_recorder.read.recording import JointSeries, PowerSeries
 
 PERIOD_NS = 2_000_000  # /joint_states come at 500 Hz by contract

@@ -9,8 +9,8 @@ import numpy as np
 
 from ir_description import Cell, PowerData
 from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
-from ir_msgs_py.power import REST_MODES, Mode
 from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.meter import Meter
 from ir_recorder.read.recording import PowerSeries, Recording

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.report import MovementKind
 from ir_recorder.analysis.results import Share, StationUse, StepResult
 from ir_recorder.read.recording import PowerSeries

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.notices import Level
 

@@ -11,8 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode
-from ir_msgs_py.power import Mode, PowerMode
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc.inputs import Plc

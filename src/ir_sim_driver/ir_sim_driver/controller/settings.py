@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from ir_kernels.power import REGENERATIONS, Regeneration
+from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.plc import OperatingMode
-from ir_msgs_py.power import REST_MODES, Mode
 from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.plant.control import ControlSettings

@@ -14,8 +14,8 @@ import numpy as np
 
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
-from ir_msgs_py.power import Mode
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.emergency import EmergencyStop
 from ir_sim_driver.controller.pause import Pauses

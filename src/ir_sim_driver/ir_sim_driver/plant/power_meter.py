@@ -15,7 +15,7 @@ import numpy as np
 
 from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant.backend import Work
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
-from ir_msgs_py.power import Mode
 from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.notices import Level, Notices
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import PlcOutputs
-from ir_msgs_py.power import Mode
 
 COILS = (
     "ab",

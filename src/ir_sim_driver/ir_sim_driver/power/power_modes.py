@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ir_msgs_py.power import Mode
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.errors import SettingsError
 
