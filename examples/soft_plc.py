@@ -2,7 +2,7 @@
 
 Start the driver first, with short transitions so that the example takes a minute:
 
-    ir-sim-driver --ros-args -p modbus:=true -p transitions.hibernation_enter:=2.0
+    ir_sim_driver --ros-args -p modbus:=true -p transitions.hibernation_enter:=2.0
         -p transitions.hibernation_minimum_stay:=2.0 -p transitions.hibernation_leave:=3.0     (one line)
 
 then: python examples/soft_plc.py [--host 127.0.0.1] [--port 5020] [--mac 02:00:00:c4:02:10]

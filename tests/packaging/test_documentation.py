@@ -13,6 +13,8 @@ from types import ModuleType
 import pytest
 import yaml
 
+from ir_cli.main import COMMAND_MODULES
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PACKAGES = {path.name for path in (ROOT / "src").iterdir()}
@@ -198,3 +200,26 @@ def test_the_citation_names_version_and_licence_of_the_packages() -> None:
     for setup in setups:
         assert f'version="{citation["version"]}"' in setup
         assert f'license="{citation["license"]}"' in setup
+
+
+def commands() -> set[str]:
+    """What a user can type: console scripts with a hyphen, subcommands of `ir`, targets of make."""
+    setups = "".join(path.read_text("utf-8") for path in (ROOT / "src").glob("*/setup.py"))
+    targets = re.findall(r"^\.PHONY: (.*)", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)[0].split()
+    scripts = re.findall(r'"(ir-\w+) = ', setups)
+    return {*scripts, *(f"ir {name}" for name in COMMAND_MODULES), *(f"make {name}" for name in targets)}
+
+
+@pytest.mark.parametrize("page", [*PAGES, *sorted((ROOT / "examples").glob("*.py"))], ids=name_of)
+def test_commands_that_are_named_exist(page: Path) -> None:
+    spans = re.findall(r"```.*?```|`[^`\n]+`|^ {4}.*?$", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+    named = re.findall(r"(?<![\w-])((?:ir|make) [a-z][\w-]*|ir(?:-\w+)+)(?![\w/-])", "\n".join(spans))
+    assert set(named) - commands() == set()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_interfaces_that_are_named_exist(page: Path) -> None:
+    """`srv/Name`, `msg/Name`, `action/Name`, also after `ir_msgs/`; not those of other packages."""
+    named = re.findall(r"(?:(?<![\w/])|ir_msgs/)((?:srv|msg|action)/[A-Z]\w+)", page.read_text("utf-8"))
+    files = (ROOT / "ros_ws" / "src" / "ir_msgs").glob("*/*.*")
+    assert set(named) <= {f"{path.parent.name}/{path.stem}" for path in files}
