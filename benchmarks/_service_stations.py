@@ -16,12 +16,14 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.inverse_kinematics import free_configurations
 from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.request.context import Context
+from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
-from ir_planner.service.service_movement import ServiceRequest, plan_service
-from ir_planner.service.settings import WithdrawalSettings
-from ir_planner.service.withdrawal import withdraw
-from ir_planner.service.withdrawal_paths import Exit
+from ir_planner.service.exit import Exit
+from ir_planner.service.modified_ga import ModifiedGa, withdraw
+from ir_planner.service.service_movement import plan_service
+from ir_planner.service.work_configurations import ServiceRequest
 
 S_M = 0.02  # m
 SHARE_OF_BEST = 0.8  # of the station's best clearance, where that is smaller
@@ -122,22 +124,16 @@ def measured(scene: PlanningScene, station: Station, seeds: int) -> StationFigur
         if len(free.q) == 0:
             continue
         for weighting in walks:
-            problem = Exit.of(free.q[0], scene, station, margin, budget())
-            walk = withdraw(
-                problem.interaction,
-                problem.area,
-                problem.inside,
-                problem.is_out,
-                WithdrawalSettings(weighting=weighting),
-                np.random.default_rng(seed),
-                1,
-            )
+            options = PlanOptions(seed=seed, safety_distance=margin, planning_time=30.0)
+            inside = Context(scene, options, Journal(budget(), seed)).at(station.name)
+            problem = Exit.of(free.q[0], inside)
+            walk = withdraw(problem, ModifiedGa(weighting=weighting), np.random.default_rng(seed), 1)
             walks[weighting] += len(walk.paths) > 0
         request = ServiceRequest(station, "exit", None, park, 1)
         options = PlanOptions(seed=seed, safety_distance=margin, planning_time=30.0)
         plan, answer_ms[seed] = milliseconds(
             lambda request=request, options=options: plan_service(
-                request, scene, options, WithdrawalSettings(), budget()
+                request, Context(scene, options, Journal(budget(), options.seed))
             )
         )
         way_ms[seed] = 1e3 * sum(stage.seconds for stage in plan.info.stages if stage.name != "timing")

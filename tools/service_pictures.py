@@ -23,12 +23,14 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.request.context import Context
+from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
-from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
-from ir_planner.service.settings import WithdrawalSettings
-from ir_planner.service.withdrawal import Walk, withdraw
-from ir_planner.service.withdrawal_paths import Exit
+from ir_planner.service.exit import Exit
+from ir_planner.service.modified_ga import ModifiedGa, Walk, withdraw
+from ir_planner.service.service_movement import ServicePlan, plan_service
+from ir_planner.service.work_configurations import ServiceRequest
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -63,18 +65,12 @@ def draw(cell_name: str, station_name: str, path: Path) -> None:
     goals = searched_configurations(
         station.pose, scene, threshold, park, 32, 0, InteractionSettings(), budget()
     )
-    problem = Exit.of(goals.q[0], scene, station, S_M, budget())
-    walk = withdraw(
-        problem.interaction,
-        problem.area,
-        problem.inside,
-        problem.is_out,
-        WithdrawalSettings(),
-        np.random.default_rng(0),
-        12,
-    )
+    options = PlanOptions(planning_time=60.0, safety_distance=S_M)
+    context = Context(scene, options, Journal(budget(), 0))
+    problem = Exit.of(goals.q[0], context.at(station_name))
+    walk = withdraw(problem, ModifiedGa(), np.random.default_rng(0), 12)
     request = ServiceRequest(station, "exit", goals.q[0], park, 3)
-    plan = plan_service(request, scene, PlanOptions(planning_time=60.0), WithdrawalSettings(), budget())
+    plan = plan_service(request, context)
     figure, panels = plt.subplots(1, 3, figsize=(15.0, 5.4), constrained_layout=True)
     stage_one(panels[0], goals.q, scene, station_name)
     raw_walk(panels[1], walk, scene, station_name)
@@ -92,11 +88,11 @@ def stage_one(panel: Any, q: FloatArray, scene: PlanningScene, station: str) -> 
 
 
 def raw_walk(panel: Any, walk: Walk, scene: PlanningScene, station: str) -> None:
-    """Ways of the population, from above."""
+    """Paths of the population, from above."""
     surroundings(panel, scene, station, PLAN)
     for path in walk.paths:
-        way = seen(scene.chain.tcp_poses(path)[:, :3, 3], scene, station)[:, PLAN]
-        panel.plot(*way.T, "o-", color=ARM, alpha=0.5, markersize=3, linewidth=1)
+        line = seen(scene.chain.tcp_poses(path)[:, :3, 3], scene, station)[:, PLAN]
+        panel.plot(*line.T, "o-", color=ARM, alpha=0.5, markersize=3, linewidth=1)
     panel.set_title(
         f"Stage two, eq. (7): {walk.generations} generations, {walk.candidates} copies,\n"
         f"{len(walk.paths)} ways of the tcp out, from above"
@@ -111,9 +107,9 @@ def candidates(panel: Any, plan: ServicePlan, scene: PlanningScene, station: str
         if trajectory is None:
             continue
         q = trajectory.sample(np.linspace(0.0, trajectory.duration, 80)).q
-        way = seen(scene.chain.tcp_poses(q)[:, :3, 3], scene, station)[:, PLAN]
+        line = seen(scene.chain.tcp_poses(q)[:, :3, 3], scene, station)[:, PLAN]
         text = f"{candidate.report.duration:.2f} s, {candidate.report.min_clearance * 1e3:.0f} mm"
-        panel.plot(*way.T, color=colour, linewidth=2, label=text)
+        panel.plot(*line.T, color=colour, linewidth=2, label=text)
     best = plan.candidates[0]
     for q_end, tone in ((best.work, ARM), (best.outside, "#b7c9de")):
         arm(panel, q_end, scene, station, PLAN, tone)

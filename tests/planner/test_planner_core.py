@@ -16,10 +16,12 @@ from ir_planner.checks.states import too_near
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.planner import Planner
 from ir_planner.request.bounds import PLANNING_TIME_MAX
+from ir_planner.request.context import Context
 from ir_planner.request.goals import Goal, parse_goal
+from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import scene_with, with_parts
-from ir_planner.service.service_lines import retreat_poses, service_lines
+from ir_planner.service.service_lines import line_poses, service_lines
 from ir_planner.store import Store
 from ir_planner.trajectories.through_points import Reference
 
@@ -94,11 +96,12 @@ def test_an_unreachable_pose_and_an_occupied_one_are_told_apart(planner: Planner
 def test_service_lines_follow_the_approach_axis_in_one_branch(planner: Planner) -> None:
     scene = planner.scene()
     station = scene.station("lathe_work")
-    poses = retreat_poses(station)
+    poses = line_poses(station)
     assert np.linalg.norm(poses[-1, :3, 3] - poses[0, :3, 3]) == pytest.approx(station.approach_distance)
     work = scene.inverse_kinematics.solve(np.asarray(station.pose)[None]).q
     rejected: Counter[str] = Counter()
-    lines = service_lines(work, station, scene, rejected)
+    context = Context(scene, PlanOptions(), Journal(Work(1000, np.inf, lambda: 0.0), 0))
+    lines = service_lines(work, context.at("lathe_work"), rejected)
     assert lines
     for line in lines:
         assert scene.chain.tcp_poses(line.points) == pytest.approx(poses, abs=1e-9)

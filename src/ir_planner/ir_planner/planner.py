@@ -30,6 +30,7 @@ from ir_planner.program import ProgramPlan, ProgramRequest, Standby, plan_progra
 from ir_planner.regional import MovementPlan, plan_regional
 from ir_planner.request import (
     Clock,
+    Context,
     Goal,
     Journal,
     Work,
@@ -42,10 +43,11 @@ from ir_planner.request import (
 from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_planner.search import GeneticSettings
 from ir_planner.service import (
+    ModifiedGa,
     ServicePlan,
     ServiceRequest,
-    WithdrawalSettings,
     checked_request,
+    exit_searches,
     known_method,
     plan_service,
 )
@@ -99,7 +101,7 @@ class Planner:
         pauses: TransitionTimes | None = None,
         power: PowerData | None = None,
         interaction: InteractionSettings | None = None,
-        withdrawal: WithdrawalSettings | None = None,
+        withdrawal: ModifiedGa | None = None,
         genetic: GeneticSettings | None = None,
     ) -> None:
         self.clock = clock
@@ -107,7 +109,7 @@ class Planner:
         self.pauses = pauses or TransitionTimes()
         self.power = power or load_power_data()
         self.interaction = interaction or InteractionSettings()
-        self.withdrawal = withdrawal or WithdrawalSettings()
+        self.withdrawal = withdrawal or ModifiedGa()
         self.genetic = genetic or GeneticSettings()
         self._cell: Cell | None = None
         # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
@@ -289,7 +291,8 @@ class Planner:
             )
         request = ServiceRequest(scene.station(station), direction, configuration, near, max_candidates)
         options = replace(options, planner_id=method)
-        plan = plan_service(request, scene, options, self.withdrawal, self._work(options, cancelled))
+        context = Context(scene, options, Journal(self._work(options, cancelled), options.seed))
+        plan = plan_service(request, context, exit_searches(self.withdrawal))
         for candidate in plan.candidates:
             if candidate.trajectory is not None:
                 self.trajectories.add(candidate.trajectory)

@@ -58,7 +58,7 @@ from ir_planner.node.parameters import PlannerParameters
 from ir_planner.node.requests import Requests
 from ir_planner.planner import Planner
 from ir_planner.search import GeneticSettings
-from ir_planner.service import ServicePlan, WithdrawalSettings, service_shapes
+from ir_planner.service import ModifiedGa, ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
 _MARKER = {
@@ -193,7 +193,7 @@ class PlannerNode(Node):
     def _change_interaction(self, settings: InteractionSettings) -> None:
         self.planner.interaction = settings
 
-    def _change_withdrawal(self, settings: WithdrawalSettings) -> None:
+    def _change_withdrawal(self, settings: ModifiedGa) -> None:
         self.planner.withdrawal = settings
 
     def _change_genetic(self, settings: GeneticSettings) -> None:

@@ -8,7 +8,7 @@ from rclpy.node import Node
 
 from ir_planner.configurations import InteractionSettings
 from ir_planner.search import GeneticSettings
-from ir_planner.service import WithdrawalSettings
+from ir_planner.service import ModifiedGa
 from ir_planner.settings import PlannerSettings
 
 
@@ -24,7 +24,7 @@ class PlannerParameters:
         on_planner: Callable[[PlannerSettings], None],
         on_pauses: Callable[[TransitionTimes], None],
         on_interaction: Callable[[InteractionSettings], None],
-        on_withdrawal: Callable[[WithdrawalSettings], None],
+        on_withdrawal: Callable[[ModifiedGa], None],
         on_genetic: Callable[[GeneticSettings], None],
     ) -> None:
         self._planner = Parameters(node, PlannerSettings, on_change=on_planner)
@@ -32,7 +32,7 @@ class PlannerParameters:
         self._interaction = Parameters(
             node, InteractionSettings, prefix="interaction.", on_change=on_interaction
         )
-        self._withdrawal = Parameters(node, WithdrawalSettings, prefix="withdrawal.", on_change=on_withdrawal)
+        self._withdrawal = Parameters(node, ModifiedGa, prefix="withdrawal.", on_change=on_withdrawal)
         self._genetic = Parameters(node, GeneticSettings, prefix="genetic.", on_change=on_genetic)
 
     @property
@@ -51,7 +51,7 @@ class PlannerParameters:
         return self._interaction.value
 
     @property
-    def withdrawal(self) -> WithdrawalSettings:
+    def withdrawal(self) -> ModifiedGa:
         """In force now."""
         return self._withdrawal.value
 

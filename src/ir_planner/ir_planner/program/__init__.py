@@ -1,6 +1,7 @@
 """Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
 
-from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.program import plan_program
+from ir_planner.program.request import ProgramPlan, ProgramRequest
 from ir_planner.program.standby import Standby, plan_standby
 
 __all__ = ["ProgramPlan", "ProgramRequest", "Standby", "plan_program", "plan_standby"]

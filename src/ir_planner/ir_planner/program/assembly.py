@@ -114,12 +114,12 @@ def _moves(leg: Leg) -> list[PlannedMovement]:
 
 
 def _pause(
-    here: str, duration: float, wish: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+    here: str, duration: float, requested: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
 ) -> PlannedMovement:
-    mode = wish
-    if duration > 0.0 and wish == AUTO:
+    mode = requested
+    if duration > 0.0 and requested == AUTO:
         mode = plan_standby(duration, q, scene, times).chosen.name
-    elif wish == AUTO:
+    elif requested == AUTO:
         mode = ""
     energy = pause_energy(mode or "STAND_ON_MOTORS", duration, q, scene, times) if duration > 0.0 else 0.0
     if not np.isfinite(energy):  # asked for by name though it is too short: it is spent coming and going

@@ -2,7 +2,7 @@
 
 Each stop of a program is a layer of configurations; the cost between two of them is W. A straight movement
 may collide, so costs are settled lazily: the shortest path is found with what is known, the steps on it are
-certified (or a way round is planned), their true cost is entered, and the search repeats until all steps of
+certified (or a path around is planned), their true cost is entered, and the search repeats until all steps of
 the shortest path are settled.
 """
 
@@ -17,14 +17,14 @@ from ir_planner.scene import movement_cost
 from ir_planner.service import ServiceLine
 
 UNKNOWN, STRAIGHT, BLOCKED, PLANNED, IMPOSSIBLE = range(5)
-_BATCH = 12
-_DETOUR = 1.6  # a first guess: a way round costs this times the straight movement
+_BATCH = 12  # straight movements that are certified together: about a millisecond
+_DETOUR = 1.6  # a first guess: a path around what obstructs costs this times the straight movement
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A way to stand at a stop: where the arm works, and where it is while nothing else may be near
-    (`outside`).
+    """A configuration at a stop with its service line: where the arm works, and where nothing else may be
+    near it (`outside`).
     """
 
     line: ServiceLine
@@ -67,7 +67,7 @@ Plan = Callable[[int, Node, Node], float | None]
 
 @dataclass
 class StationGraph:
-    """Gaps in order. certify(gap, q0 (K, n), q1 (K, n)): which are free; plan(gap, a, b): W of a way round,
+    """Gaps in order. certify(gap, q0 (K, n), q1 (K, n)): which are free; plan(gap, a, b): W of a path around,
     or None.
     """
 
@@ -90,7 +90,7 @@ class StationGraph:
         return chosen[::-1], float(np.min(cost))
 
     def solve(self, on_cost: Callable[[float], None]) -> tuple[list[int], float]:
-        """Settle the shortest chain; `on_cost` hears of the best cost known so far."""
+        """Settle the shortest chain; `on_cost` gets the best cost known so far."""
         while True:
             chosen, cost = self.shortest()
             if not np.isfinite(cost):

@@ -2,7 +2,7 @@
 it.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from ir_kernels.power import Regeneration
 from ir_msgs_py.status import StatusCode
@@ -82,11 +82,6 @@ def placed_steps(cell: Cell, steps: tuple[ProgramStep, ...], places: PartPlaces)
         result.append(PlacedStep(step, places, after))
         places = after
     return tuple(result)
-
-
-def without_program(cell: Cell) -> Cell:
-    """The cell alone, for scenes in which its parts have moved on."""
-    return replace(cell, program=())
 
 
 def signal_text(signal: Signal) -> str:

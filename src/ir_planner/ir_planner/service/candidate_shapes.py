@@ -17,7 +17,7 @@ _SAMPLES = 60
 def service_shapes(
     candidates: Sequence[ServiceCandidate], station: str, scene: PlanningScene
 ) -> tuple[Shape, ...]:
-    """Shapes of ranked candidates at a station: the best one's way is thick, its closest pair has a label."""
+    """Shapes of ranked candidates at a station: the best path is thick, its closest pair has a label."""
     machine = scene.cell.machine(scene.station(station).equipment)
     zone, shapes = machine.zone, []
     if machine.enabled:
@@ -28,16 +28,16 @@ def service_shapes(
         if candidate.trajectory is None:
             continue
         times = np.linspace(candidate.trajectory.times[0], candidate.trajectory.times[-1], _SAMPLES)
-        way = scene.chain.tcp_poses(candidate.trajectory.sample(times).q)[:, :3, 3]
+        path = scene.chain.tcp_poses(candidate.trajectory.sample(times).q)[:, :3, 3]
         width = np.array([0.006 if rank else 0.014, 0.0, 0.0])
         colour = _OTHERS if rank else WAY
-        shapes.append(Shape("service_candidates", "line", np.eye(4), width, colour, way))
+        shapes.append(Shape("service_candidates", "line", np.eye(4), width, colour, path))
         shapes.extend(_closest(candidate, rank == 0))
     return tuple(shapes)
 
 
 def _closest(candidate: ServiceCandidate, labelled: bool) -> list[Shape]:
-    """The line between the closest points of the way's nearest pair, and its label."""
+    """The line between the closest points of the path's nearest pair, and its label."""
     pair = candidate.report.closest
     if pair is None:
         return []

@@ -1,7 +1,7 @@
-"""Service movement: out of a station along -x of the tool (exit), or into it the same way (entry).
+"""Service movement: out of a station along -x of the tool (exit), or into it along the same line (entry).
 
 The straight line of the tcp over the station's approach distance is followed through closed-form
-configurations of one branch, point by point; a joint spline (eq. 10) runs through them. On the way the
+configurations of one branch, point by point; a joint spline (eq. 10) runs through them. On the line the
 station's allowed contacts hold; the outer end keeps S_m from everything.
 """
 
@@ -10,26 +10,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.options import PlanOptions
 
 from ir_description import Station
 from ir_planner.checks import FreeSpace, evaluate_trajectory
 from ir_planner.errors import TimingError
 from ir_planner.optimize import movement_over
-from ir_planner.request import Work
-from ir_planner.scene import PlanningScene
+from ir_planner.request import Context
 from ir_planner.timing import TimedMovement, best_stretch, stretched, time_spline
 
-SPACING = 0.03  # m between points of the line
+SPACING = 0.03  # m between points of the line: in between, the tool leaves it by less than a millimetre
 _JUMP = 0.35  # rad: a larger step between neighbours is another branch or a singular wrist
-_TORQUE_SHARES = (0.97, 0.92, 0.85)
+_TORQUE_SHARES = (0.97, 0.92, 0.85)  # tried in turn: torque is sampled while timing, and proved afterwards
 
 
 @dataclass(frozen=True, eq=False)
 class ServiceLine:
-    """Configurations (L, n) from the work configuration to the outer end.
+    """Configurations (L, n) from the interaction configuration to the outer end.
 
-    straight: points of a straight way of the tool; else waypoints of a withdrawal (eq. 7).
+    straight: points of a straight line of the tool; else waypoints of a withdrawal (eq. 7).
     """
 
     points: FloatArray
@@ -48,7 +46,7 @@ class ServiceLine:
         return last
 
 
-def retreat_poses(station: Station) -> FloatArray:
+def line_poses(station: Station) -> FloatArray:
     """Poses (L, 4, 4) of the tcp from the station backwards along its -x; one pose where the approach is 0
     m.
     """
@@ -59,14 +57,12 @@ def retreat_poses(station: Station) -> FloatArray:
     return poses
 
 
-def service_lines(
-    interaction: FloatArray, station: Station, scene: PlanningScene, rejected: Counter[str]
-) -> list[ServiceLine]:
-    """Lines from work configurations (K, n); those that leave the limits or change branch are counted and
-    dropped.
+def service_lines(interaction: FloatArray, context: Context, rejected: Counter[str]) -> list[ServiceLine]:
+    """Lines of the context's station from interaction configurations (K, n); those that leave the limits or
+    change branch are counted and dropped.
     """
-    poses = retreat_poses(station)
-    found = scene.inverse_kinematics.solve(poses)
+    poses = line_poses(context.scene.station(context.station))
+    found = context.scene.inverse_kinematics.solve(poses)
     lines = []
     for q in interaction:
         points = [q]
@@ -81,58 +77,47 @@ def service_lines(
             lines.append(ServiceLine(np.array(points)))
         else:
             share = len(points) / len(poses)
-            rejected[f"retreat from {station.name} leaves the joint limits after {100 * share:.0f} %"] += 1
+            rejected[f"line out of {context.station} leaves the joint limits after {100 * share:.0f} %"] += 1
     return lines
 
 
-def lines_free(
-    lines: list[ServiceLine],
-    station: Station,
-    scene: PlanningScene,
-    safety_distance: float,
-    work: Work,
-    rejected: Counter[str],
-) -> list[bool]:
-    """Which lines are free: on the way with the station's allowed contacts, at the outer end without."""
-    inside = FreeSpace.of(scene, safety_distance, work, station.name)
-    outside = FreeSpace.of(scene, safety_distance, work)
-    on_the_way = inside.paths_free([line.points for line in lines])
+def lines_free(lines: list[ServiceLine], context: Context, rejected: Counter[str]) -> list[bool]:
+    """Which lines are free: inside with the station's allowed contacts, at the outer end without."""
+    scene, margin, work = context.scene, context.safety_distance, context.work
+    inside = FreeSpace.of(scene, margin, work, context.station).paths_free([line.points for line in lines])
     if not lines:
         return []
-    ends = outside.states_free(np.array([line.outside for line in lines]))
-    rejected[f"retreat from {station.name} collides"] += int((~on_the_way).sum())
-    rejected[f"outer end at {station.name} is not free"] += int((on_the_way & ~ends).sum())
-    return [bool(way and end) for way, end in zip(on_the_way, ends, strict=True)]
+    ends = FreeSpace.of(scene, margin, work).states_free(np.array([line.outside for line in lines]))
+    rejected[f"line out of {context.station} collides"] += int((~inside).sum())
+    rejected[f"outer end at {context.station} is not free"] += int((inside & ~ends).sum())
+    return [bool(free) for free in inside & ends]
 
 
-def timed_service(
-    line: ServiceLine, entry: bool, station: str, scene: PlanningScene, options: PlanOptions, work: Work
-) -> TimedMovement:
-    """The movement along the line, outwards or (entry) inwards, verified with the station's allowed contacts.
+def timed_service(line: ServiceLine, entry: bool, context: Context) -> TimedMovement:
+    """The movement along the line, outwards or (entry) inwards, verified with the allowed contacts of the
+    context's station.
 
     Raises TimingError when a torque does not suffice.
     """
     points = line.points[::-1] if entry else line.points
+    scene, options, station = context.scene, context.options, context.station
     if len(points) < 3 or not line.straight:
-        return movement_over(points, scene, options, work, station)
-    names = scene.cell.robot.joint_names
+        return movement_over(points, scene, options, context.work, station)
     for share in _TORQUE_SHARES:
-        work.check()
-        limits = scene.limits.scaled(
-            options.velocity_scaling, options.acceleration_scaling
-        ).with_torque_share(share)
-        fastest = time_spline(points, names, limits, scene.dynamics)
-        work.check()
+        context.work.check()
+        limits = context.limits.with_torque_share(share)
+        fastest = time_spline(points, context.joint_names, limits, scene.dynamics)
+        context.work.check()
         factor = best_stretch(fastest, scene, options.objective, options.time_value)
         trajectory = stretched(fastest, factor)
-        work.check()
+        context.work.check()
         evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
         violation = evaluation.verification.violation
         if violation is None:
             break
         if violation.what == "clearance":
-            # the spline leaves the certified polyline where points lie far apart: stop at none, but cut less
-            return movement_over(points, scene, options, work, station)
+            # the spline leaves the certified polyline where points lie far apart: refined from the polyline
+            return movement_over(points, scene, options, context.work, station)
     if violation is not None and violation.what != "torque":
         raise TimingError(violation.sentence, 0)
     return TimedMovement(np.array(points), trajectory, evaluation)

@@ -17,15 +17,17 @@ from ir_planner.configurations.inverse_kinematics import free_configurations
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
 from ir_planner.program.program import ProgramRequest, plan_program
+from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
-from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
-from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.service.exit import Exit
+from ir_planner.service.modified_ga import ModifiedGa, withdraw
+from ir_planner.service.service_movement import ServicePlan, plan_service
 from ir_planner.service.step_weights import accumulated_mass, step_weights
-from ir_planner.service.withdrawal import withdraw
-from ir_planner.service.withdrawal_paths import Exit, ways_out
+from ir_planner.service.withdrawals import exit_searches, withdrawal
 from ir_planner.service.work_area import WorkArea
+from ir_planner.service.work_configurations import ServiceRequest
 
 from ir_description import Body, Cell, PowerData, load_cell
 
@@ -47,6 +49,11 @@ def a_budget(edges: int = 60_000) -> Work:
     return Work(edges, time.monotonic() + 60.0, time.monotonic)
 
 
+def asked(scene: PlanningScene, work: Work, options: PlanOptions | None = None) -> Context:
+    options = options or PlanOptions()
+    return Context(scene, options, Journal(work, options.seed))
+
+
 def planned(scene: PlanningScene, station: str, direction: str = "exit", **choices: Any) -> ServicePlan:
     configuration = choices.pop("configuration", None)
     wanted = choices.pop("max_candidates", 2)
@@ -54,13 +61,13 @@ def planned(scene: PlanningScene, station: str, direction: str = "exit", **choic
     request = ServiceRequest(
         scene.station(station), direction, configuration, np.array(scene.cell.park), wanted
     )
-    return plan_service(request, scene, options, WithdrawalSettings(), a_budget())
+    return plan_service(request, asked(scene, a_budget(), options))
 
 
 def problem_at(scene: PlanningScene, name: str, budget: Work) -> Exit:
     station = scene.station(name)
     free = free_configurations(station.pose, scene, scene.thresholds(0.02, name), scene.cell.park)
-    return Exit.of(free.q[0], scene, station, 0.02, budget)
+    return Exit.of(free.q[0], asked(scene, budget).at(name))
 
 
 # -- eq. (7)
@@ -85,22 +92,14 @@ def test_literal_weights_grow_towards_the_base_and_inverse_ones_towards_the_tool
 
 @pytest.mark.parametrize("weighting", ["literal", "inverse"])
 @pytest.mark.parametrize(("cell", "station"), IN_ZONES)
-def test_the_modified_ga_walks_out_over_certified_steps_while_d_grows(
+def test_the_modified_ga_leaves_over_certified_steps_while_d_grows(
     cell: str, station: str, weighting: str, scene_of: SceneOf
 ) -> None:
     scene = scene_of(cell)
     for seed in range(3):
         problem = problem_at(scene, station, a_budget())
-        chosen = WithdrawalSettings(weighting=weighting)
-        walk = withdraw(
-            problem.interaction,
-            problem.area,
-            problem.inside,
-            problem.is_out,
-            chosen,
-            np.random.default_rng(seed),
-            1,
-        )
+        chosen = ModifiedGa(weighting=weighting)
+        walk = withdraw(problem, chosen, np.random.default_rng(seed), 1)
         assert walk.paths, walk.rejected.most_common(3)
         path = walk.paths[0]
         assert np.array_equal(path[0], problem.interaction)
@@ -126,17 +125,9 @@ def test_d_counts_only_what_moves_and_this_machine(demo_scene: PlanningScene) ->
     )
 
 
-def test_every_candidate_of_the_walk_is_kept_or_has_a_reason(scene_of: SceneOf) -> None:
+def test_every_candidate_of_the_search_is_kept_or_has_a_reason(scene_of: SceneOf) -> None:
     problem = problem_at(scene_of("deep_box"), "tun", a_budget())
-    walk = withdraw(
-        problem.interaction,
-        problem.area,
-        problem.inside,
-        problem.is_out,
-        WithdrawalSettings(),
-        np.random.default_rng(0),
-        2,
-    )
+    walk = withdraw(problem, ModifiedGa(), np.random.default_rng(0), 2)
     reasons = Counter(
         reason.split(" beyond")[0] if "beyond" in reason else reason for reason in walk.rejected
     )
@@ -175,7 +166,7 @@ def test_candidates_are_certified_distinct_and_ranked(
         assert np.abs(outer[:k] - outer[k]).max(axis=1).min() > 0.05
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_way(scene_of: SceneOf) -> None:
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_path(scene_of: SceneOf) -> None:
     scene = scene_of("cnc_door")
     ids = [
         tuple(candidate.trajectory_id for candidate in planned(scene, "press", seed=seed).candidates)
@@ -186,19 +177,19 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_way(scene_o
 
 
 @pytest.mark.parametrize(("cell", "station"), IN_ZONES)
-def test_the_tree_finds_a_way_where_it_is_asked_to(cell: str, station: str, scene_of: SceneOf) -> None:
+def test_the_tree_finds_a_path_where_it_is_asked_to(cell: str, station: str, scene_of: SceneOf) -> None:
     plan = planned(scene_of(cell), station, planner_id="tree", max_candidates=1)
     assert plan.status.ok, plan.status.message
     assert plan.candidates[0].method == plan.info.planner_id == "tree"
     assert plan.candidates[0].report.certified
 
 
-def test_the_tree_takes_over_where_the_walk_is_given_up(scene_of: SceneOf) -> None:
+def test_the_tree_takes_over_where_the_modified_ga_gives_up(scene_of: SceneOf) -> None:
     scene = scene_of("deep_box")
     problem = problem_at(scene, "bin", a_budget())
     journal = Journal(problem.inside.work, 0)
-    found = ways_out(problem, WithdrawalSettings(generations=1), 1, "", journal)
-    assert [way.method for way in found.ways] == ["tree"]
+    found = withdrawal(problem, 1, "", exit_searches(ModifiedGa(generations=1)), journal)
+    assert [path.method for path in found.paths] == ["tree"]
     assert [stage.name for stage in journal.stages] == ["modified GA", "tree", "shorten"]
 
 
@@ -279,12 +270,12 @@ def test_a_box_without_an_exit_is_answered_within_the_budget_and_names_its_walls
 ) -> None:
     request = ServiceRequest(boxed.station("press"), "exit", None, np.array(boxed.cell.park))
     budget = a_budget(3000)
-    plan = plan_service(request, boxed, PlanOptions(), WithdrawalSettings(), budget)
+    plan = plan_service(request, asked(boxed, budget))
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert "to leave the zone of press (clearance there" in plan.status.message
     assert "too near plate_" in plan.status.message
-    assert "modified GA (0 ways" in plan.status.message
-    assert "tree (no way)" in plan.status.message
+    assert "modified GA (0 paths" in plan.status.message
+    assert "tree (no path)" in plan.status.message
     assert budget.iterations < 3200
     assert not budget.truncated
     assert any("plate_" in rejection.reason for rejection in plan.info.rejected)
@@ -295,7 +286,7 @@ def test_a_pose_out_of_reach_is_no_ik_solution(demo_scene: PlanningScene) -> Non
     pose = np.array(station.pose)
     pose[:3, 3] += [3.0, 0.0, 0.0]
     request = ServiceRequest(replace(station, pose=pose), "exit", None, np.array(demo_scene.cell.park))
-    plan = plan_service(request, demo_scene, PlanOptions(), WithdrawalSettings(), a_budget())
+    plan = plan_service(request, asked(demo_scene, a_budget()))
     assert plan.status.code == StatusCode.NO_IK_SOLUTION
     assert "gauge_measure" in plan.status.message
 
@@ -315,13 +306,14 @@ def test_a_start_in_collision_is_refused_with_its_pair(scene_of: SceneOf) -> Non
     assert entry.status.code == StatusCode.GOAL_IN_COLLISION
 
 
-def test_without_a_way_out_the_answer_says_how_far_it_came_and_what_was_in_the_way(
+def test_without_an_exit_path_the_answer_says_how_far_it_came_and_what_obstructed(
     scene_of: SceneOf,
 ) -> None:
     scene = scene_of("cnc_door")
     options = PlanOptions(planning_time=60.0, max_iterations=400, planner_id="modified_ga")
     request = ServiceRequest(scene.station("cnc"), "exit", None, np.array(scene.cell.park), 1)
-    plan = plan_service(request, scene, options, WithdrawalSettings(generations=1), a_budget(400))
+    searches = exit_searches(ModifiedGa(generations=1))
+    plan = plan_service(request, asked(scene, a_budget(400), options), searches)
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert "lacks" in plan.status.message
     assert "clearance there" in plan.status.message
@@ -334,7 +326,7 @@ def test_cancelling_ends_the_search(scene_of: SceneOf) -> None:
     budget = Work(60_000, time.monotonic() + 60.0, time.monotonic, lambda: True)
     request = ServiceRequest(scene.station("tun"), "exit", None, np.array(scene.cell.park))
     with pytest.raises(CancelledError):
-        plan_service(request, scene, PlanOptions(), WithdrawalSettings(), budget)
+        plan_service(request, asked(scene, budget))
 
 
 def test_unknown_choices_list_the_known(planner: Planner) -> None:

@@ -1,35 +1,87 @@
-"""Withdrawal from a machine's work area by the modified genetic algorithm of eq. (7): the raw walk.
+"""Withdrawal from a machine's work area by the modified genetic algorithm of eq. (7): the raw paths.
 
-A population of copies of the work configuration is perturbed, q_i <- q_i + W_i n_i with n_i ~ N(mu_i, sigma).
-What comes nearer than S_m is dropped, with its reason; the rest is ranked by the total metric distance D to
-the machine. The mean grows with D and points where D grew and the tool leaves; the spread shrinks with the
-gain of D, and is 1 rad around a configuration whose offspring all collide, to get round what closes the zone.
-It goes on until D grows for every configuration and the zone is left. Every step is a certified edge.
+A population of copies of the interaction configuration is perturbed, q_i <- q_i + W_i n_i with
+n_i ~ N(mu_i, sigma). What comes nearer than S_m is dropped, with its reason; the rest is ranked by the total
+metric distance D to the machine. The mean grows with D and points where D grew and the tool leaves; the
+spread shrinks with the gain of D, and is 1 rad around a configuration whose offspring all collide, to get
+round what closes the zone. It goes on until D grows for every configuration and the zone is left. Every step
+is a certified edge.
 """
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_msgs_py.settings import check_settings, setting
 
-from ir_planner.checks import FreeSpace
-from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.request import Work
+from ir_planner.service.exit import Exit
+from ir_planner.service.exit_search import ExitsFound
 from ir_planner.service.step_weights import step_weights
-from ir_planner.service.work_area import WorkArea
 
-_DAMPING = 0.02  # of the retreat's least squares; m^2
-_ROTATION_LENGTH = 0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its way
-_SHARPEST = 0.25  # the spread shrinks at most to this share in one generation
-_LARGEST_MEAN = 4.0  # mean steps grow with D up to this factor
-_PER_PARENT = 3  # offspring of one configuration that may survive
+_DAMPING = 0.02  # m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)
+_ROTATION_LENGTH = 0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its travel
+_SHARPEST = 0.25  # the spread shrinks at most to this share in one generation, so that one step can't end it
+_WIDEST = 1.3  # and grows at most so, where D was lost
+_MEAN_LEAST, _MEAN_MOST = 0.25, 4.0  # of the first step: mean steps grow with D between them
+_PER_PARENT = 3  # offspring of one configuration that may survive: several directions stay alive
+_FEWEST_OFFSPRING = 4  # of one configuration, however large the population
+_SMALLEST_D = 1e-3  # m: gains of D are relative to at least this
+
+
+@dataclass(frozen=True)
+class ModifiedGa:
+    """Withdrawal from a machine by the modified genetic algorithm of eq. (7)."""
+
+    weighting: str = setting(
+        "literal",
+        "W of eq. 7: literal (proportional to the mass from the tool to the joint) or inverse.",
+        choices=("literal", "inverse"),
+    )
+    population: int = setting(16, "Configurations in the population.", minimum=2, maximum=1000)
+    offspring: int = setting(6, "Perturbed copies of each configuration.", minimum=1, maximum=1000)
+    generations: int = setting(60, "Generations before the search is given up.", minimum=1, maximum=10_000)
+    step: float = setting(
+        0.12, "Distance that the tool moves in the first mean step.", unit="m", minimum=0.001, maximum=2.0
+    )
+    momentum: float = setting(
+        0.8, "Largest share of the last step's direction in the mean.", minimum=0.0, maximum=1.0
+    )
+    spread: float = setting(
+        0.15, "Standard deviation of the first steps.", unit="rad", minimum=1e-4, maximum=3.0
+    )
+    spread_least: float = setting(0.01, "Least standard deviation.", unit="rad", minimum=0.0, maximum=3.0)
+    spread_decades: float = setting(
+        1.5, "Offspring step with 1 to 10^-this of the deviation.", minimum=0.0, maximum=6.0
+    )
+    collision_spread: float = setting(
+        1.0, "Deviation where all offspring collide.", unit="rad", minimum=0.01, maximum=3.0
+    )
+    shrink: float = setting(
+        2.0, "How much the deviation shrinks per relative gain of D.", minimum=0.0, maximum=100.0
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+    @property
+    def title(self) -> str:
+        """The name of its stage in answers."""
+        return "modified GA"
+
+    def find(self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work) -> ExitsFound:
+        """Perturb and rank until `wanted` paths have left the zone, generations or work end."""
+        walk = withdraw(problem, self, np.random.default_rng(seed), wanted)
+        note = f"{len(walk.paths)} paths, {walk.generations} generations, {walk.candidates} candidates"
+        return ExitsFound(walk.paths, walk.best, note, walk.rejected)
 
 
 @dataclass(eq=False)
 class Walk:
-    """What a walk found: paths (M_k, n) from the work configuration to outside, in the order they came.
+    """What a search found: paths (M_k, n) from the interaction configuration to outside, in the order they
+    came.
 
     best: the configuration farthest out; rejected: dropped candidates by reason.
     """
@@ -60,44 +112,27 @@ class _Population:
         return len(self.q)
 
 
-def withdraw(
-    interaction: FloatArray,
-    area: WorkArea,
-    inside: FreeSpace,
-    is_out: Callable[[FloatArray], BoolArray],
-    settings: WithdrawalSettings,
-    rng: np.random.Generator,
-    wanted: int,
-) -> Walk:
-    """Walk from `work` (n,), free in `inside`, until `wanted` ways end where `is_out` (N, n) -> (N,) says so.
+def withdraw(problem: Exit, settings: ModifiedGa, rng: np.random.Generator, wanted: int) -> Walk:
+    """Search from the interaction configuration until `wanted` paths end outside.
 
-    Ends at the settings' generations or when the budget is spent.
+    Ends at the settings' generations or when the work is spent.
     """
-    return _Walker(interaction, area, inside, is_out, settings, rng).run(wanted)
+    return _Walker(problem, settings, rng).run(wanted)
 
 
 class _Walker:
-    def __init__(
-        self,
-        interaction: FloatArray,
-        area: WorkArea,
-        inside: FreeSpace,
-        is_out: Callable[[FloatArray], BoolArray],
-        settings: WithdrawalSettings,
-        rng: np.random.Generator,
-    ) -> None:
-        self.area, self.inside, self.is_out = area, inside, is_out
+    def __init__(self, problem: Exit, settings: ModifiedGa, rng: np.random.Generator) -> None:
+        self.problem, self.area, self.inside = problem, problem.area, problem.inside
         self.settings, self.rng = settings, rng
-        scene = inside.scene
-        self.scene = scene
-        self.W = step_weights(
-            scene.cell.robot.link_mass, sum(x.mass for x in scene.loads), settings.weighting
-        )
-        self.nodes: list[FloatArray] = [interaction]
+        self.scene = scene = problem.inside.scene
+        loads = sum(load.mass for load in scene.loads)
+        self.W = step_weights(scene.cell.robot.link_mass, loads, settings.weighting)
+        first = problem.interaction
+        self.nodes: list[FloatArray] = [first]
         self.parents: list[int] = [0]
-        self.first_total = max(float(area.total_distance(interaction[None])[0]), 1e-3)
-        self.walk = Walk([], interaction, 0, 0)
-        self.best_zone = float(area.zone_distance(interaction[None])[0])
+        self.first_total = max(float(self.area.total_distance(first[None])[0]), _SMALLEST_D)
+        self.walk = Walk([], first, 0, 0)
+        self.best_zone = float(self.area.zone_distance(first[None])[0])
 
     def run(self, wanted: int) -> Walk:
         n, count = len(self.nodes[0]), self.settings.population
@@ -112,7 +147,9 @@ class _Walker:
             if len(population) == 0 or self.inside.work.exhausted or len(self.walk.paths) >= wanted:
                 break
             self.walk.generations += 1
-            population = self._next(population, max(self.settings.offspring * count // len(population), 4))
+            population = self._next(
+                population, max(self.settings.offspring * count // len(population), _FEWEST_OFFSPRING)
+            )
         return self.walk
 
     def _next(self, parents: _Population, offspring: int) -> _Population:
@@ -151,9 +188,9 @@ class _Walker:
         """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
         counted = self.area.pairs > 0  # a zone without bodies has no D
         grown = np.clip(
-            parents.total / self.first_total if counted else np.ones(len(parents)), 0.25, _LARGEST_MEAN
+            parents.total / self.first_total if counted else np.ones(len(parents)), _MEAN_LEAST, _MEAN_MOST
         )
-        out = self._retreat(parents.q) * self.settings.step
+        out = self._straight_out(parents.q) * self.settings.step
         length = np.linalg.norm(out, axis=1, keepdims=True)
         last = parents.step
         size = np.linalg.norm(last, axis=1, keepdims=True)
@@ -161,8 +198,8 @@ class _Walker:
         share = self.rng.uniform(0.0, self.settings.momentum, (len(parents), 1))
         return np.asarray(grown[:, None] * ((1.0 - share) * out + share * momentum))
 
-    def _retreat(self, q: FloatArray) -> FloatArray:
-        """Joint rates (N, n) per metre of the tool's way along its -x, by damped least squares."""
+    def _straight_out(self, q: FloatArray) -> FloatArray:
+        """Joint rates (N, n) per metre that the tool moves along its -x, by damped least squares."""
         J = self.scene.chain.jacobian(q)
         J = J * np.array([1.0, 1.0, 1.0, *[_ROTATION_LENGTH] * 3])[:, None]
         target = np.zeros((len(q), 6))
@@ -212,8 +249,8 @@ class _Walker:
         self, parents: _Population, q: FloatArray, owner: IntArray, total: FloatArray
     ) -> _Population:
         """Survivors with their spread: it shrinks in proportion to the gain of D."""
-        gain = (total - parents.total[owner]) / np.maximum(parents.total[owner], 1e-3)
-        shrink = np.clip(1.0 - self.settings.shrink * gain, _SHARPEST, 1.3)
+        gain = (total - parents.total[owner]) / np.maximum(parents.total[owner], _SMALLEST_D)
+        shrink = np.clip(1.0 - self.settings.shrink * gain, _SHARPEST, _WIDEST)
         sigma = np.clip(
             parents.sigma[owner] * shrink, self.settings.spread_least, self.settings.collision_spread
         )
@@ -230,7 +267,7 @@ class _Walker:
         far = int(np.argmax(zone))
         if zone[far] > self.best_zone:
             self.best_zone, self.walk.best = float(zone[far]), children.q[far]
-        done = self.is_out(children.q)
+        done = self.problem.is_out(children.q)
         grown = (children.total > self.first_total) | (self.area.pairs == 0)
         if (done & ~grown).any():
             self.walk.rejected["outside, but D did not grow"] += int((done & ~grown).sum())

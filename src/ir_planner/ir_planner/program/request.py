@@ -1,0 +1,70 @@
+"""What a program is asked as, and what its answer is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ir_kernels.power import Regeneration
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.names import NO_LOAD
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.transitions import TransitionTimes
+
+from ir_description import Cell, PowerData
+from ir_planner.errors import RequestError
+from ir_planner.search import GeneticSettings
+from ir_planner.service import ModifiedGa
+
+Progress = Callable[[str, int, int, float], None]  # phase, done, total, cost of the best chain
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramPlan:
+    """The answer: movements and pauses in order; empty unless the status is SUCCESS."""
+
+    status: Status
+    info: PlanningInfo
+    program_id: str = ""
+    movements: tuple[PlannedMovement, ...] = ()
+    report: TrajectoryReport = field(default_factory=TrajectoryReport)
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramRequest:
+    """What to plan: the cell, its stations to visit (empty: its program), from `start` (n,), in
+    `cycle_time` s (0: free).
+    """
+
+    cell: Cell
+    power: PowerData
+    stations: tuple[str, ...]
+    start: FloatArray
+    options: PlanOptions
+    cycle_time: float = 0.0
+    regeneration: Regeneration = "shared"
+    pauses: TransitionTimes = field(default_factory=TransitionTimes)
+    withdrawal: ModifiedGa = field(default_factory=ModifiedGa)
+    genetic: GeneticSettings = field(default_factory=GeneticSettings)
+
+    def check(self) -> None:
+        """Raise RequestError for options that a program doesn't take."""
+        load, duration = self.options.load, self.options.duration
+        if load not in ("", NO_LOAD):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"load is {load!a}: in a program the steps say what is attached, leave it empty",
+            )
+        if duration > 0.0:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"duration is {duration:g} s: a program has a cycle_time instead, leave it 0 s",
+            )
+
+
+class StageError(Exception):
+    """A stage of the program found nothing; carries the status of the answer."""
+
+    def __init__(self, status: Status) -> None:
+        super().__init__(status.message)
+        self.status = status

@@ -1,0 +1,47 @@
+"""The stops of a program in order: which steps go somewhere, and what is held where when they do."""
+
+from dataclasses import dataclass
+
+from ir_planner.program.steps import PlacedStep, Scenes
+from ir_planner.scene import PlanningScene
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """All steps, and `stops`: indices of those that go somewhere; a step at the place of the one before stays
+    there.
+    """
+
+    steps: tuple[PlacedStep, ...]
+    scenes: Scenes
+    stops: tuple[int, ...]
+
+    @staticmethod
+    def over(steps: tuple[PlacedStep, ...], scenes: Scenes) -> "Route":
+        """The route that visits the targets of the steps."""
+        stops, here = [], ""
+        for k, placed in enumerate(steps):
+            if placed.step.kind != "PAUSE" and placed.step.target != here:
+                stops.append(k)
+                here = placed.step.target
+        return Route(steps, scenes, tuple(stops))
+
+    def __len__(self) -> int:
+        return len(self.stops)
+
+    def at(self, place: int) -> PlacedStep:
+        """The step of a stop."""
+        return self.steps[self.stops[place]]
+
+    def name(self, place: int) -> str:
+        """Where a stop is; "": before the first."""
+        return self.at(place).step.target if place >= 0 else ""
+
+    def arriving(self, place: int) -> PlanningScene:
+        """The scene in which a stop is reached."""
+        return self.scenes.of(self.at(place).before)
+
+    def leaving(self, place: int) -> PlanningScene:
+        """The scene in which a stop is left; after the last one, the scene at the end."""
+        last = place + 1 == len(self.stops)
+        return self.scenes.of(self.steps[-1].after if last else self.at(place + 1).before)

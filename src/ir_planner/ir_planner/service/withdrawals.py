@@ -1,0 +1,133 @@
+"""Exit paths from an interaction configuration to outside a machine's zone: eq. (7) first, trees where it
+finds none.
+
+What comes out is shortened: shortcuts, waypoints pulled straight, and the end retracted to where the zone
+has just been left; all of it over certified edges.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.status import StatusCode
+
+from ir_planner.errors import RequestError
+from ir_planner.request import Journal
+from ir_planner.scene import path_cost
+from ir_planner.search import fewest_corners
+from ir_planner.service.exit import Exit
+from ir_planner.service.exit_search import ExitSearch
+from ir_planner.service.exit_tree import ExitTree
+from ir_planner.service.modified_ga import ModifiedGa
+
+# Every search for exit paths by its name; the next is asked where one finds none.
+EXIT_SEARCHES: Mapping[str, ExitSearch] = {"modified_ga": ModifiedGa(), "tree": ExitTree()}
+_SEARCHED = 2  # raw paths per candidate that is wanted: shortened, some of them end at the same place
+_STREAM = 7  # of the request's seed, so that other stages draw other numbers
+_DIFFERENT = 0.1  # rad: paths that end nearer to each other are one
+_END_SAMPLES = 24  # of the last step, where the zone is left: about a centimetre apart
+_CORNERS = 11  # points of a path between which shortcuts are tried: their number grows with the square
+
+
+@dataclass(frozen=True, eq=False)
+class ExitPath:
+    """A free path (M, n) from the interaction configuration to outside the zone, and the method that found
+    it.
+    """
+
+    method: str
+    points: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Withdrawal:
+    """What was found; for a failure the configuration farthest out, and the rejected candidates by reason.
+
+    zone_distance [m] of `farthest`: negative inside.
+    """
+
+    paths: list[ExitPath]
+    farthest: FloatArray
+    zone_distance: float
+    rejected: Counter[str]
+
+
+def exit_searches(modified_ga: ModifiedGa) -> Mapping[str, ExitSearch]:
+    """The registered searches, the modified GA with these settings."""
+    return {**EXIT_SEARCHES, "modified_ga": modified_ga}
+
+
+def withdrawal(
+    problem: Exit, wanted: int, method: str, searches: Mapping[str, ExitSearch], journal: Journal
+) -> Withdrawal:
+    """Up to `wanted` different shortened exit paths, cheapest by W first.
+
+    method: a key of `searches`, or "": each in turn until one finds any.
+    """
+    seed = np.random.SeedSequence([journal.seed % 2**63, _STREAM])
+    farthest, rejected = problem.interaction, Counter[str]()
+    depth = float(problem.area.zone_distance(farthest[None])[0])
+    paths: list[ExitPath] = []
+    for name, search in searches.items():
+        if paths or method not in ("", name):
+            continue
+        with journal.stage(search.title) as notes:
+            found = search.find(problem, _SEARCHED * wanted, seed, journal.work)
+            notes.append(found.note)
+        journal.rejected.update(+found.rejected)
+        rejected.update(found.rejected)
+        distance = float(problem.area.zone_distance(found.farthest[None])[0])
+        if distance > depth:
+            farthest, depth = found.farthest, distance
+        paths = [ExitPath(name, path) for path in found.paths]
+    if paths:
+        with journal.stage("shorten") as notes:
+            paths = _cheapest(paths, problem, wanted)
+            notes.append(f"{len(paths)} different paths")
+    return Withdrawal(paths, farthest, depth, rejected)
+
+
+def _cheapest(paths: list[ExitPath], problem: Exit, wanted: int) -> list[ExitPath]:
+    """The paths shortened, cheapest by W first, those that end at the same place once."""
+    space, weights = problem.inside, problem.inside.scene.weights
+
+    def cost(path: ExitPath) -> float:
+        return path_cost(weights, path.points)
+
+    shortened = []
+    for path in sorted(paths, key=cost)[: _SEARCHED * wanted]:
+        points = _end_retracted(fewest_corners(path.points, space, weights, _CORNERS), problem)
+        shortened.append(ExitPath(path.method, points if problem.contacts_end(points) else path.points))
+    chosen: list[ExitPath] = []
+    for path in sorted(shortened, key=cost):
+        if len(chosen) < wanted and all(_apart(path.points, other.points) for other in chosen):
+            chosen.append(path)
+    return chosen
+
+
+def _apart(a: FloatArray, b: FloatArray) -> bool:
+    """Whether two paths from the same configuration end apart."""
+    return bool(np.abs(a[-1] - b[-1]).max() > _DIFFERENT)
+
+
+def _end_retracted(path: FloatArray, problem: Exit) -> FloatArray:
+    """The path, its last step cut where the zone has just been left for good."""
+    share = np.linspace(0.0, 1.0, _END_SAMPLES + 1)[1:, None]
+    along = path[-2] + share * (path[-1] - path[-2])
+    out = problem.is_out(along)
+    still = np.flatnonzero(~out)
+    first = int(still[-1]) + 1 if len(still) else 0
+    return np.concatenate([path[:-1], along[first : first + 1]])
+
+
+def known_method(method: str) -> str:
+    """The method of a request; an unknown one lists the known."""
+    if method not in ("", *EXIT_SEARCHES):
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"planner_id {method[:60]!a} is unknown for service movements: "
+            f'known are "", {", ".join(EXIT_SEARCHES)}',
+        )
+    return method
