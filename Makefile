@@ -46,8 +46,9 @@ bench: setup      ## every benchmark, its claims at the end; JSON in out/bench
 	  $(BIN)/python "$$script" --json "out/bench/$$name.json" $(ARGS) || exit 1; \
 	done
 
-docs: setup       ## docs/interface_reference.md, from the interface files
+docs: setup       ## the pages that are written from code: interfaces, rooms
 	@$(BIN)/python tools/interface_reference.py
+	@$(BIN)/python tools/architecture_page.py
 
 clean:            ## remove what was built; .venv stays (rm -rf .venv for all)
 	rm -rf out build install log ros_ws/build ros_ws/install ros_ws/log .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
+import importlib.util
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -171,25 +171,17 @@ def test_a_name_that_does_not_exist_is_noticed() -> None:
     assert not exists("ir_kernels.ccd.no_such_function")
 
 
-def rooms_of(package: str) -> dict[str, str]:
-    """First paragraph of every sub-package and module of a package."""
-    folder = ROOT / "src" / package / package
-    files = (*folder.glob("*.py"), *folder.glob("*/__init__.py"))
-    named = {(path.parent.name if path.parent != folder else path.stem): path for path in files}
-    named.pop("__init__")
-    return {
-        name: " ".join((ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").split("\n\n")[0].split())
-        for name, path in named.items()
-    }
-
-
-def test_the_architecture_shows_every_room_with_its_first_words() -> None:
-    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
-    sections = re.findall(r"^## Inside `(\w+)`\n(.*?)(?=^## |\Z)", page, re.DOTALL | re.MULTILINE)
-    assert sections
-    for package, section in sections:
-        shown = dict(re.findall(r"^\| `(\w+)` \| (.+?) \|", section, re.MULTILINE))
-        assert shown == rooms_of(package), package
+def test_the_architecture_shows_the_rooms_as_they_are() -> None:
+    spec = importlib.util.spec_from_file_location(
+        "architecture_page", ROOT / "tools" / "architecture_page.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    page = tool.PAGE.read_text("utf-8")
+    assert tool.PART.findall(page)
+    assert page == tool.page(), "run `make docs`"
 
 
 def test_the_citation_names_version_and_licence_of_the_packages() -> None:
