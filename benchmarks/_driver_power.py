@@ -53,21 +53,21 @@ RESTS = (
 
 
 def transition_rows(cell: Cell) -> list[dict[str, Any]]:
-    """How long every way in and out takes, beside its parameter."""
+    """How long every transition into a mode and out of it takes, beside its parameter."""
     simulation = make_simulation(cell, backend="ideal")
     rows = []
     for mode, enter, leave in RESTS:
         rest = simulation.modes.rests[mode]
-        for act, on_the_way, there, asked in (
+        for act, transition, there, asked in (
             (enter, rest.entering, mode, rest.enter),
             (leave, rest.leaving, Mode.STAND_ON_MOTORS, rest.leave),
         ):
             act(simulation)
-            until(simulation, on_the_way)
+            until(simulation, transition)
             began = simulation.time
             until(simulation, there)
             took = simulation.time - began
-            row = {"case": "transition", "name": on_the_way.name, "seconds": took, "asked": asked}
+            row = {"case": "transition", "name": transition.name, "seconds": took, "asked": asked}
             rows.append({**row, "error_s": abs(took - asked)})
         press("-drives_on")(simulation)
         simulation.run(1.0)
@@ -110,15 +110,15 @@ def _watts(simulation: Simulation, mode: Mode, payload: float) -> dict[str, Any]
     return {"case": "Table II", "mode": mode.name, "payload_kg": payload, "watts": watts}
 
 
-def energy_rows(cell: Cell) -> list[dict[str, Any]]:
-    """An hour of the ideal robot to and fro and at rest: the meter beside the sum of what it publishes."""
+def energy_row(cell: Cell, seconds: float) -> dict[str, Any]:
+    """The ideal robot to and fro and at rest for so long: the meter beside the sum of what it publishes."""
     simulation = make_simulation(cell, backend="ideal")
     driver = Driver(simulation, round(TICK / simulation.settings.dt))
     home = simulation.executor.command
     places = (home + np.array([0.8, 0.2, -0.2, 0.4, -0.3, 0.5]), home)
     rest = np.zeros((1, 6))
     total = energy = 0.0
-    for k in range(1, round(HOUR / TICK)):
+    for k in range(1, round(seconds / TICK)):
         if k % 1500 == 0:  # every 15 s, and 60 s of Bus Power Off in every 5 min
             press("ab" if k % 30_000 == 24_000 else "-ab")(simulation)
             if simulation.modes.motors_on:
@@ -133,12 +133,10 @@ def energy_rows(cell: Cell) -> list[dict[str, Any]]:
             energy = frame.power.energy
     driver.close()
     percent = 100.0 * abs(total / energy - 1.0)
-    return [
-        {
-            "case": "energy",
-            "cell": cell.name,
-            "published_J": total,
-            "meter_J": energy,
-            "error_percent": percent,
-        }
-    ]
+    return {
+        "case": "energy",
+        "cell": cell.name,
+        "published_J": total,
+        "meter_J": energy,
+        "error_percent": percent,
+    }

@@ -3,74 +3,76 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rclpy
+from _node_process import running
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+
+FIRST, STARTED_S = 500, 60.0  # messages that are passed over, and how long they may take to come
+PERIOD_NS = 2_000_000
+
+
+@dataclass
+class Heard:
+    """When messages arrived [s], when they were sent [ns], and their stamps [ns]."""
+
+    arrivals: list[float] = field(default_factory=list)
+    sent: list[int] = field(default_factory=list)
+    stamps: list[int] = field(default_factory=list)
+
+    def hear(self, msg: JointState, info: dict[str, int]) -> None:
+        """Take one message."""
+        self.arrivals.append(time.monotonic())
+        self.sent.append(info["source_timestamp"])
+        self.stamps.append(msg.header.stamp.sec * 1_000_000_000 + msg.header.stamp.nanosec)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self.arrivals.clear()
+        self.sent.clear()
+        self.stamps.clear()
 
 
 def streamed(cell: str, seconds: float) -> dict[str, Any]:
     """Run the node as a process and listen to joint_states for so long."""
-    os.environ.setdefault("ROS_DOMAIN_ID", "83")
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    import rclpy
-    from rclpy.qos import QoSProfile
-    from sensor_msgs.msg import JointState
+    heard = Heard()
+    with running("ir_sim_driver.node", cell=cell, wake_port=0) as process:
+        rclpy.init()
+        node = rclpy.create_node("driver_benchmark")
+        try:
+            node.create_subscription(JointState, "joint_states", heard.hear, QoSProfile(depth=2000))
+            limit = time.monotonic() + STARTED_S
+            while len(heard.stamps) < FIRST and time.monotonic() < limit:
+                rclpy.spin_once(node, timeout_sec=0.1)
+            heard.clear()
+            before, began = process_cpu(process.pid), time.monotonic()
+            while time.monotonic() - began < seconds:
+                rclpy.spin_once(node, timeout_sec=0.1)
+            cpu = (process_cpu(process.pid) - before) / (time.monotonic() - began)
+        finally:
+            node.destroy_node()
+            rclpy.try_shutdown()
+    return _row(cell, heard, cpu)
 
-    command = [
-        sys.executable,
-        "-m",
-        "ir_sim_driver.node",
-        "--ros-args",
-        "-p",
-        f"cell:={cell}",
-        "-p",
-        "wake_port:=0",
-    ]
-    node_process = subprocess.Popen(command)
-    rclpy.init()
-    node = rclpy.create_node("driver_benchmark")
-    arrivals: list[float] = []
-    stamps: list[int] = []
 
-    sent: list[int] = []
-
-    def heard(msg: JointState, info: dict[str, int]) -> None:
-        arrivals.append(time.monotonic())
-        sent.append(info["source_timestamp"])
-        stamps.append(msg.header.stamp.sec * 1_000_000_000 + msg.header.stamp.nanosec)
-
-    node.create_subscription(JointState, "joint_states", heard, QoSProfile(depth=2000))
-    try:
-        limit = time.monotonic() + 60.0
-        while len(arrivals) < 500 and time.monotonic() < limit:
-            rclpy.spin_once(node, timeout_sec=0.1)
-        arrivals.clear()
-        sent.clear()
-        stamps.clear()
-        before, began = process_cpu(node_process.pid), time.monotonic()
-        while time.monotonic() - began < seconds:
-            rclpy.spin_once(node, timeout_sec=0.1)
-        cpu = (process_cpu(node_process.pid) - before) / (time.monotonic() - began)
-    finally:
-        node_process.send_signal(signal.SIGINT)
-        node_process.wait(10.0)
-        node.destroy_node()
-        rclpy.try_shutdown()
-    periods = np.diff(arrivals) * 1e3
+def _row(cell: str, heard: Heard, cpu: float) -> dict[str, Any]:
+    """Periods and losses; cpu: share of a core that the node used."""
+    stamps, arrivals, periods = heard.stamps, heard.arrivals, np.diff(heard.arrivals) * 1e3
     return {
         "case": "streamed pybullet",
         "cell": cell,
         "messages": len(stamps),
-        "lost": round((stamps[-1] - stamps[0]) / 2_000_000) + 1 - len(stamps),
+        "lost": round((stamps[-1] - stamps[0]) / PERIOD_NS) + 1 - len(stamps),
         "rate_hz": (len(arrivals) - 1) / (arrivals[-1] - arrivals[0]),
         "p50_ms": float(np.percentile(periods, 50)),
         "p99_ms": float(np.percentile(periods, 99)),
-        "p99_sent_ms": float(np.percentile(np.diff(sent) * 1e-6, 99)),  # without the listener's own delays
+        "p99_sent_ms": float(np.percentile(np.diff(heard.sent) * 1e-6, 99)),  # without the listener's delays
         "worst_ms": float(periods.max()),
         "cpu_percent": 100.0 * cpu,
     }

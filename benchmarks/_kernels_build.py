@@ -8,7 +8,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from _kernels_dynamics import Claim, Row
+from _kernels_rows import Row
+from _results import Claim, at_most
 
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "ir_kernels"
 IMPORT = "import time, numpy; t = time.perf_counter(); import ir_kernels; print(time.perf_counter() - t)"
@@ -40,9 +41,9 @@ def measure(build: bool) -> tuple[list[Row], list[Claim]]:
     """Rows and claims of this half; the build only where it is asked for."""
     loading = import_time() * 1e3
     rows = [Row("import, after NumPy", "", loading, "ms")]
-    claims = [Claim("import", loading, "ms", 60.0, loading <= 60.0)]
+    claims = [at_most("import", loading, "ms", 60.0)]
     if build:
         seconds = build_time()
         rows.append(Row("build of both variants", "", seconds, "s"))
-        claims.append(Claim("build", seconds, "s", 90.0, seconds <= 90.0))
+        claims.append(at_most("build", seconds, "s", 90.0))
     return rows, claims

@@ -1,6 +1,5 @@
 """Dynamics and inverse kinematics half of `benchmarks/kernels.py`: nanoseconds per sample, beside Pinocchio.
 
-`rows()` measures and `claims()` judges; `python benchmarks/_kernels_dynamics.py` prints both on its own.
 One thread, best of several repetitions (what the machine can do, not what its other work leaves), peers in
 the same run.
 """
@@ -8,12 +7,14 @@ the same run.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio
+from _kernels_rows import Row, Tool, best
+from _pinocchio_arm import pinocchio_arm
+from _results import Claim, at_least, at_most
 
 from ir_description import load_robot
 from ir_kernels import (
@@ -30,67 +31,7 @@ from ir_msgs_py.arrays import FloatArray
 
 SAMPLES = 4096
 PINOCCHIO_SAMPLES = 512
-REPETITIONS = 30
 POSITION_ERROR, ROTATION_ERROR = 1e-4, 3e-4  # m, rad: what counts as arrived
-
-
-@dataclass(frozen=True)
-class Row:
-    """One measurement: what, beside what it stands, how long one item took."""
-
-    kernel: str
-    peer: str
-    value: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A measured figure beside the bound it was asked to keep."""
-
-    name: str
-    value: float
-    unit: str
-    bound: float
-    holds: bool
-
-
-@dataclass(frozen=True)
-class Tool:
-    """The 155 kg of the paper's Table II."""
-
-    name: str = "tool"
-    mass: float = 155.0
-    com: tuple[float, float, float] = (0.24, 0.0, 0.0)
-    inertia: tuple[tuple[float, ...], ...] = ((5.0, 0.0, 0.0), (0.0, 4.0, 0.0), (0.0, 0.0, 6.0))
-
-
-def best(function: Callable[[], Any], items: int, repetitions: int = REPETITIONS) -> float:
-    """Seconds per item, the fastest of the repetitions."""
-    fastest = np.inf
-    for _ in range(repetitions):
-        begin = time.perf_counter()
-        function()
-        fastest = min(fastest, time.perf_counter() - begin)
-    return fastest / items
-
-
-def _pinocchio_model(robot: Any, load: Tool) -> Any:
-    model = pinocchio.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -9.80665])
-    parent = 0
-    for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):
-        placement = pinocchio.SE3(origin[:3, :3].copy(), origin[:3, 3].copy())
-        parent = model.addJoint(
-            parent, pinocchio.JointModelRevoluteUnaligned(axis.copy()), placement, f"joint_{i}"
-        )
-        own = pinocchio.Inertia(
-            float(robot.link_mass[i + 1]), robot.link_com[i + 1].copy(), robot.link_inertia[i + 1].copy()
-        )
-        model.appendBodyToJoint(parent, own, pinocchio.SE3.Identity())
-    carried = pinocchio.Inertia(load.mass, np.array(load.com), np.array(load.inertia))
-    model.appendBodyToJoint(parent, carried, pinocchio.SE3.Identity())
-    return model
 
 
 def _agreement(model: DynamicsModel, peer: Any, samples: Sequence[FloatArray], robot: Any) -> float:
@@ -107,7 +48,7 @@ def _agreement(model: DynamicsModel, peer: Any, samples: Sequence[FloatArray], r
 
 def _dynamics(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
     robot = load_robot()
-    model, peer = DynamicsModel(robot, (Tool(),)), _pinocchio_model(robot, Tool())
+    model, peer = DynamicsModel(robot, (Tool(),)), pinocchio_arm(robot, (Tool(),))
     q = rng.uniform(robot.position_min, robot.position_max, (SAMPLES, 6))
     qd, qdd = rng.normal(size=(2, SAMPLES, 6))
     data = peer.createData()
@@ -142,10 +83,10 @@ def _dynamics(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
     agrees = _agreement(model, peer, few, robot)
     off = float(np.abs(model.inverse_dynamics_single(q, qd, qdd) - tau).max() / np.abs(tau).max())
     claims = [
-        Claim("inverse dynamics in double", double * 1e9, ns, 20.0, double * 1e9 <= 20.0),
-        Claim("inverse dynamics in float", single * 1e9, ns, 20.0, single * 1e9 <= 20.0),
-        Claim("inverse dynamics against Pinocchio, double", agrees, "relative", 1e-9, agrees <= 1e-9),
-        Claim("inverse dynamics in float against double", off, "relative", 1e-5, off <= 1e-5),
+        at_most("inverse dynamics in double", double * 1e9, ns, 20.0),
+        at_most("inverse dynamics in float", single * 1e9, ns, 20.0),
+        at_most("inverse dynamics against Pinocchio, double", agrees, "relative", 1e-9),
+        at_most("inverse dynamics in float against double", off, "relative", 1e-5),
     ]
     return rows, claims
 
@@ -166,9 +107,9 @@ def _closed_form(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
         Row("closed-form IK, solutions", "", len(found.q) / SAMPLES, "per pose"),
     ]
     claims = [
-        Claim("closed-form IK, all branches and turns", seconds * 1e6, us, 2.0, seconds * 1e6 <= 2.0),
-        Claim("closed-form IK, configurations missed", float(missed), f"of {SAMPLES}", 0.0, missed == 0),
-        Claim("closed-form IK, error of the pose", error, "m", 1e-9, error <= 1e-9),
+        at_most("closed-form IK, all branches and turns", seconds * 1e6, us, 2.0),
+        at_most("closed-form IK, configurations missed", missed, f"of {SAMPLES}", 0),
+        at_most("closed-form IK, error of the pose", error, "m", 1e-9),
     ]
     return rows, claims
 
@@ -197,8 +138,8 @@ def _descent(rng: np.random.Generator, poses: int) -> tuple[list[Row], list[Clai
         rows += [Row(name, "", median, "ms per pose, median"), Row(name, "", share, "% of the poses reached")]
         if settings.newton_steps:
             claims += [
-                Claim(f"{name}: time", median, "ms per pose, median", 1.0, median <= 1.0),
-                Claim(f"{name}: reached", share, "% of the poses", 99.0, share >= 99.0),
+                at_most(f"{name}: time", median, "ms per pose, median", 1.0),
+                at_least(f"{name}: reached", share, "% of the poses", 99.0),
             ]
     return rows, claims
 
@@ -208,17 +149,3 @@ def measure(seed: int = 0, poses: int = 500) -> tuple[list[Row], list[Claim]]:
     rng = np.random.default_rng(seed)
     parts = [_dynamics(rng), _closed_form(rng), _descent(rng, poses)]
     return [row for rows, _ in parts for row in rows], [claim for _, claims in parts for claim in claims]
-
-
-def main() -> None:
-    rows, claims = measure()
-    for row in rows:
-        print(f"{row.kernel + (' (' + row.peer + ')' if row.peer else ''):66s} {row.value:10.3f} {row.unit}")
-    print()
-    for claim in claims:
-        verdict = "holds" if claim.holds else "falls short"
-        print(f"{claim.name:50s} {claim.value:10.3g} {claim.unit:22s} bound {claim.bound:<8g} {verdict}")
-
-
-if __name__ == "__main__":
-    main()

@@ -15,20 +15,32 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from _kernels_dynamics import Claim, Row, best
 from _kernels_peers import Bullet, Coal
+from _kernels_rows import Row, best
+from _results import Claim, at_least, at_most
 
 from ir_description import Cell, load_cell
 from ir_kernels import FREE, UNDECIDED, Chain, CollisionModel
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
 SAMPLES = 4000  # configurations per batch: a hundred edges
-REPETITIONS, TURNS = 60, 10
-EDGE, SAFETY, ROOM = 0.8, 0.02, 0.005  # rad, m, m
-EDGES, FINE = 2500, 0.0005  # per cell; rad
-AGREEMENT = 25_000  # configurations per cell compared with Coal
+EDGE, SAFETY, MARGIN = 0.8, 0.02, 0.005  # rad, m, m
+FINE = 0.0005  # rad
 COAL_SAMPLES, BULLET_SAMPLES = 200, 40
 NS = "ns per configuration"
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How often a batch is timed, in how many turns with Coal; edges and compared configurations per cell."""
+
+    repetitions: int = 60
+    turns: int = 10
+    edges: int = 2500
+    compared: int = 25_000
+
+
+FULL, QUICK = Effort(), Effort(10, 2, 300, 1000)
 
 
 @dataclass(frozen=True)
@@ -69,80 +81,78 @@ def path_like(cell: Cell, rng: np.random.Generator, count: int = SAMPLES) -> Flo
     return np.ascontiguousarray((q0[:, None] + t * (q1 - q0)[:, None]).reshape(-1, q0.shape[1]))
 
 
-def threaded(model: CollisionModel, q: FloatArray) -> float:
+def threaded(model: CollisionModel, q: FloatArray, repetitions: int) -> float:
     """Seconds per configuration with two threads, each with its half."""
     halves = np.ascontiguousarray(q[: len(q) // 2]), np.ascontiguousarray(q[len(q) // 2 :])
     with ThreadPoolExecutor(2) as pool:
-        return best(lambda: list(pool.map(model.min_distance, halves)), len(q), REPETITIONS)
+        return best(lambda: list(pool.map(model.min_distance, halves)), len(q), repetitions)
 
 
-def _speed(name: str, cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
+def _speed(cell: Cell, rng: np.random.Generator, effort: Effort) -> tuple[list[Row], list[Claim]]:
+    """Distances and checks, beside Coal and PyBullet."""
     model, capsules, bodies = model_of(cell)
-    path, random = path_like(cell, rng), uniform(cell, rng, SAMPLES)
+    path, name = path_like(cell, rng), cell.name
     coal, bullet = Coal(model, capsules, bodies), Bullet(cell, model, bodies)
     ours = theirs = np.inf
-    for _ in range(TURNS):  # in turns: the processor's pace changes
-        ours = min(ours, best(lambda: model.min_distance(path), SAMPLES, REPETITIONS))
+    for _ in range(effort.turns):  # in turns: the processor's clock changes
+        ours = min(ours, best(lambda: model.min_distance(path), SAMPLES, effort.repetitions))
         theirs = min(theirs, best(lambda: coal.compute_all(path[:COAL_SAMPLES]), COAL_SAMPLES, 5))
     pybullet = best(lambda: [bullet.compute(q) for q in path[:BULLET_SAMPLES]], BULLET_SAMPLES, 2)
-    others = {
-        "minimum distance, random": best(lambda: model.min_distance(random), SAMPLES, REPETITIONS),
-        "minimum distance, path, two threads": threaded(model, path),
-        "check against 20 mm, path": best(lambda: model.is_free(path, SAFETY), SAMPLES, REPETITIONS),
-        "check against 20 mm, random": best(lambda: model.is_free(random, SAFETY), SAMPLES, REPETITIONS),
-        f"all {len(model.pairs)} distances": best(lambda: model.distances(path), SAMPLES, 10),
-        "link poses": best(lambda: model.chain.link_poses(path), SAMPLES, REPETITIONS),
-    }
+    what = f"{name}: minimum distance, path"
     rows = [
-        Row(f"{name}: minimum distance, path", "", ours * 1e9, NS),
-        *(Row(f"{name}: {what}", "", seconds * 1e9, NS) for what, seconds in others.items()),
-        Row(f"{name}: minimum distance, path", "Coal through Pinocchio", theirs * 1e9, NS),
-        Row(f"{name}: minimum distance, path", "PyBullet", pybullet * 1e9, NS),
+        Row(what, "", ours * 1e9, NS),
+        *_batches(name, model, path, uniform(cell, rng, SAMPLES), effort.repetitions),
+        Row(what, "Coal through Pinocchio", theirs * 1e9, NS),
+        Row(what, "PyBullet", pybullet * 1e9, NS),
         Row(f"{name}: against Coal through Pinocchio", "", theirs / ours, "times faster"),
         Row(f"{name}: against PyBullet", "", pybullet / ours, "times faster"),
     ]
     bound = 100.0 if name == "open" else 150.0
     claims = [
-        Claim(f"{name}: minimum distance, path-like", ours * 1e9, NS, bound, ours * 1e9 <= bound),
-        Claim(
-            f"{name}: against Coal through Pinocchio",
-            theirs / ours,
-            "times faster",
-            300.0,
-            theirs >= 300.0 * ours,
-        ),
+        at_most(f"{name}: minimum distance, path-like", ours * 1e9, NS, bound),
+        at_least(f"{name}: against Coal through Pinocchio", theirs / ours, "times faster", 300.0),
     ]
     return rows, claims
 
 
-def _agreement(name: str, cell: Cell, rng: np.random.Generator) -> list[Claim]:
+def _batches(
+    name: str, model: CollisionModel, path: FloatArray, random: FloatArray, repetitions: int
+) -> list[Row]:
+    """Every other question about a batch of configurations."""
+    timed = {
+        "minimum distance, random": best(lambda: model.min_distance(random), SAMPLES, repetitions),
+        "minimum distance, path, two threads": threaded(model, path, repetitions),
+        "check against 20 mm, path": best(lambda: model.is_free(path, SAFETY), SAMPLES, repetitions),
+        "check against 20 mm, random": best(lambda: model.is_free(random, SAFETY), SAMPLES, repetitions),
+        f"all {len(model.pairs)} distances": best(lambda: model.distances(path), SAMPLES, 10),
+        "link poses": best(lambda: model.chain.link_poses(path), SAMPLES, repetitions),
+    }
+    return [Row(f"{name}: {what}", "", seconds * 1e9, NS) for what, seconds in timed.items()]
+
+
+def _agreement(cell: Cell, rng: np.random.Generator, count: int) -> list[Claim]:
     """Least distances beside Coal's."""
     model, capsules, bodies = model_of(cell)
     coal = Coal(model, capsules, bodies)
     coal.precise()
-    q = uniform(cell, rng, AGREEMENT)
+    q = uniform(cell, rng, count)
     ours = model.min_distance(q).distance
     theirs = np.array([coal.distances(row).min() for row in q])
     apart = theirs > 0.0
     worst = float(np.abs(ours - theirs)[apart].max())
     signs = int(((ours > 1e-6) & (theirs < -1e-6)).sum() + ((ours < -1e-6) & (theirs > 1e-6)).sum())
+    different = f"{cell.name}: difference from Coal where apart"
     return [
-        Claim(
-            f"{name}: difference from Coal where apart",
-            worst,
-            f"m of {int(apart.sum())}",
-            1e-6,
-            worst <= 1e-6,
-        ),
-        Claim(f"{name}: other sign than Coal", float(signs), f"of {AGREEMENT}", 0.0, signs == 0),
+        at_most(different, worst, f"m of {int(apart.sum())}", 1e-6),
+        at_most(f"{cell.name}: other sign than Coal", signs, f"of {count}", 0),
     ]
 
 
-def _roomy(model: CollisionModel, q0: FloatArray, q1: FloatArray) -> BoolArray:
-    """Edges whose 81 samples all keep the safety distance and ROOM."""
+def _clear(model: CollisionModel, q0: FloatArray, q1: FloatArray) -> BoolArray:
+    """Edges whose 81 samples all keep the safety distance and MARGIN."""
     free = np.ones(len(q0), bool)
     for t in np.linspace(0.0, 1.0, 81):
-        free &= model.is_free(np.ascontiguousarray(q0 + t * (q1 - q0)), SAFETY + ROOM)
+        free &= model.is_free(np.ascontiguousarray(q0 + t * (q1 - q0)), SAFETY + MARGIN)
     return free
 
 
@@ -155,43 +165,43 @@ def _refuted(model: CollisionModel, q0: FloatArray, q1: FloatArray) -> int:
     return count
 
 
-def _edges(name: str, cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
-    model, _, _ = model_of(cell)
-    q0, q1 = edges(cell, rng, 12 * EDGES)
-    roomy = _roomy(model, q0, q1)
-    a, b = q0[roomy][:EDGES], q1[roomy][:EDGES]
-    few = [(a[k : k + 50], b[k : k + 50]) for k in range(0, len(a) - 49, 50)]
-    per_edge = [best(partial(model.certify_edges, *pair, SAFETY), 50, 5) for pair in few]
-    alone = [best(partial(model.certify_edges, a[k : k + 1], b[k : k + 1], SAFETY), 1, 3) for k in range(200)]
-    t = np.linspace(0.0, 1.0, 40)[None, :, None]
-    samples = (a[:200, None] + t * (b - a)[:200, None]).reshape(-1, a.shape[1])
-    sampled = best(lambda: model.is_free(samples, SAFETY), 200, 10)
+def _edges(cell: Cell, rng: np.random.Generator, count: int) -> tuple[list[Row], list[Claim]]:
+    """Certified edges: their time, those left undecided, and whether a fine sample refutes one."""
+    model, name = model_of(cell)[0], cell.name
+    q0, q1 = edges(cell, rng, 12 * count)
+    clear = _clear(model, q0, q1)
+    a, b = q0[clear][:count], q1[clear][:count]
     found = model.certify_edges(a, b, SAFETY)
-    undecided = 100.0 * float((found.verdict == UNDECIDED).mean())
-    everything = model.certify_edges(q0[:EDGES], q1[:EDGES], SAFETY)
+    everything = model.certify_edges(q0[:count], q1[:count], SAFETY)
     free = everything.verdict == FREE
-    refuted = _refuted(model, q0[:EDGES][free], q1[:EDGES][free])
+    refuted = _refuted(model, q0[:count][free], q1[:count][free])
     refuted += _refuted(model, a[found.verdict == FREE], b[found.verdict == FREE])
     checked = int(free.sum() + (found.verdict == FREE).sum())
-    median = float(np.median(per_edge)) * 1e6
-    rows = [
-        Row(f"{name}: certified edge, in batches of 50, median", "", median, "us"),
-        Row(
-            f"{name}: certified edge, one per call from Python, median",
-            "",
-            float(np.median(alone)) * 1e6,
-            "us",
-        ),
-        Row(f"{name}: sampled edge, 40 configurations, in a batch", "", sampled * 1e6, "us"),
-    ]
+    rows = _edge_times(name, model, a, b)
+    undecided = 100.0 * float((found.verdict == UNDECIDED).mean())
     claims = [
-        Claim(f"{name}: certified edge, in batches of 50, median", median, "us", 10.0, median <= 10.0),
-        Claim(f"{name}: undecided edges", undecided, "%", 1.0, undecided < 1.0),
-        Claim(
-            f"{name}: edges called free with a colliding sample", refuted, f"of {checked}", 0, refuted == 0
-        ),
+        at_most(f"{name}: certified edge, in batches of 50, median", rows[0].value, "us", 10.0),
+        at_most(f"{name}: undecided edges", undecided, "%", 1.0),
+        at_most(f"{name}: edges called free with a colliding sample", refuted, f"of {checked}", 0),
     ]
     return rows, claims
+
+
+def _edge_times(name: str, model: CollisionModel, a: FloatArray, b: FloatArray) -> list[Row]:
+    """Microseconds per edge from a to b (N, n): in batches, alone, and sampled instead of certified."""
+    few = [(a[k : k + 50], b[k : k + 50]) for k in range(0, len(a) - 49, 50)]
+    per_edge = [best(partial(model.certify_edges, *pair, SAFETY), 50, 5) for pair in few]
+    single = [(a[k : k + 1], b[k : k + 1]) for k in range(min(200, len(a)))]
+    alone = [best(partial(model.certify_edges, *pair, SAFETY), 1, 3) for pair in single]
+    t = np.linspace(0.0, 1.0, 40)[None, :, None]
+    samples = (a[:200, None] + t * (b - a)[:200, None]).reshape(-1, a.shape[1])
+    sampled = best(lambda: model.is_free(samples, SAFETY), len(samples) // 40, 10)
+    timed = {
+        "certified edge, in batches of 50, median": float(np.median(per_edge)),
+        "certified edge, one per call from Python, median": float(np.median(alone)),
+        "sampled edge, 40 configurations, in a batch": sampled,
+    }
+    return [Row(f"{name}: {what}", "", seconds * 1e6, "us") for what, seconds in timed.items()]
 
 
 def _boxes(cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
@@ -207,17 +217,13 @@ def _boxes(cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]
     model, _, _ = model_of(cell, bodies)
     path, random = path_like(cell, rng), uniform(cell, rng, 400)
     ours = best(lambda: model.min_distance(path), len(path), 20) * 1e6
+    other = best(lambda: model.min_distance(random), 400, 10) * 1e6
     us = "us per configuration"
     rows = [
         Row("1,000 boxes: minimum distance, path", "", ours, us),
-        Row(
-            "1,000 boxes: minimum distance, random",
-            "",
-            best(lambda: model.min_distance(random), 400, 10) * 1e6,
-            us,
-        ),
+        Row("1,000 boxes: minimum distance, random", "", other, us),
     ]
-    return rows, [Claim("1,000 boxes: minimum distance, path-like", ours, us, 1.5, ours <= 1.5)]
+    return rows, [at_most("1,000 boxes: minimum distance, path-like", ours, us, 1.5)]
 
 
 def _construction(cell: Cell) -> Row:
@@ -228,17 +234,17 @@ def _construction(cell: Cell) -> Row:
     return Row(f"{cell.name}: a new collision model", "", (time.perf_counter() - begin) / 20 * 1e6, "us")
 
 
-def measure(cells: Sequence[str], seed: int = 0) -> tuple[list[Row], list[Claim]]:
+def measure(cells: Sequence[str], seed: int = 0, effort: Effort = FULL) -> tuple[list[Row], list[Claim]]:
     """All rows and claims of this half over the cells."""
     rng = np.random.default_rng(seed)
     rows: list[Row] = []
     claims: list[Claim] = []
     for name in cells:
         cell = load_cell(name)
-        for part in (_speed(cell.name, cell, rng), _edges(cell.name, cell, rng)):
+        for part in (_speed(cell, rng, effort), _edges(cell, rng, effort.edges)):
             rows += part[0]
             claims += part[1]
-        claims += _agreement(cell.name, cell, rng)
+        claims += _agreement(cell, rng, effort.compared)
         rows.append(_construction(cell))
     part = _boxes(load_cell(cells[0]), rng)
     return rows + part[0], claims + part[1]

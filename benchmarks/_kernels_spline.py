@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from _kernels_dynamics import Row, Tool, best
 from _kernels_geometry import model_of
+from _kernels_rows import Row, Tool, best
 
 from ir_description import load_cell
 from ir_kernels import DynamicsModel, SplineCost, SplineDescent, SplineTerms
@@ -20,10 +20,10 @@ def _rows(name: str, rng: np.random.Generator) -> list[Row]:
     threshold = np.full((1, len(model.pairs)), 0.02)
     terms = SplineTerms(*limits, robot.position_min, robot.position_max, np.zeros(robot.n), threshold)
     u = np.clip((np.arange(CONTROL) - 2.0) / (CONTROL - 5.0), 0.0, 1.0)[:, None]
-    way = rng.uniform(-0.2, 0.2, robot.n)
-    way[0] = 1.5
+    span = rng.uniform(-0.2, 0.2, robot.n)
+    span[0] = 1.5
     middle = np.radians([0.0, -90.0, 100.0, 0.0, 60.0, 0.0])
-    control = middle + (u * u * (3.0 - 2.0 * u) - 0.5) * way
+    control = middle + (u * u * (3.0 - 2.0 * u) - 0.5) * span
     cost, plain = SplineCost(model, dynamics, terms), SplineCost(model, dynamics, terms, core=None)
 
     def descend() -> SplineDescent:

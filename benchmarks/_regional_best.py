@@ -56,9 +56,9 @@ def _ompl(task: Task, seconds: float) -> Iterator[tuple[OmplPath, Cost]]:
 
 def _followed(planner: Planner, task: Task, seconds: float) -> Iterator[Cost]:
     """OMPL's paths driven by the planner: half of the time finds paths, half drives the cheapest of them."""
-    ways = sorted(_ompl(task, 0.5 * seconds), key=lambda way: way[1].J)
+    paths = sorted(_ompl(task, 0.5 * seconds), key=lambda found: found[1].J)
     end = time.perf_counter() + 0.5 * seconds
-    for path, _ in ways:
+    for path, _ in paths:
         if time.perf_counter() > end:
             return
         try:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from _regional_ours import Run
 from _regional_tasks import Cost, Task
+from _results import Claim, at_least, at_most
 
 FIRST_MS = {"open": 1.0, "table_columns": 2.0, "cnc_door": 10.0, "deep_box": 30.0}
 FINAL_MS = {"open": 50.0, "table_columns": 50.0, "cnc_door": 200.0, "deep_box": 200.0}
@@ -89,27 +90,6 @@ class Figures:
             row["near_best"] = f"{self.near_best(self.runs)}/{len(self.runs)}"
             row["near_best_1s"] = f"{self.near_best(self.patient)}/{len(self.patient)}"
         return row
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A measured figure beside the bound it was asked to keep."""
-
-    name: str
-    value: float
-    unit: str
-    bound: float
-    holds: bool
-
-
-def at_most(name: str, value: float, unit: str, bound: float) -> Claim:
-    """A claim that holds up to its bound."""
-    return Claim(name, value, unit, bound, value <= bound)
-
-
-def at_least(name: str, value: float, unit: str, bound: float) -> Claim:
-    """A claim that holds from its bound on."""
-    return Claim(name, value, unit, bound, value >= bound)
 
 
 def _median(values: list[float], digits: int) -> float | None:

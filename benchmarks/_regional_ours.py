@@ -19,7 +19,7 @@ from ir_planner.request.goals import Goal
 PLANNING_TIME = 1.0  # s
 ENDLESS = 100_000_000  # certified edges: more than the time holds
 UNHURRIED = 60.0  # s: where ids are compared, so that the budget of work ends a search and never the clock
-FIRST = "first feasible"  # how the note of the stage begins that knew the first free way
+FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 NOTHING = "nothing free"
 
 
@@ -58,7 +58,7 @@ def asked(task: Task, seed: int = 0) -> PlanOptions:
 
 
 def first_feasible(info: PlanningInfo) -> float:
-    """Seconds until the first free way was known, as the stages tell it.
+    """Seconds until the first free path was known, as the stages tell it.
 
     Without a note of it: until the first stage had ended that didn't come back with nothing.
     """
@@ -72,7 +72,7 @@ def first_feasible(info: PlanningInfo) -> float:
 
 
 def tells_first(info: PlanningInfo) -> bool:
-    """Whether a stage notes the first feasible way."""
+    """Whether a stage notes the first feasible path."""
     return any(stage.note.startswith(FIRST) for stage in info.stages)
 
 

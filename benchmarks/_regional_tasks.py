@@ -49,11 +49,16 @@ class Cost:
         return Cost(energy + TIME_VALUE * duration, duration, energy)
 
 
+def scene_of(cell: str) -> PlanningScene:
+    """A bundled cell or the cell of a file with its tool."""
+    described = load_cell(cell)
+    return scene_with(described, load_text(described), load_power_data())
+
+
 def tasks_of(cell: str) -> list[Task]:
     """Every task of a cell, there and back: `start->goal` and `goal->start`."""
-    described = load_cell(cell)
-    scene = scene_with(described, load_text(described), load_power_data())
-    tasks = []
+    scene = scene_of(cell)
+    described, tasks = scene.cell, []
     for task in described.tasks:
         start, goal = (np.array(q, dtype=np.float64) for q in (task.start, task.goal))
         ends = float(scene.collision.min_distance(np.stack([start, goal])).distance.min())

@@ -158,8 +158,8 @@ def _excess(trajectory: PathTrajectory, scene: PlanningScene) -> float:
 
 def _fastest_leg(points: FloatArray, scene: PlanningScene) -> _Leg | None:
     """TOPP-RA over a spline through the points, iterated until its tangents are where it drives."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    path = SplineInterpolator(way / way[-1], points, "natural")
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    path = SplineInterpolator(length / length[-1], points, "natural")
     grid = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, GRID + 1)))  # finer at the ends, where s' changes most
     limits = _Limits(scene, path, grid)
     best: tuple[float, _Leg] | None = None
@@ -169,9 +169,9 @@ def _fastest_leg(points: FloatArray, scene: PlanningScene) -> _Leg | None:
         if speed is None or not np.isfinite(speed).all():
             break
         leg = _Leg(path, grid, speed**2)
-        pace = _allowed(PathTrajectory([leg]), scene)
-        if pace is not None and (best is None or pace.duration < best[0]):
-            best = pace.duration, leg
+        slowed = _allowed(PathTrajectory([leg]), scene)
+        if slowed is not None and (best is None or slowed.duration < best[0]):
+            best = slowed.duration, leg
         limits.tangent_at(leg.x)
     return best[1] if best else None
 
@@ -186,7 +186,7 @@ def _allowed(trajectory: PathTrajectory, scene: PlanningScene) -> PathTrajectory
     return None
 
 
-def _best_pace(legs: list[_Leg], scene: PlanningScene) -> tuple[PathTrajectory, Cost] | None:
+def _cheapest(legs: list[_Leg], scene: PlanningScene) -> tuple[PathTrajectory, Cost] | None:
     """The uniform slow-down of least J."""
     fastest = _allowed(PathTrajectory(legs), scene)
     if fastest is None:
@@ -200,18 +200,18 @@ def timed(path: OmplPath, task: Task) -> tuple[PathTrajectory, Cost, str] | None
     """OMPL's path driven along its B-spline, or with stops at its corners where that hits; and which."""
     if len(path.corners) > 2 and _spline_free(path.smooth, task):
         leg = _fastest_leg(path.smooth, task.scene)
-        pace = _best_pace([leg], task.scene) if leg else None
-        if pace is not None:
-            return (*pace, "B-spline")
+        slowed = _cheapest([leg], task.scene) if leg else None
+        if slowed is not None:
+            return (*slowed, "B-spline")
     legs = [_fastest_leg(path.corners[k : k + 2], task.scene) for k in range(len(path.corners) - 1)]
     kept = [leg for leg in legs if leg is not None]
-    pace = _best_pace(kept, task.scene) if len(kept) == len(legs) else None
-    return (*pace, "stops" if len(legs) > 1 else "straight") if pace is not None else None
+    slowed = _cheapest(kept, task.scene) if len(kept) == len(legs) else None
+    return (*slowed, "stops" if len(legs) > 1 else "straight") if slowed is not None else None
 
 
 def _spline_free(points: FloatArray, task: Task) -> bool:
     """Whether the spline through the points stays free."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    path = SplineInterpolator(way / way[-1], points, "natural")
-    count = int(3 * way[-1] / RESOLUTION) + 2
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    path = SplineInterpolator(length / length[-1], points, "natural")
+    count = int(3 * length[-1] / RESOLUTION) + 2
     return Free(task).all(path(np.linspace(0.0, 1.0, count)))

@@ -1,7 +1,8 @@
-"""What every benchmark says at its end: rows, claims with their bounds, machine and commit."""
+"""What every benchmark shares: its command line, and rows, claims, machine and commit at its end."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
@@ -52,6 +53,35 @@ def commit(root: Path | None = None) -> str:
         ["git", "rev-parse", "HEAD"], cwd=place, capture_output=True, text=True, check=False
     )
     return done.stdout.strip()
+
+
+def command_line(doc: str | None, cells: Sequence[str], seeds: int, quick: str) -> argparse.ArgumentParser:
+    """A parser with --cell, --seeds, --quick and --json.
+
+    doc: the script's own text; cells: the default ones; seeds: the default; quick: what --quick leaves.
+    """
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cell", action="append", help=f"file or bundled cell; default: {', '.join(cells)}")
+    parser.add_argument("--seeds", type=int, default=seeds, help=f"default: {seeds}")
+    add_ending(parser, quick)
+    return parser
+
+
+def add_ending(parser: argparse.ArgumentParser, quick: str) -> None:
+    """The two options that every benchmark has: --quick and --json."""
+    parser.add_argument("--quick", action="store_true", help=f"at most two minutes: {quick}")
+    parser.add_argument("--json", type=Path, help="also write the results here")
+
+
+def line_of(row: dict[str, Any]) -> str:
+    """A row as `key value  key value`."""
+    return "  ".join(f"{key} {v:.4g}" if isinstance(v, float) else f"{key} {v}" for key, v in row.items())
+
+
+def finish(path: Path | None, rows: Sequence[dict[str, Any]], claims: Sequence[Claim], **more: Any) -> None:
+    """Print the claims, and write everything where there is a path."""
+    print_claims(claims)
+    write_json(path, rows, claims, **more)
 
 
 def print_claims(claims: Sequence[Claim]) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ir_description import Cell, Station, load_power_data
+from ir_description import Station
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
@@ -19,16 +20,18 @@ from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
-from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
+from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.service.exit import Exit
 from ir_planner.service.modified_ga import ModifiedGa, withdraw
-from ir_planner.service.service_movement import plan_service
+from ir_planner.service.service_movement import ServicePlan, plan_service
 from ir_planner.service.work_configurations import ServiceRequest
 
+T = TypeVar("T")
 S_M = 0.02  # m
 SHARE_OF_BEST = 0.8  # of the station's best clearance, where that is smaller
 STARTS = 32
 REPETITIONS = 50
+EDGES, CEILING = 60_000, 30.0  # certified edges, s
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class StationFigures:
     literal: int
     inverse: int
     found: int
-    way_ms: FloatArray
+    path_ms: FloatArray
     answer_ms: FloatArray
     methods: dict[str, int]
     trajectories: tuple[JointTrajectory, ...]
@@ -65,20 +68,15 @@ class StationFigures:
             "eq7_literal": f"{self.literal}/{seeds}",
             "eq7_inverse": f"{self.inverse}/{seeds}",
             "certified": f"{self.found}/{seeds}",
-            "way_median_ms": round(float(np.median(self.way_ms)), 2),
-            "way_p95_ms": round(float(np.percentile(self.way_ms, 95)), 2),
+            "path_median_ms": round(float(np.median(self.path_ms)), 2),
+            "path_p95_ms": round(float(np.percentile(self.path_ms, 95)), 2),
             "answer_median_ms": round(float(np.median(self.answer_ms)), 2),
             "answer_p95_ms": round(float(np.percentile(self.answer_ms, 95)), 2),
             "methods": "+".join(f"{name}:{count}" for name, count in sorted(self.methods.items())),
         }
 
 
-def scene_of(cell: Cell) -> PlanningScene:
-    """The cell with its tool."""
-    return scene_with(cell, load_text(cell), load_power_data())
-
-
-def milliseconds(function: Callable[[], Any]) -> tuple[Any, float]:
+def milliseconds(function: Callable[[], T]) -> tuple[T, float]:
     """Its result and how long it took."""
     begin = time.perf_counter()
     result = function()
@@ -97,65 +95,71 @@ def margin_at(scene: PlanningScene, station: Station) -> float:
 
 def measured(scene: PlanningScene, station: Station, seeds: int) -> StationFigures:
     """All figures of one station."""
-    margin = margin_at(scene, station)
-    threshold, park = scene.thresholds(margin, station.name), np.array(scene.cell.park)
-
-    def budget() -> Work:
-        return Work(60_000, time.monotonic() + 30.0, time.monotonic)
+    margin, park = margin_at(scene, station), np.array(scene.cell.park)
+    threshold = scene.thresholds(margin, station.name)
 
     def closed() -> Any:
         q = scene.inverse_kinematics.solve(station.pose[None]).q
         return scene.collision.min_distance(q, threshold) if len(q) else None
 
     analytic = min(milliseconds(closed)[1] for _ in range(REPETITIONS))
-    free = free_configurations(station.pose, scene, threshold, park)
-    ccd_ms, ccd_found = np.zeros(seeds), 0
-    walks = {"literal": 0, "inverse": 0}
-    way_ms, answer_ms, found = np.zeros(seeds), np.zeros(seeds), 0
-    methods: dict[str, int] = {}
-    trajectories: list[JointTrajectory] = []
-    for seed in range(seeds):
-        searched, ccd_ms[seed] = milliseconds(
-            lambda seed=seed: searched_configurations(
-                station.pose, scene, threshold, park, STARTS, seed, InteractionSettings(), budget()
-            )
-        )
-        ccd_found += len(searched.q) > 0
-        if len(free.q) == 0:
-            continue
-        for weighting in walks:
-            options = PlanOptions(seed=seed, safety_distance=margin, planning_time=30.0)
-            inside = Context(scene, options, Journal(budget(), seed)).at(station.name)
-            problem = Exit.of(free.q[0], inside)
-            walk = withdraw(problem, ModifiedGa(weighting=weighting), np.random.default_rng(seed), 1)
-            walks[weighting] += len(walk.paths) > 0
-        request = ServiceRequest(station, "exit", None, park, 1)
-        options = PlanOptions(seed=seed, safety_distance=margin, planning_time=30.0)
-        plan, answer_ms[seed] = milliseconds(
-            lambda request=request, options=options: plan_service(
-                request, Context(scene, options, Journal(budget(), options.seed))
-            )
-        )
-        way_ms[seed] = 1e3 * sum(stage.seconds for stage in plan.info.stages if stage.name != "timing")
-        for candidate in plan.candidates[:1]:
-            found += candidate.report.certified
-            methods[candidate.method] = methods.get(candidate.method, 0) + 1
-            assert candidate.trajectory is not None
-            trajectories.append(candidate.trajectory)
+    free = free_configurations(station.pose, scene, threshold, park).q
+    searched = [_searched(scene, station, threshold, seed) for seed in range(seeds)]
+    there = seeds if len(free) else 0
+    plans = [_planned(_context(scene, margin, seed), station) for seed in range(there)]
+
+    def walks(weighting: str) -> int:
+        here = [_context(scene, margin, seed).at(station.name) for seed in range(there)]
+        return sum(_walks_out(free[0], context, weighting) for context in here)
+
+    candidates = [plan.candidates[0] for plan, _ in plans if plan.candidates]
+    paths = [1e3 * sum(s.seconds for s in plan.info.stages if s.name != "timing") for plan, _ in plans]
     return StationFigures(
-        scene.cell.name,
-        station.name,
-        station.zone,
-        margin,
-        analytic,
-        len(free.q),
-        ccd_ms,
-        ccd_found,
-        walks["literal"],
-        walks["inverse"],
-        found,
-        way_ms,
-        answer_ms,
-        methods,
-        tuple(trajectories),
+        cell=scene.cell.name,
+        station=station.name,
+        zone=station.zone,
+        margin=margin,
+        analytic_ms=analytic,
+        free=len(free),
+        ccd_ms=np.array([took for _, took in searched]),
+        ccd_found=sum(found for found, _ in searched),
+        literal=walks("literal"),
+        inverse=walks("inverse"),
+        found=sum(candidate.report.certified for candidate in candidates),
+        path_ms=np.array(paths or [0.0] * seeds),
+        answer_ms=np.array([took for _, took in plans] or [0.0] * seeds),
+        methods=Counter(candidate.method for candidate in candidates),
+        trajectories=tuple(c.trajectory for c in candidates if c.trajectory is not None),
     )
+
+
+def _context(scene: PlanningScene, margin: float, seed: int) -> Context:
+    """A request with this clearance [m] and seed, and a budget of its own."""
+    options = PlanOptions(seed=seed, safety_distance=margin, planning_time=CEILING)
+    return Context(scene, options, Journal(_work(), seed))
+
+
+def _work() -> Work:
+    return Work(EDGES, time.monotonic() + CEILING, time.monotonic)
+
+
+def _searched(scene: PlanningScene, station: Station, threshold: FloatArray, seed: int) -> tuple[bool, float]:
+    """Whether CCD finds a free configuration, and its milliseconds."""
+    park, settings = np.array(scene.cell.park), InteractionSettings()
+    found, took = milliseconds(
+        lambda: searched_configurations(station.pose, scene, threshold, park, STARTS, seed, settings, _work())
+    )
+    return len(found.q) > 0, took
+
+
+def _walks_out(q: FloatArray, context: Context, weighting: str) -> bool:
+    """Whether eq. (7) alone finds a path out from q (n,), in the context of a station."""
+    generator = np.random.default_rng(context.options.seed)
+    walk = withdraw(Exit.of(q, context), ModifiedGa(weighting=weighting), generator, 1)
+    return len(walk.paths) > 0
+
+
+def _planned(context: Context, station: Station) -> tuple[ServicePlan, float]:
+    """The whole movement out, and its milliseconds."""
+    request = ServiceRequest(station, "exit", None, np.array(context.scene.cell.park), 1)
+    return milliseconds(lambda: plan_service(request, context))

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from _compare_scripts import script_rows
 from _compare_sides import Side, both_built, differences
-from _results import Claim, at_most, commit, print_claims, write_json
+from _results import Claim, add_ending, at_most, commit, finish
 
 HERE = Path(__file__).resolve().parents[1]
 RATIO = 1.05
@@ -38,8 +38,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--script", action="append", default=[], help="a benchmark to run in both, as kernels"
     )
-    parser.add_argument("--quick", action="store_true", help="every third request, one timed round")
-    parser.add_argument("--json", type=Path, help="also write the results here")
+    add_ending(parser, "every third request, one timed round")
     given = parser.parse_args()
     missing = both_built(given.before, given.after)
     if missing:
@@ -133,9 +132,8 @@ def main() -> None:
         if more:
             ratio = float(np.median([row["ratio"] for row in more]))
             claims.append(at_most(f"median ratio of the times of benchmark {name}", ratio, "1", RATIO))
-    print_claims(claims)
     commits = {"before": commit(given.before), "after": commit(given.after)}
-    write_json(given.json, [*rows, *groups], claims, compared=commits)
+    finish(given.json, [*rows, *groups], claims, compared=commits)
 
 
 if __name__ == "__main__":

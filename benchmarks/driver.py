@@ -1,6 +1,6 @@
 """How fast is the simulated robot, how well does it follow, and how regular is what the node publishes?
 
-    python benchmarks/driver.py [--cell FILE]... [--seeds N] [--seconds S] [--json FILE]
+    python benchmarks/driver.py [--cell FILE]... [--seeds N] [--seconds S] [--quick] [--json FILE]
 
 Each cell's robot carries its tool through random rest-to-rest movements within the limits, stepped without
 ROS: as they are, then scaled, disturbed and canceled. The power modes are entered and left (Table II, times
@@ -10,16 +10,14 @@ of transitions). Then the node runs as a process of its own, and a subscriber he
 from __future__ import annotations
 
 import argparse
-import json
 import time
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from _driver_power import energy_rows, table_2_rows, transition_rows
+from _driver_power import HOUR, energy_row, table_2_rows, transition_rows
 from _driver_stream import streamed
-from kernels import commit, machine
+from _results import Claim, at_least, at_most, command_line, finish, line_of
 
 from ir_description import Cell, load_cell
 from ir_kernels.power import DcBusParameters, dc_bus
@@ -29,31 +27,17 @@ from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import TrajectoryGoal
 
+CELL = "demo"
 DT = 0.001
 MOVEMENTS = 4
 LEAD_IN = 3.0  # s
 DISTURBANCE = np.array([600.0, 600.0, 600.0, 100.0, 100.0, 100.0])  # Nm, the bound of docs/driver.md
 
 
-@dataclass(frozen=True)
-class Claim:
-    """One figure with its bound."""
-
-    name: str
-    value: float
-    unit: str
-    bound: float
-    at_least: bool
-
-    @property
-    def holds(self) -> bool:
-        """Whether the figure keeps its bound."""
-        return self.value >= self.bound if self.at_least else self.value <= self.bound
-
-
 def random_movements(simulation: Simulation, generator: np.random.Generator) -> list[JointTrajectory]:
     """Quintic movements from rest to rest that the driver accepts, each starting where the last one ends."""
-    robot, movements = simulation.robot, []
+    robot = simulation.robot
+    movements: list[JointTrajectory] = []
     q = simulation.executor.command
     while len(movements) < MOVEMENTS:
         reach = 0.35 * (robot.position_max - robot.position_min)
@@ -158,111 +142,59 @@ def disturbed(cell: Cell, seed: int) -> dict[str, Any]:
 def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     """The figures that were asked for, the worst over all rows."""
 
-    def over(case: str, key: str, pick: Any) -> float:
+    def over(case: str, key: str, pick: Callable[[Iterator[float]], float] = max) -> float:
         return float(pick(row[key] for row in rows if row["case"] == case))
 
+    bullet, ideal, streams = "stepped pybullet", "stepped ideal", "streamed pybullet"
+    energy = 100.0 * over(bullet, "energy_error")
     claims = [
-        Claim(
-            "stepped with PyBullet, times real time", over("stepped pybullet", "factor", min), "", 15.0, True
-        ),
-        Claim(
-            "stepped with the ideal robot, times real time",
-            over("stepped ideal", "factor", min),
-            "",
-            100.0,
-            True,
-        ),
-        Claim("tool deviation, PyBullet", over("stepped pybullet", "deviation_mm", max), "mm", 1.0, False),
-        Claim(
-            "energy against the model, beyond 200 J",
-            100.0 * over("stepped pybullet", "energy_error", max),
-            "%",
-            5.0,
-            False,
-        ),
+        at_least("stepped with PyBullet, times real time", over(bullet, "factor", min), "", 15.0),
+        at_least("stepped with the ideal robot, times real time", over(ideal, "factor", min), "", 100.0),
+        at_most("tool deviation, PyBullet", over(bullet, "deviation_mm"), "mm", 1.0),
+        at_most("energy against the model, beyond 200 J", energy, "%", 5.0),
+        at_most("tool deviation, scaled, disturbed", over("disturbed", "deviation_mm"), "mm", 5.0),
+        at_most("tube left when disturbed up to the bound", over("disturbed", "violated"), "times", 0),
+        at_most("power modes against Table II", over("Table II", "error_percent"), "%", 1.0),
+        at_most("transitions against their parameters", over("transition", "error_s"), "s", 0.1),
+        at_most("energy against the published power", over("energy", "error_percent"), "%", 0.1),
     ]
-    claims += [
-        Claim(
-            "tool deviation, scaled, disturbed, canceled",
-            over("disturbed", "deviation_mm", max),
-            "mm",
-            5.0,
-            False,
-        ),
-        Claim(
-            "tube left when disturbed up to the bound",
-            over("disturbed", "violated", max),
-            "times",
-            0.0,
-            False,
-        ),
-        Claim("power modes against Table II", over("Table II", "error_percent", max), "%", 1.0, False),
-        Claim("transitions against their parameters", over("transition", "error_s", max), "s", 0.1, False),
-        Claim("energy against the published power", over("energy", "error_percent", max), "%", 0.1, False),
-    ]
-    if any(row["case"] == "streamed pybullet" for row in rows):
+    if any(row["case"] == streams for row in rows):
         claims += [
-            Claim("joint_states p99 period", over("streamed pybullet", "p99_ms", max), "ms", 2.5, False),
-            Claim("joint_states lost", over("streamed pybullet", "lost", max), "", 0.0, False),
-            Claim(
-                "CPU of the node", over("streamed pybullet", "cpu_percent", max), "% of a core", 40.0, False
-            ),
+            at_most("joint_states p99 period", over(streams, "p99_ms"), "ms", 2.5),
+            at_most("joint_states lost", over(streams, "lost"), "", 0),
+            at_most("CPU of the node", over(streams, "cpu_percent"), "% of a core", 40.0),
         ]
     return claims
 
 
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = command_line(__doc__, (CELL,), 3, "1 seed, 3 s of listening, 6 min of modes and movements")
+    heard = "of listening to the node; 0 leaves it out"
+    parser.add_argument("--seconds", type=float, default=10.0, help=heard)
+    given = parser.parse_args()
+    if given.quick:
+        given.seeds, given.seconds = min(given.seeds, 1), min(given.seconds, 3.0)
+    return given
+
+
 def main() -> None:
     """Measure, print, write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--cell", action="append", help="cell file or name of a bundled cell (default: demo)")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument(
-        "--seconds", type=float, default=10.0, help="of listening to the node; 0 leaves it out"
-    )
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
+    given = arguments()
     rows: list[dict[str, Any]] = []
-    cells = options.cell or ["demo"]
+    cells = given.cell or [CELL]
     for name in cells:
         cell = load_cell(name)
-        for seed in range(options.seeds):
+        for seed in range(given.seeds):
             rows += [stepped(cell, backend, seed) for backend in ("pybullet", "ideal")]
             rows.append(disturbed(cell, seed))
-        rows += [*table_2_rows(cell), *transition_rows(cell), *energy_rows(cell)]
-    if options.seconds > 0.0:
-        rows.append(streamed(cells[0], options.seconds))
+        rows += [*table_2_rows(cell), *transition_rows(cell)]
+        rows.append(energy_row(cell, 0.1 * HOUR if given.quick else HOUR))
+    if given.seconds > 0.0:
+        rows.append(streamed(cells[0], given.seconds))
     for row in rows:
-        print(
-            "  ".join(
-                f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
-                for key, value in row.items()
-            )
-        )
-    claims = claims_of(rows)
-    print()
-    for claim in claims:
-        sign = ">=" if claim.at_least else "<="
-        print(
-            f"{claim.name}: {claim.value:.4g} {claim.unit} (bound {sign} {claim.bound:g}): "
-            f"{'holds' if claim.holds else 'FALLS SHORT'}"
-        )
-    if options.json:
-        options.json.write_text(
-            json.dumps(
-                {
-                    "machine": machine(),
-                    "commit": commit(),
-                    "rows": rows,
-                    "claims": [
-                        {"name": c.name, "value": c.value, "unit": c.unit, "bound": c.bound, "holds": c.holds}
-                        for c in claims
-                    ],
-                },
-                indent=2,
-            )
-        )
+        print(line_of(row))
+    finish(given.json, rows, claims_of(rows))
 
 
 if __name__ == "__main__":

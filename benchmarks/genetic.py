@@ -1,27 +1,23 @@
-"""How surely and how fast does the genetic correction get round what is in the way, and what matters in it?
+"""How surely and how fast does the genetic correction find a free path, and which settings matter?
 
-    python benchmarks/genetic.py [--cell FILE]... [--seeds N] [--json FILE]
+    python benchmarks/genetic.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
 Every task there and back whose straight movement is not free, with the default settings and with one of them
-changed. "first": until the first free way (no generation follows it), "all": until the different ways are
-there, both in ms of processor time; W of the cheapest way as a multiple of the straight movement's, raw
+changed. "first": until the first free path (no generation follows it), "all": until the different paths are
+there, both in ms of processor time; W of the cheapest path as a multiple of the straight movement's, raw
 and polished; work in edges.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import time
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from _regional_figures import Claim, at_least, at_most
 from _regional_tasks import CELLS, Task, tasks_of
-from kernels import commit, machine
+from _results import Claim, at_least, at_most, command_line, finish, line_of
 
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.request.work import Work
@@ -48,12 +44,12 @@ EDGES = 60_000  # the planner's default budget
 
 @dataclass(frozen=True)
 class Search:
-    """One search: solved, ms, ways, W as a multiple of the straight movement's (nan: nothing), work."""
+    """One search: solved, ms, paths, W as a multiple of the straight movement's (nan: nothing), work."""
 
     solved: bool
     first_ms: float
     all_ms: float
-    ways: int
+    paths: int
     raw: float
     polished: float
     work: int
@@ -86,8 +82,8 @@ def searched(task: Task, settings: GeneticSettings, seed: int) -> Search:
     if not found.ways:
         return Search(False, first_ms, all_ms, 0, np.nan, np.nan, work)
     straight = float(movement_cost(weights, task.start, task.goal))
-    polished = [pulled(fewest_corners(way, space, weights), space, weights) for way in found.ways]
-    cheapest = min(path_cost(weights, way) for way in polished)
+    polished = [pulled(fewest_corners(path, space, weights), space, weights) for path in found.ways]
+    cheapest = min(path_cost(weights, path) for path in polished)
     raw = path_cost(weights, found.ways[0])
     return Search(True, first_ms, all_ms, len(found.ways), raw / straight, cheapest / straight, work)
 
@@ -110,7 +106,7 @@ def row_of(cell: str, variant: str, searches: list[Search]) -> dict[str, Any]:
         "first_p95_ms": round(float(np.percentile(first, 95)), 1),
         "all_ms": round(float(np.median(whole)), 2),
         "all_p95_ms": round(float(np.percentile(whole, 95)), 1),
-        "ways": mean([search.ways for search in solved]),
+        "paths": mean([search.paths for search in solved]),
         "W": mean([search.raw for search in solved]),
         "W_polished": mean([search.polished for search in solved]),
         "work": round(float(np.mean([search.work for search in searches]))),
@@ -126,45 +122,35 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
         if cell in by_cell
     ]
     if "open" in by_cell:
-        claims.append(at_most("open: first free way, median", by_cell["open"]["first_ms"], "ms", 4.0))
+        claims.append(at_most("open: first free path, median", by_cell["open"]["first_ms"], "ms", 4.0))
     if "table_columns" in by_cell:
         found = by_cell["table_columns"]["all_p95_ms"]
-        claims.append(at_most("table_columns: all ways, p95", found, "ms", 90.0))
+        claims.append(at_most("table_columns: all paths, p95", found, "ms", 90.0))
     return claims
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    given = command_line(__doc__, CELLS, 10, "1 seed, the default settings and two variants").parse_args()
+    if given.quick:
+        given.seeds = min(given.seeds, 1)
+    return given
 
 
 def main() -> None:
     """Measure, print, write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--cell", action="append", help=f"file or bundled cell; default: {', '.join(CELLS)}")
-    parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--json", type=Path, help="also write the results here")
-    given = parser.parse_args()
+    given = arguments()
     rows: list[dict[str, Any]] = []
+    variants = dict(list(VARIANTS.items())[: 3 if given.quick else None])
     for cell in given.cell or CELLS:
         tasks = [task for task in tasks_of(cell) if not straight_is_free(task)]
-        for variant, changed in VARIANTS.items():
+        for variant, changed in variants.items():
             settings = GeneticSettings(**changed)
             searches = [searched(task, settings, seed) for task in tasks for seed in range(given.seeds)]
             if searches:
                 rows.append(row_of(tasks[0].cell, variant, searches))
-                print("  ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)
-    print()
-    claims = claims_of(rows)
-    for claim in claims:
-        verdict = "holds" if claim.holds else "falls short"
-        print(f"{claim.name:40s} {claim.value:10.4g} {claim.unit:4s} bound {claim.bound:<10.6g} {verdict}")
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        result = {
-            "machine": f"{machine()}, load {os.getloadavg()[0]:.1f}",
-            "commit": commit(),
-            "rows": rows,
-            "claims": [asdict(claim) for claim in claims],
-        }
-        given.json.write_text(json.dumps(result, indent=1))
+                print(line_of(rows[-1]), flush=True)
+    finish(given.json, rows, claims_of(rows))
 
 
 if __name__ == "__main__":

@@ -15,15 +15,11 @@ earlier run's JSON adds what it found by --best. Coal looks at the first N diffe
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import time
-from dataclasses import asdict
 from pathlib import Path
 
 from _regional_best import best_of, read
-from _regional_checks import SecondOpinion
-from _regional_figures import Claim, Figures, PeerRun, at_least, claims_of
+from _regional_figures import Figures, PeerRun, claims_of
 from _regional_ompl import PLANNERS, SEARCH_S, ompl_path
 from _regional_ours import (
     Run,
@@ -39,7 +35,8 @@ from _regional_ours import (
 from _regional_plot import plot
 from _regional_tasks import CELLS, Task, tasks_of
 from _regional_toppra import timed
-from kernels import commit, machine
+from _results import Claim, at_least, command_line, finish, line_of
+from _second_opinion import SecondOpinion
 
 from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
@@ -51,26 +48,34 @@ GENETIC_CELLS = ("open", "table_columns")
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--cell", action="append", help=f"file or bundled cell; default: {', '.join(CELLS)}")
+    quick = "2 tasks per cell there and back, 2 seeds, 1 search, 0.3 s for the best known J"
+    parser = command_line(__doc__, CELLS, 30, quick)
     parser.add_argument("--task", action="append", help="only tasks of this name, as home->p1")
-    parser.add_argument("--seeds", type=int, default=30)
     parser.add_argument("--patient", type=int, default=3, help="seeds with 1 s of work per task")
     parser.add_argument("--peers", type=int, default=5, help="searches of each of OMPL's planners per task")
     parser.add_argument("--coal", type=int, default=1, help="movements per task that Coal checks")
     parser.add_argument("--best-seconds", type=float, default=5.0, help="per task for the best known J")
     parser.add_argument("--minute", action="store_true", help="60 s of each method for the best known J")
     parser.add_argument("--best", type=Path, help="JSON of an earlier run whose best J count as well")
-    parser.add_argument("--quick", action="store_true", help="2 seeds, 2 searches, 1 s for the best known J")
-    parser.add_argument("--json", type=Path, help="also write the results here")
     parser.add_argument("--plot", type=Path, default=Path("out/regional.png"))
     given = parser.parse_args()
     if given.quick:
-        given.seeds, given.peers, given.best_seconds = min(given.seeds, 2), min(given.peers, 2), 1.0
+        given.seeds, given.peers, given.best_seconds = min(given.seeds, 2), min(given.peers, 1), 0.3
         given.patient = min(given.patient, 1)
     return given
+
+
+def chosen_tasks(given: argparse.Namespace) -> dict[str, list[Task]]:
+    """The tasks of each cell that are asked for."""
+    chosen = {cell: tasks_of(cell) for cell in given.cell or CELLS}
+    if given.task:
+        chosen = {cell: [t for t in tasks if t.name in given.task] for cell, tasks in chosen.items()}
+    elif given.quick:
+        chosen = {cell: tasks[:4] for cell, tasks in chosen.items()}
+    chosen = {cell: tasks for cell, tasks in chosen.items() if tasks}
+    if not chosen:
+        raise SystemExit("no cell has such a task")
+    return chosen
 
 
 def peer_runs(task: Task, count: int) -> tuple[PeerRun, ...]:
@@ -171,16 +176,21 @@ def tables(figures: list[Figures]) -> None:
         print("  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)))
 
 
+def remarks(given: argparse.Namespace, noted: bool, earlier: bool) -> None:
+    """Print how the figures were found."""
+    print()
+    if not noted:
+        print("no stage notes the first feasible path: its time is that of the whole stage that found it")
+    spent = "60 s of each method" if given.minute else f"{given.best_seconds:g} s per task for all methods"
+    print(f"best known J: these runs, {spent}{', an earlier run' if earlier else ''}")
+    print("OMPL: paths sampled every 0.01 rad, not proved; TOPP-RA: no limit of jerk")
+
+
 def main() -> None:
     """Measure, print, write."""
     given = arguments()
     earlier = read(given.best) if given.best else {}
-    chosen = {cell: tasks_of(cell) for cell in given.cell or CELLS}
-    if given.task:
-        chosen = {cell: [t for t in tasks if t.name in given.task] for cell, tasks in chosen.items()}
-    chosen = {cell: tasks for cell, tasks in chosen.items() if tasks}
-    if not chosen:
-        raise SystemExit("no cell has such a task")
+    chosen = chosen_tasks(given)
     figures: list[Figures] = []
     noted = True
     for cell, tasks in chosen.items():
@@ -189,32 +199,15 @@ def main() -> None:
             figures.append(measured(planner, task, opinion, given, earlier))
             row = figures[-1].row()
             shown = ("task", "solved", "first_ms", "final_ms", "J", "ompl_J", "best_J")
-            print("  ".join(f"{key} {row.get(key, '-')}" for key in shown), flush=True)
+            print(line_of({key: row.get(key, "-") for key in shown}), flush=True)
         plan = planner.plan_regional(tasks[0].start, Goal(configuration=tasks[0].goal), asked(tasks[0]))
         noted &= tells_first(plan.info)
     print()
     tables(figures)
-    print()
-    if not noted:
-        print("no stage notes the first feasible way: its time is that of the whole stage that found it")
-    spent = "60 s of each method" if given.minute else f"{given.best_seconds:g} s per task for all methods"
-    print(f"best known J: these runs, {spent}{', an earlier run' if earlier else ''}")
-    print("OMPL: paths sampled every 0.01 rad, not proved; TOPP-RA: no limit of jerk")
+    remarks(given, noted, bool(earlier))
     claims = [*claims_of(figures), *genetic_claims(chosen, min(given.seeds, 5)), repeat_claim(chosen)]
-    print()
-    for claim in claims:
-        verdict = "holds" if claim.holds else "falls short"
-        print(f"{claim.name:74s} {claim.value:10.4g} {claim.unit:4s} bound {claim.bound:<10.6g} {verdict}")
     plot(figures, given.plot)
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        result = {
-            "machine": f"{machine()}, load {os.getloadavg()[0]:.1f}",
-            "commit": commit(),
-            "rows": [figure.row() for figure in figures],
-            "claims": [asdict(claim) for claim in claims],
-        }
-        given.json.write_text(json.dumps(result, indent=1))
+    finish(given.json, [figure.row() for figure in figures], claims)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""How soon two trees find a way: time to a certified path for every task of the cells, in both directions.
+"""How soon do two trees find a certified path, for every task of the cells and in both directions?
 
-    python benchmarks/search.py [--cell FILE]... [--seeds N] [--json FILE]
+    python benchmarks/search.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
 One thread, the whole call from Python, the cell's tool attached; S_m is 20 mm, or 80 % of the clearance of
 the task's ends where that is less. Closes with one line per figure that was asked for: measured value, bound,
@@ -10,21 +10,16 @@ holds or falls short.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
-from _kernels_dynamics import Claim
-from kernels import commit, machine
+from _regional_tasks import Task, tasks_of
+from _results import Claim, at_most, command_line, finish
 
-from ir_description import load_cell, load_power_data
 from ir_kernels.search import BidirectionalTree
-from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 
 BOUNDS = {"open": 1.0, "table_columns": 2.0, "cnc_door": 10.0, "deep_box": 30.0}  # ms, of the median
-SAFETY = 0.02
 BUDGET = 100_000  # certified edges, about a second
 
 
@@ -41,77 +36,51 @@ class Row:
 
 
 def arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else "")
-    parser.add_argument(
-        "--cell", action="append", help="cell file or name of a bundled one; default: those with a bound"
-    )
-    parser.add_argument("--seeds", type=int, default=30, help="runs per task and direction")
-    parser.add_argument("--json", type=Path, help="also write the results here")
-    return parser.parse_args()
+    """The command line."""
+    given = command_line(__doc__, list(BOUNDS), 30, "3 seeds").parse_args()
+    if given.quick:
+        given.seeds = min(given.seeds, 3)
+    return given
 
 
-def measure(name: str, scene: PlanningScene, seeds: int) -> tuple[list[Row], list[float]]:
-    """A row per task and direction, and the times [ms] of all runs."""
-    robot = scene.cell.robot
-    scale = np.maximum(np.sqrt(scene.weights / scene.weights[0]), 0.1)
-    rows: list[Row] = []
-    all_times: list[float] = []
-    for task in scene.cell.tasks:
-        ends = np.array([task.start, task.goal])
-        clearance = float(scene.collision.min_distance(ends).distance.min())
-        threshold = np.full(len(scene.collision.pairs), min(SAFETY, 0.8 * clearance))
-        for label, (start, goal) in ((task.name, ends), (f"{task.name} back", ends[::-1])):
-            times, edges, failed = [], [], 0
-            for seed in range(seeds):
-                begin = time.perf_counter()
-                search = BidirectionalTree(
-                    scene.collision, start, goal[None], threshold, robot.position_min, robot.position_max,
-                    scale, seed,
-                )  # fmt: skip
-                found = search.grow(BUDGET)
-                path = search.path
-                times.append((time.perf_counter() - begin) * 1e3)
-                edges.append(search.edges)
-                failed += not (found and len(path) > 1)
-            rows.append(
-                Row(name, label, float(np.median(times)), max(times), float(np.median(edges)), failed)
-            )
-            all_times += times
-    return rows, all_times
+def searched(task: Task, seed: int) -> tuple[float, int, bool]:
+    """Milliseconds, certified edges and success of one search."""
+    robot, model = task.scene.cell.robot, task.scene.collision
+    scale = np.maximum(np.sqrt(task.scene.weights / task.scene.weights[0]), 0.1)
+    threshold = np.full(len(model.pairs), task.margin)
+    low, high = robot.position_min, robot.position_max
+    begin = time.perf_counter()
+    search = BidirectionalTree(model, task.start, task.goal[None], threshold, low, high, scale, seed)
+    found = search.grow(BUDGET)
+    path = search.path
+    return 1e3 * (time.perf_counter() - begin), search.edges, bool(found and len(path) > 1)
+
+
+def measured(task: Task, seeds: int) -> tuple[Row, list[float]]:
+    """The row of a task, and the times [ms] of all runs."""
+    times, edges, done = zip(*(searched(task, seed) for seed in range(seeds)), strict=True)
+    median, worst = float(np.median(times)), max(times)
+    row = Row(task.cell, task.name, median, worst, float(np.median(edges)), seeds - sum(done))
+    return row, list(times)
 
 
 def main() -> None:
+    """Measure, print, write."""
     given = arguments()
-    power = load_power_data()
     rows: list[Row] = []
     claims: list[Claim] = []
-    for name in given.cell or list(BOUNDS):
-        cell = load_cell(name)
-        scene = scene_with(cell, load_text(cell), power)
-        found, times = measure(name, scene, given.seeds)
-        rows += found
-        median, failed = float(np.median(times)), sum(row.failed for row in found)
-        bound = BOUNDS.get(name, float("inf"))
-        claims.append(Claim(f"{name}: median time to a path", median, "ms", bound, median <= bound))
-        claims.append(Claim(f"{name}: runs without one", failed, f"of {len(times)}", 0, failed == 0))
     print(f"{'cell':16s}{'task':24s}{'median ms':>10s}{'worst ms':>10s}{'edges':>8s}{'failed':>8s}")
-    for row in rows:
-        print(
-            f"{row.cell:16s}{row.task:24s}{row.median:10.2f}{row.worst:10.2f}{row.edges:8.0f}{row.failed:8d}"
-        )
-    print()
-    for claim in claims:
-        verdict = "holds" if claim.holds else "falls short"
-        print(f"{claim.name:48s} {claim.value:10.3g} {claim.unit:10s} bound {claim.bound:<8g} {verdict}")
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        result = {
-            "machine": machine(),
-            "commit": commit(),
-            "rows": [asdict(row) for row in rows],
-            "claims": [asdict(claim) for claim in claims],
-        }
-        given.json.write_text(json.dumps(result, indent=1))
+    for name in given.cell or list(BOUNDS):
+        found = [measured(task, given.seeds) for task in tasks_of(name)]
+        for row, _ in found:
+            figures = f"{row.median:10.2f}{row.worst:10.2f}{row.edges:8.0f}{row.failed:8d}"
+            print(f"{row.cell:16s}{row.task:24s}{figures}")
+        times = [one for _, some in found for one in some]
+        bound, failed = BOUNDS.get(name, float("inf")), sum(row.failed for row, _ in found)
+        claims.append(at_most(f"{name}: median time to a path", float(np.median(times)), "ms", bound))
+        claims.append(at_most(f"{name}: runs without one", failed, f"of {len(times)}", 0))
+        rows += [row for row, _ in found]
+    finish(given.json, [asdict(row) for row in rows], claims)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 """How fast and how surely does the robot get into and out of machines?
 
-    python benchmarks/service.py [--cell FILE]... [--seeds N] [--coal N] [--no-ros] [--json FILE]
+    python benchmarks/service.py [--cell FILE]... [--seeds N] [--coal N] [--no-ros] [--quick]
+                                 [--json FILE]
 
 At every station: configurations in closed form and by CCD from 32 starts; eq. (7) alone with literal and
-inverse weighting; the whole movement. "way": found, shortened and proved as a path; "answer": with its time,
+inverse weighting; the whole movement. "path": found, shortened and proved as a path; "answer": with its time,
 energy and the proof of the trajectory. Then Coal checks distances, the limits are sampled at 10 kHz, and the
 node is asked.
 """
@@ -11,41 +12,17 @@ node is asked.
 from __future__ import annotations
 
 import argparse
-import json
-import os
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from _service_checks import clearance_left, largest_share, over_ros
-from _service_stations import StationFigures, measured, scene_of
-from kernels import commit, machine
+from _regional_tasks import scene_of
+from _results import Claim, at_least, at_most, command_line, finish, line_of
+from _second_opinion import SecondOpinion
+from _service_ros import over_ros
+from _service_stations import StationFigures, measured
 
-from ir_description import load_cell
+from ir_planner.scene.planning_scene import PlanningScene
 
 CELLS = ("cnc_door", "deep_box", "demo")
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A measured figure beside the bound it was asked to keep."""
-
-    name: str
-    value: float
-    unit: str
-    bound: float
-    holds: bool
-
-
-def at_most(name: str, value: float, unit: str, bound: float) -> Claim:
-    """A claim that holds up to its bound."""
-    return Claim(name, value, unit, bound, value <= bound)
-
-
-def at_least(name: str, value: float, unit: str, bound: float) -> Claim:
-    """A claim that holds from its bound on."""
-    return Claim(name, value, unit, bound, value >= bound)
 
 
 def claims_of(figures: list[StationFigures]) -> list[Claim]:
@@ -65,73 +42,73 @@ def claims_of(figures: list[StationFigures]) -> list[Claim]:
     ):
         there = [f for f in free if f.zone in kinds]
         if there:
-            way = float(np.median([f.way_ms for f in there]))
+            path = float(np.median([f.path_ms for f in there]))
             answer = float(np.median([f.answer_ms for f in there]))
-            claims.append(at_most(f"way found and proved, {what}, median", way, "ms", bound))
+            claims.append(at_most(f"path found and proved, {what}, median", path, "ms", bound))
             claims.append(at_most(f"answer with time and energy, {what}, median", answer, "ms", bound))
-    ways = np.concatenate([f.way_ms for f in free])
+    paths = np.concatenate([f.path_ms for f in free])
     answers = np.concatenate([f.answer_ms for f in free])
-    claims.append(at_most("way found and proved, p95", float(np.percentile(ways, 95)), "ms", 250.0))
+    claims.append(at_most("path found and proved, p95", float(np.percentile(paths, 95)), "ms", 250.0))
     claims.append(at_most("answer with time and energy, p95", float(np.percentile(answers, 95)), "ms", 250.0))
     return claims
 
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--cell", action="append", help=f"file or bundled cell; default: {', '.join(CELLS)}")
-    parser.add_argument("--seeds", type=int, default=5)
+    parser = command_line(__doc__, CELLS, 5, "1 seed, the first cell, Coal at one station")
     parser.add_argument("--coal", type=int, default=1, help="movements per station that Coal checks")
     parser.add_argument("--no-ros", action="store_true", help="leave the node out")
-    parser.add_argument("--json", type=Path, help="also write the results here")
-    return parser.parse_args()
+    given = parser.parse_args()
+    if given.quick:
+        given.seeds = min(given.seeds, 1)
+    given.cell = given.cell or CELLS[: 1 if given.quick else None]
+    return given
+
+
+def checked(figures: list[StationFigures], scenes: dict[str, PlanningScene], coal: int) -> list[Claim]:
+    """Second opinions: Coal looks at so many movements of a station, the limits are sampled in all."""
+    opinions = {name: SecondOpinion(scene) for name, scene in scenes.items()}
+    left: list[tuple[float, int]] = []
+    shares: list[float] = []
+    for figure in figures:
+        opinion = opinions[figure.cell]
+        shares += [opinion.largest_share(one) for one in figure.trajectories]
+        asked = figure.trajectories[:coal]
+        left += [opinion.clearance_left(one, figure.margin, figure.station) for one in asked]
+    claims = []
+    if left:
+        name = f"least distance beyond S_m by Coal, {sum(count for _, count in left)} configurations"
+        claims.append(at_least(name, min(least for least, _ in left), "m", -1e-6))
+    if shares:
+        claims.append(at_most("largest share of a limit at 10 kHz", max(shares), "1", 1.0 + 1e-6))
+    return claims
+
+
+def node_claims(figures: list[StationFigures], cell: str, seeds: int) -> list[Claim]:
+    """What the node says at the stations of one cell."""
+    stations = [figure.station for figure in figures if figure.cell == figures[0].cell]
+    extra, repeats = over_ros(cell, stations, min(seeds, 3))
+    return [
+        at_most("over ROS, beyond the core's time, median", float(np.median(extra)), "ms", 20.0),
+        at_least("same seed, same trajectory_id", 100.0 * repeats, "%", 100.0),
+    ]
 
 
 def main() -> None:
     """Measure, print, write."""
     given = arguments()
     figures: list[StationFigures] = []
-    shares, left, asked = [], [], 0
-    for name in given.cell or CELLS:
-        scene = scene_of(load_cell(name))
+    scenes: dict[str, PlanningScene] = {}
+    for name in given.cell:
+        scene = scene_of(name)
+        scenes[scene.cell.name] = scene
         for station in scene.cell.stations:
             figures.append(measured(scene, station, given.seeds))
-            last = figures[-1]
-            print("  ".join(f"{key} {value}" for key, value in last.row().items()), flush=True)
-            shares += [largest_share(trajectory, scene) for trajectory in last.trajectories]
-            for trajectory in last.trajectories[: given.coal]:
-                least, count = clearance_left(trajectory, scene, station.name, last.margin)
-                left.append(least)
-                asked += count
-    claims = claims_of(figures)
-    if left:
-        name = f"least distance beyond S_m by Coal, {asked} configurations"
-        claims.append(at_least(name, min(left), "m", -1e-6))
-    if shares:
-        claims.append(at_most("largest share of a limit at 10 kHz", max(shares), "1", 1.0 + 1e-6))
+            print(line_of(figures[-1].row()), flush=True)
+    claims = [*claims_of(figures), *checked(figures[: 1 if given.quick else None], scenes, given.coal)]
     if not given.no_ros:
-        stations = [f.station for f in figures if f.cell == figures[0].cell]
-        extra, repeats = over_ros((given.cell or CELLS)[0], stations, min(given.seeds, 3))
-        claims.append(
-            at_most("over ROS, beyond the core's time, median", float(np.median(extra)), "ms", 20.0)
-        )
-        claims.append(at_least("same seed, same trajectory_id", 100.0 * repeats, "%", 100.0))
-    print()
-    for claim in claims:
-        verdict = "holds" if claim.holds else "falls short"
-        print(f"{claim.name:64s} {claim.value:10.4g} {claim.unit:4s} bound {claim.bound:<10.6g} {verdict}")
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        rows: list[dict[str, Any]] = [figure.row() for figure in figures]
-        result = {
-            "machine": f"{machine()}, load {os.getloadavg()[0]:.1f}",
-            "commit": commit(),
-            "rows": rows,
-            "claims": [asdict(claim) for claim in claims],
-        }
-        given.json.write_text(json.dumps(result, indent=1))
+        claims += node_claims(figures, given.cell[0], given.seeds)
+    finish(given.json, [figure.row() for figure in figures], claims)
 
 
 if __name__ == "__main__":

@@ -1,28 +1,27 @@
-"""Second opinions on regional movements: distances by Coal at 0.0005 rad, limits at 10 kHz, torque by
-Pinocchio.
-"""
+"""Second opinions on movements: distances by Coal at 0.0005 rad, limits at 10 kHz, torque by Pinocchio."""
 
 from __future__ import annotations
 
 import numpy as np
 import pinocchio
 from _kernels_peers import Coal
+from _pinocchio_arm import pinocchio_arm
 
-from ir_kernels.dynamics_data import STANDARD_GRAVITY
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.scene.zones import tcp_inside
 
 STEP = 0.0005  # rad of the fastest joint between two configurations that Coal is asked about
 RATE = 10_000.0  # Hz
 
 
 def sampled_densely(trajectory: JointTrajectory, step: float = STEP) -> FloatArray:
-    """Configurations (M, n) along the way; no joint moves more than `step` [rad] from one to the next."""
+    """Configurations (M, n) along the path; no joint moves more than `step` [rad] from one to the next."""
     times = trajectory.times
     instants = np.linspace(times[0], times[-1], max(int((times[-1] - times[0]) * RATE), 2))
-    way = np.abs(np.diff(trajectory.sample(instants).q, axis=0)).max(axis=1)
-    passed = np.concatenate([[0.0], np.cumsum(way)])
+    steps = np.abs(np.diff(trajectory.sample(instants).q, axis=0)).max(axis=1)
+    passed = np.concatenate([[0.0], np.cumsum(steps)])
     count = int(np.ceil(1.1 * passed[-1] / step)) + 2
     while True:
         q = trajectory.sample(np.interp(np.linspace(0.0, passed[-1], count), passed, instants)).q
@@ -39,13 +38,23 @@ class SecondOpinion:
         self._scene = scene
         self._coal = Coal(scene.collision, [*scene.cell.robot.capsules, *loads], scene.cell.bodies())
         self._coal.precise()
-        self._arm = _arm(scene)
+        self._arm = pinocchio_arm(scene.cell.robot, scene.loads, scene.cell.base_pose)
         self._data = self._arm.createData()
 
-    def clearance_left(self, trajectory: JointTrajectory, margin: float) -> tuple[float, int]:
-        """Least distance minus what its pair must keep [m] by Coal, and how many configurations."""
-        kept, asked = self._scene.thresholds(margin), sampled_densely(trajectory)
-        return min(float((self._coal.distances(q) - kept).min()) for q in asked), len(asked)
+    def clearance_left(
+        self, trajectory: JointTrajectory, margin: float, station: str = ""
+    ) -> tuple[float, int]:
+        """Least distance minus what its pair must keep [m] by Coal, and how many configurations.
+
+        station: inside its zone its allowed contacts keep their own distances.
+        """
+        asked, plain = sampled_densely(trajectory), self._scene.thresholds(margin)
+        kept = np.broadcast_to(plain, (len(asked), len(plain)))
+        if station:
+            inside = tcp_inside(asked, self._scene, station, margin)
+            kept = np.where(inside[:, None], self._scene.thresholds(margin, station), plain)
+        left = [float((self._coal.distances(q) - row).min()) for q, row in zip(asked, kept, strict=True)]
+        return min(left), len(asked)
 
     def largest_share(self, trajectory: JointTrajectory) -> float:
         """Largest used share of position, speed, acceleration, jerk and torque limits at 10 kHz."""
@@ -96,21 +105,3 @@ class SecondOpinion:
         pull = -force
         torque[:, spring.joint] = z * pull[0] - x * pull[1]  # about +y
         return torque
-
-
-def _arm(scene: PlanningScene) -> pinocchio.Model:
-    """Robot and loads as rigid bodies."""
-    robot, model, parent = scene.cell.robot, pinocchio.Model(), 0
-    model.gravity.linear = np.asarray(scene.cell.base_pose)[:3, :3].T @ [0.0, 0.0, -STANDARD_GRAVITY]
-    for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):
-        placement = pinocchio.SE3(origin[:3, :3].copy(), origin[:3, 3].copy())
-        joint = pinocchio.JointModelRevoluteUnaligned(axis.copy())
-        parent = model.addJoint(parent, joint, placement, f"joint_{i}")
-        link = (robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1])
-        for mass, com, inertia in (
-            link,
-            *((x.mass, x.com, x.inertia) for x in scene.loads if i == robot.n - 1),
-        ):
-            body = pinocchio.Inertia(float(mass), np.array(com), np.array(inertia))
-            model.appendBodyToJoint(parent, body, pinocchio.SE3.Identity())
-    return model
