@@ -1,7 +1,7 @@
 # `make help` lists the targets. Everything runs in .venv, which the first target makes; results go to out/.
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-long check sanitize bench docs clean
+.PHONY: help setup demo test test-long check sanitize bench bench-long compare docs clean
 # A sourced ROS 2 would put its own packages, of another Python, in front of the environment's.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 
@@ -12,6 +12,8 @@ PYTEST := $(BIN)/python -m pytest -n $(CORES) --dist worksteal
 SYSTEM_TESTS := $(BIN)/python -m pytest tests/system
 # make demo ARGS='--cell my_cell.yaml'; make test ARGS='-k energy'; make bench ARGS='--seeds 3'
 ARGS ?=
+# make compare BEFORE=../checkout_of_another_commit, with its core built
+BEFORE ?=
 
 help:             ## this list
 	@echo "make TARGET [ARGS='...'], with TARGET one of"
@@ -40,11 +42,23 @@ check: setup      ## ruff and mypy --strict
 sanitize: setup   ## the compiled core under the address and undefined-behaviour sanitizers
 	@PYTHON=$(CURDIR)/$(BIN)/python src/ir_kernels/sanitize.sh $(ARGS)
 
-bench: setup      ## every benchmark, its claims at the end; JSON in out/bench
-	@mkdir -p out/bench; for script in benchmarks/[!_]*.py; do \
-	  [ -e "$$script" ] || continue; name=$$(basename "$$script" .py); echo "== $$name"; \
-	  $(BIN)/python "$$script" --json "out/bench/$$name.json" $(ARGS) || exit 1; \
+# compare.py needs another checkout: it has a target of its own.
+BENCHMARKS := $(filter-out benchmarks/compare.py,$(wildcard benchmarks/[!_]*.py))
+define run_benchmarks
+	@mkdir -p out/bench; for script in $(BENCHMARKS); do \
+	  name=$$(basename "$$script" .py); echo "== $$name"; \
+	  $(BIN)/python "$$script" $(1) --json "out/bench/$$name.json" $(ARGS) || exit 1; \
 	done
+endef
+
+bench: setup      ## every benchmark in at most 2 minutes each, its claims at the end; JSON in out/bench
+	$(call run_benchmarks,--quick)
+
+bench-long: setup ## every benchmark in full: what claims quote; JSON in out/bench
+	$(call run_benchmarks,)
+
+compare: setup    ## the same answers, and as fast? This checkout against BEFORE=CHECKOUT
+	@$(BIN)/python benchmarks/compare.py --before "$(BEFORE)" --json out/bench/compare.json $(ARGS)
 
 docs: setup       ## the pages that are written from code: interfaces, rooms
 	@$(BIN)/python tools/interface_reference.py

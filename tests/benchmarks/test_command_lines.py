@@ -1,0 +1,50 @@
+"""Every benchmark has the same options and writes the same JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPTS = sorted((ROOT / "benchmarks").glob("[!_]*.py"))
+OPTIONS = {"--cell", "--seeds", "--quick", "--json"}
+OTHERS = {"compare": {"--before", "--after", "--quick", "--json"}}  # its requests name cells and seeds
+
+
+def ran(script: str, *words: str) -> str:
+    """What a benchmark prints."""
+    command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), *words]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("script", [path.stem for path in SCRIPTS])
+def test_every_benchmark_has_the_options(script: str) -> None:
+    shown = ran(script, "--help")
+    assert {option for option in OTHERS.get(script, OPTIONS) if option not in shown} == set()
+
+
+def test_a_quick_run_prints_its_claims_and_writes_them(tmp_path: Path) -> None:
+    file = tmp_path / "new" / "search.json"
+    printed = ran("search", "--quick", "--cell", "open", "--seeds", "1", "--json", str(file))
+    result = json.loads(file.read_text())
+    assert set(result) == {"machine", "commit", "rows", "claims"}
+    assert len(result["rows"]) == 12  # six tasks, there and back
+    assert [set(claim) for claim in result["claims"]] == [{"name", "value", "unit", "bound", "holds"}] * 2
+    lines = printed.splitlines()[-2:]
+    for line, claim in zip(lines, result["claims"], strict=True):
+        assert line.startswith(claim["name"])
+        assert line.endswith("holds" if claim["holds"] else "falls short")
+
+
+def test_make_bench_runs_all_of_them() -> None:
+    shown = subprocess.run(["make", "-n", "bench"], cwd=ROOT, capture_output=True, text=True).stdout
+    listed = {path.stem for path in SCRIPTS if f"benchmarks/{path.name}" in shown}
+    assert listed == {path.stem for path in SCRIPTS} - {"compare"}
+    assert "--quick" in shown
