@@ -18,6 +18,7 @@ from ir_description import (
     check_cell,
     load_cell,
 )
+from ir_description.poses import composed, pose_of
 from ir_kernels import Chain, CollisionModel, SphericalWristIk
 from ir_msgs_py.arrays import FloatArray
 
@@ -38,6 +39,11 @@ def model(cell: Cell, held: str = "", places: PartPlaces | None = None) -> Colli
     return CollisionModel(
         chain, cell.capsules(held), cell.bodies(places), cell.self_pairs(held), cell.ignored_pairs
     )
+
+
+def withdrawn(station: Station) -> FloatArray:
+    """Pose (4, 4) of the tcp in the world at the end of the approach, along -x of the tcp."""
+    return composed(station.pose, pose_of((-station.approach_distance, 0.0, 0.0)))
 
 
 def thresholds(collisions: CollisionModel, station: Station | None, safety_distance: float) -> FloatArray:
@@ -130,7 +136,7 @@ def test_every_station_of_the_demo_can_be_entered_and_left_straight() -> None:
             steps = np.linspace(0.0, station.approach_distance, 12)
             poses = np.repeat(station.pose[None], len(steps), axis=0)
             poses[:, :3, 3] -= steps[:, None] * station.pose[:3, 0]
-            assert poses[-1] == pytest.approx(station.retreat_pose())
+            assert poses[-1] == pytest.approx(withdrawn(station))
             solutions = ik.solve(poses)
             free = np.ones(len(solutions.q), dtype=bool)
             for state in (places, after):  # as it comes and as it goes
@@ -155,7 +161,7 @@ def test_every_move_of_the_demo_is_free_straight_or_by_way_of_park() -> None:
         there = (
             cell.posture(step.target)[None]
             if step.kind == "POSTURE"
-            else unturned(ik.solve(cell.station(step.target).retreat_pose()[None]).q)
+            else unturned(ik.solve(withdrawn(cell.station(step.target))[None]).q)
         )
         collisions = model(cell, places.held, places)
 
@@ -179,5 +185,5 @@ def test_the_demo_s_tool_is_out_of_the_zone_after_the_retreat() -> None:
         forbidden = Body("zone", "box", zone.pose, zone.size)
         moving = [capsule for capsule in cell.capsules("gear") if capsule.link >= 3]
         collisions = CollisionModel(chain, moving, [forbidden], ())
-        q = ik.solve(station.retreat_pose()[None]).q
+        q = ik.solve(withdrawn(station)[None]).q
         assert collisions.min_distance(q).distance.max() > SAFETY_DISTANCE, station.name

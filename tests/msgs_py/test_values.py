@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_msgs_py import modes, plc, power, program, report, stations
+from ir_msgs_py import modes, plc, power, program, report
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
@@ -62,10 +62,6 @@ NAN = float("nan")
         (lambda: plc.PlcInputs().with_bit("zz", True), 'PLC input is "zz": known are ab, hib, ks'),
         (lambda: plc.PlcInputs().with_bit("T1", False), "operating mode T1 cannot be taken away"),
         (
-            lambda: stations.Station("s", "e", np.eye(4), "ajar"),
-            'zone of station s is "ajar": known are open, semi_closed, closed',
-        ),
-        (
             lambda: program.ProgramState(
                 stamp_ns=0,
                 program_id="p",
@@ -106,6 +102,7 @@ def test_a_status_says_its_code_as_a_word():
 def test_a_program_sets_and_clears_signals_by_text():
     assert plc.Signal.parse("clamp") == plc.Signal("clamp", True)
     assert plc.Signal.parse("clamp=1") == plc.Signal("clamp", True)
+    assert plc.Signal("clamp", False).text == "not clamp"
     assert plc.Signal.parse("clamp=0") == plc.Signal.parse("not clamp") == plc.Signal("clamp", False)
 
 

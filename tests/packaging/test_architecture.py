@@ -49,13 +49,13 @@ def is_ros(name: str) -> bool:
 
 
 def may_know_ros(package: str, module: Path) -> bool:
-    """Nodes, parameters, and the ROS side of the shared vocabulary; the command line knows all."""
+    """Nodes and their rooms, parameters, the ROS side of the vocabulary; the command line knows all."""
     inside = module.relative_to(SRC / package / package)
     if package == "ir_cli":
         return True
     if package == "ir_msgs_py":
         return inside.parts[0] == "ros"
-    return module.name in ("node.py", "parameters.py")
+    return inside.parts[0] == "node" or module.name in ("node.py", "parameters.py")
 
 
 def violations(package: str, forbidden: object) -> list[str]:

@@ -10,7 +10,6 @@ from ir_description.errors import (
     CellFileError,
     DescriptionError,
     DescriptionFileError,
-    InvalidValueError,
     RobotFileError,
     UnknownNameError,
 )
@@ -25,9 +24,11 @@ from ir_description.library import (
 from ir_description.load import Load
 from ir_description.part import Part
 from ir_description.power import PowerData
-from ir_description.program import CellSignal, PartPlaces, ProgramStep, Signal
+from ir_description.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.robot import Counterbalance, RobotModel
 from ir_description.urdf import robot_urdf
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.plc import Signal
 
 __all__ = [
     "AllowedContact",

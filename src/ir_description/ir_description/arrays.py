@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ir_description.errors import InvalidValueError
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 ROTATION_TOLERANCE = 1e-9
 """Largest entry of R R^T - 1 that still counts as a rotation."""

@@ -8,9 +8,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from ir_description.arrays import frozen, frozen_pose
-from ir_description.errors import InvalidValueError
 from ir_description.poses import composed, pose_of
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 BodyKind = Literal["box", "cylinder", "sphere", "capsule", "plane", "mesh"]
 KINDS: tuple[BodyKind, ...] = get_args(BodyKind)

@@ -8,11 +8,11 @@ import numpy as np
 
 from ir_description.body import KINDS, SIZE_MAX, Body
 from ir_description.cell_checks import BODIES_MAX, NameRegister
-from ir_description.errors import InvalidValueError
 from ir_description.items import Item, Table
 from ir_description.mesh import HULL_VERTICES_MAX, convex_vertices, hull_vertices, mesh_path, read_stl
 from ir_description.poses import pose_of, rotation_from_abc, rotation_from_matrix, rotation_from_quaternion
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 POSE_KEYS = ("xyz", "abc_deg", "quaternion", "rotation")
 FAR = 1000.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ir_description.arrays import frozen, in_range, transformed
-from ir_description.errors import InvalidValueError
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 
 @dataclass(frozen=True, eq=False)

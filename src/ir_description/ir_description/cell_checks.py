@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 from ir_description.body import Body
 from ir_description.capsule import Capsule
 from ir_description.equipment import AllowedContact
-from ir_description.errors import InvalidValueError, UnknownNameError
+from ir_description.errors import UnknownNameError
 from ir_description.load import Load, total_mass
 from ir_description.part import Part
 from ir_description.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.robot import RobotModel
+from ir_msgs_py.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from ir_description.cell import Cell

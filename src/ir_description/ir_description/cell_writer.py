@@ -19,8 +19,9 @@ from ir_description.equipment import Equipment, Station, zone_around
 from ir_description.load import Load
 from ir_description.part import Part
 from ir_description.poses import abc_from_rotation, rotation_from_abc
-from ir_description.program import CellSignal, ProgramStep, Signal
+from ir_description.program import CellSignal, ProgramStep
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.plc import Signal
 
 _DIGITS = 10
 _IDENTITY = np.eye(4)

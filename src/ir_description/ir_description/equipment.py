@@ -10,14 +10,15 @@ import numpy as np
 
 from ir_description.arrays import frozen, frozen_pose, in_range
 from ir_description.body import SIZE_MAX, Body
-from ir_description.errors import InvalidValueError, UnknownNameError
+from ir_description.errors import UnknownNameError
 from ir_description.poses import composed, pose_of
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
 ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)
 APPROACH_MAX = 5.0
-"""Longest retreat [m]."""
+"""Longest approach [m]."""
 ZONE_MAX = 10.0 * SIZE_MAX
 """Largest edge [m] of a zone: it holds bodies far apart."""
 
@@ -26,7 +27,7 @@ ZONE_MAX = 10.0 * SIZE_MAX
 class Zone:
     """A forbidden zone: an oriented box, pose (4, 4) of its centre and full size (3,) [m].
 
-    The kind changes how a way in and out is searched, not what the zone is.
+    The kind changes how a withdrawal is searched, not what the zone is.
     """
 
     kind: ZoneKind
@@ -147,11 +148,6 @@ class Station:
             self, "pose_in_equipment", frozen_pose(self.pose_in_equipment, f"pose of {self.name}")
         )
         in_range(self.approach_distance, 0.0, APPROACH_MAX, "m", f"approach_distance of {self.name}")
-
-    def retreat_pose(self) -> FloatArray:
-        """Return the pose (4, 4) of the tcp in the world after the retreat along -x."""
-        back = pose_of((-self.approach_distance, 0.0, 0.0))
-        return composed(self.pose, back)
 
 
 def station_at(

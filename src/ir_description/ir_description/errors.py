@@ -3,11 +3,12 @@
 ::
 
     DescriptionError
-    ├── InvalidValueError      a value that no robot, load or cell can have (also a ValueError)
     ├── UnknownNameError       a name that nobody has; the sentence lists the known ones (also a LookupError)
     └── DescriptionFileError   a file that can't be read as what it claims: path, line, sentence
         ├── CellFileError
         └── RobotFileError
+
+A value that no robot, load or cell can have raises InvalidValueError of ir_msgs_py.errors, as everywhere.
 """
 
 from __future__ import annotations
@@ -17,10 +18,6 @@ from collections.abc import Iterable
 
 class DescriptionError(Exception):
     """Root of all errors of this package."""
-
-
-class InvalidValueError(DescriptionError, ValueError):
-    """A value out of its bounds; the sentence gives value, bound and unit."""
 
 
 class UnknownNameError(DescriptionError, LookupError):

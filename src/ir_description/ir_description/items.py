@@ -14,9 +14,10 @@ from typing import NoReturn
 
 import numpy as np
 
-from ir_description.errors import DescriptionFileError, InvalidValueError, UnknownNameError, listed, shown
+from ir_description.errors import DescriptionFileError, UnknownNameError, listed, shown
 from ir_description.yaml_tree import Node, Scalar, parse_yaml
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 NAME_LENGTH = 64
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.\-]*")
@@ -107,10 +108,6 @@ class Item:
     def is_scalar(self) -> bool:
         """Whether this is a single value."""
         return isinstance(self._content, Scalar)
-
-    def is_mapping(self) -> bool:
-        """Whether this is a mapping."""
-        return isinstance(self._content, dict)
 
     def text(self, length: int = 200) -> str:
         """Return one line of text of 1 to `length` printable characters."""

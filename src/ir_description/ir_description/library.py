@@ -9,12 +9,13 @@ from pathlib import Path
 
 from ir_description.cell import Cell
 from ir_description.cell_reader import read_cell
-from ir_description.errors import CellFileError, InvalidValueError, UnknownNameError, shown
+from ir_description.errors import CellFileError, UnknownNameError, shown
 from ir_description.mesh import read_regular_file
 from ir_description.power import PowerData
 from ir_description.power_file import power_from_yaml
 from ir_description.robot import RobotModel
 from ir_description.robot_file import robot_from_yaml
+from ir_msgs_py.errors import InvalidValueError
 
 _DATA = files("ir_description") / "data"
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range, transformed
 from ir_description.capsule import Capsule
-from ir_description.errors import InvalidValueError
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 MASS_MAX = 2000.0
 """Largest mass [kg] a load may claim; what the robot carries is limited by RobotModel.rated_payload."""

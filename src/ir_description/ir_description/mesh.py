@@ -11,8 +11,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.arrays import frozen
-from ir_description.errors import InvalidValueError, shown
+from ir_description.errors import shown
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 BYTES_MAX = 20_000_000
 TRIANGLES_MAX = 200_000

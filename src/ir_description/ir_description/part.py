@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from ir_description.arrays import frozen_pose
 from ir_description.body import Body
-from ir_description.errors import InvalidValueError
 from ir_description.load import Load
 from ir_description.poses import composed
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ir_description.arrays import frozen
-from ir_description.errors import InvalidValueError
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 QUATERNION_TOLERANCE = 1e-3
 """A quaternion this far from unit length is normalised, beyond it is refused."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ir_description.arrays import in_range
-from ir_description.errors import InvalidValueError, UnknownNameError
+from ir_description.errors import UnknownNameError
+from ir_msgs_py.errors import InvalidValueError
 
 
 @dataclass(frozen=True)
-class PowerMode:
+class ControllerMode:
     """One energy mode of the controller.
 
     controller_watts [W] without drives, tool and holding torque. time_to_pause [s] into the mode and
@@ -89,7 +90,7 @@ class PowerData:
     """All of a controller's power figures; tool watts belong to the tool (Load)."""
 
     name: str
-    modes: tuple[PowerMode, ...]
+    modes: tuple[ControllerMode, ...]
     operate_manual_pe_mode_id: int
     drives_and_brake_release: float  # W while the motors are on
     motors_to_brakes_in_program: float  # s
@@ -114,7 +115,7 @@ class PowerData:
         """Energy [J] that fits into the DC link before braking energy is burnt."""
         return self.dc_link.capacity_energy
 
-    def mode(self, name: str) -> PowerMode:
+    def mode(self, name: str) -> ControllerMode:
         """Return the mode of that name."""
         for mode in self.modes:
             if mode.name == name:

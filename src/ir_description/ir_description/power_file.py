@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ir_description.errors import RobotFileError
 from ir_description.items import Item, Table, read_items
-from ir_description.power import DcLink, EnergyShare, MeasuredPower, PlcBit, PowerData, PowerMode
+from ir_description.power import ControllerMode, DcLink, EnergyShare, MeasuredPower, PlcBit, PowerData
 from ir_description.robot_file import figure
 
 FORMAT = "ir_description/power/1"
@@ -51,11 +51,11 @@ def power_from_yaml(text: str, source: str = "<text>") -> PowerData:
         )
 
 
-def _mode(item: Item) -> PowerMode:
+def _mode(item: Item) -> ControllerMode:
     table = item.table(
         ("name", "controller_w", "enter_s", "leave_s", "minimum_stay_s", "time_min_pause_s", "profienergy_id")
     )
-    return PowerMode(
+    return ControllerMode(
         name=table["name"].name(),
         pe_mode_id=figure(table["profienergy_id"]).integer(0, 255),
         controller_watts=figure(table["controller_w"]).number(0, 1e5, "W"),

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from ir_description.arrays import in_range
-from ir_description.errors import InvalidValueError, UnknownNameError
+from ir_description.errors import UnknownNameError
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import REST_MODES
+from ir_msgs_py.plc import Signal
 
 StepKind = Literal["STATION", "POSTURE", "PAUSE"]
 POSTURES = ("home", "park")
@@ -20,24 +22,6 @@ AUTO = "AUTO"
 PAUSE_POWER_MODES = (AUTO, *REST_MODES)
 PAUSE_MAX = 604_800.0
 """Longest pause or dwell [s]: a week."""
-
-
-@dataclass(frozen=True)
-class Signal:
-    """A machine's signal with the value that is awaited or set; as text `door_open` or `not door_open`."""
-
-    name: str
-    value: bool = True
-
-    @property
-    def text(self) -> str:
-        """The signal as it is written."""
-        return self.name if self.value else f"not {self.name}"
-
-    @staticmethod
-    def from_text(text: str) -> Signal:
-        """Read what `text` gives."""
-        return Signal(text[4:].strip(), False) if text.startswith("not ") else Signal(text)
 
 
 @dataclass(frozen=True)

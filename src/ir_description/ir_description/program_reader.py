@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ir_description.items import Item, Table
-from ir_description.program import PAUSE_MAX, PAUSE_POWER_MODES, POSTURES, CellSignal, ProgramStep, Signal
+from ir_description.program import PAUSE_MAX, PAUSE_POWER_MODES, POSTURES, CellSignal, ProgramStep
+from ir_msgs_py.plc import Signal
 
 _COMMON = ("wait_for", "set_signals")
 _STEP_KEYS = ("station", "posture", "pause", "dwell", "attach", "detach", "power_mode", *_COMMON)
@@ -68,7 +69,9 @@ def _signals(table: Table, key: str) -> tuple[Signal, ...]:
 
 
 def _signal(item: Item) -> Signal:
-    signal = Signal.from_text(item.text(80))
-    if not signal.name or not signal.name.replace("_", "").replace(".", "").replace("-", "").isalnum():
-        item.fail(f"is {signal.name!r}, must be a signal's name, perhaps after 'not '")
-    return signal
+    text = item.text(80)
+    inverted = text.startswith("not ")
+    name = text.removeprefix("not ").strip() if inverted else text
+    if not name.replace("_", "").replace(".", "").replace("-", "").isalnum():
+        item.fail(f"is {name!r}, must be a signal's name, perhaps after 'not '")
+    return Signal(name, not inverted)

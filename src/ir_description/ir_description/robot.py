@@ -11,8 +11,8 @@ import numpy as np
 
 from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range
 from ir_description.capsule import Capsule
-from ir_description.errors import InvalidValueError
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 __all__ = ["Capsule", "Counterbalance", "RobotModel"]
 

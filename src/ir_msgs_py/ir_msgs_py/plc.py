@@ -88,10 +88,10 @@ class PlcOutputs:
 
 @dataclass(frozen=True)
 class Signal:
-    """One signal of a machine of the cell; stamp_ns: node clock [ns]."""
+    """One signal of a machine of the cell: its level, awaited, set or reported; stamp_ns: node clock [ns]."""
 
     name: str
-    value: bool
+    value: bool = True
     stamp_ns: int = 0
 
     def __post_init__(self) -> None:
@@ -99,6 +99,11 @@ class Signal:
             raise InvalidValueError(
                 f"name of a signal is {self.name[:40]!r}: it must be 1 to 256 printable characters"
             )
+
+    @property
+    def text(self) -> str:
+        """The signal as a cell file has it: "name" or "not name"."""
+        return self.name if self.value else f"not {self.name}"
 
     @classmethod
     def parse(cls, text: str) -> Signal:

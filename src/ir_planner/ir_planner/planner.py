@@ -10,7 +10,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import DistancePair, PlannedMovement, PlanningInfo, PlanningStage, TrajectoryReport
-from ir_msgs_py.stations import IkSolution
+from ir_msgs_py.candidates import IkSolution
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes

@@ -13,6 +13,14 @@ from ir_msgs_py.ros.convert_basics import (
     time_to_msg,
     velocity_from_msg,
 )
+from ir_msgs_py.ros.convert_candidates import (
+    ik_solution_from_msg,
+    ik_solution_to_msg,
+    plan_options_from_msg,
+    plan_options_to_msg,
+    service_candidate_from_msg,
+    service_candidate_to_msg,
+)
 from ir_msgs_py.ros.convert_pose import (
     NORM_TOLERANCE,
     pose_from_msg,
@@ -44,16 +52,6 @@ from ir_msgs_py.ros.convert_report import (
     planning_info_to_msg,
     report_from_msg,
     report_to_msg,
-)
-from ir_msgs_py.ros.convert_stations import (
-    ik_solution_from_msg,
-    ik_solution_to_msg,
-    plan_options_from_msg,
-    plan_options_to_msg,
-    service_candidate_from_msg,
-    service_candidate_to_msg,
-    station_from_msg,
-    station_to_msg,
 )
 from ir_msgs_py.ros.convert_trajectory import (
     MAX_POINTS,
@@ -104,8 +102,6 @@ __all__ = [
     "stamped_pose_from_msg",
     "stamped_pose_given",
     "stamped_pose_to_msg",
-    "station_from_msg",
-    "station_to_msg",
     "status_from_msg",
     "status_to_msg",
     "time_from_msg",

@@ -3,6 +3,8 @@
 from typing import Any
 
 import numpy as np
+from ir_msgs.msg import AllowedContact as AllowedContactMsg
+from ir_msgs.msg import Station as StationMsg
 from ir_msgs_py.ros.conversions import (
     distance_pair_to_msg,
     float_array,
@@ -12,12 +14,10 @@ from ir_msgs_py.ros.conversions import (
     power_mode_to_msg,
     report_to_msg,
     service_candidate_to_msg,
-    station_to_msg,
+    stamped_pose_to_msg,
     status_to_msg,
     trajectory_to_msg,
 )
-from ir_msgs_py.stations import AllowedContact as ContactValue
-from ir_msgs_py.stations import Station as StationValue
 from ir_msgs_py.status import Status
 
 from ir_description import Cell, Station
@@ -29,18 +29,23 @@ from ir_planner.service import ServicePlan
 from ir_planner.trajectories import OptimizationPlan
 
 
-def station_value(station: Station) -> StationValue:
-    """A station of the cell in the shared vocabulary."""
-    contacts = tuple(
-        ContactValue(contact.body_a, contact.body_b, contact.safety_distance)
-        for contact in station.allowed_contacts
+def station_to_msg(station: Station) -> StationMsg:
+    """A station of the cell."""
+    return StationMsg(
+        name=station.name,
+        equipment=station.equipment,
+        pose=stamped_pose_to_msg(station.pose),
+        zone=station.zone.lower(),
+        allowed_contacts=[
+            AllowedContactMsg(body_a=c.body_a, body_b=c.body_b, safety_distance=c.safety_distance)
+            for c in station.allowed_contacts
+        ],
     )
-    return StationValue(station.name, station.equipment, station.pose, station.zone.lower(), contacts)
 
 
 def stations_to_msg(cell: Cell) -> list[Any]:
     """All stations of the cell."""
-    return [station_to_msg(station_value(station)) for station in cell.stations]
+    return [station_to_msg(station) for station in cell.stations]
 
 
 def fill_status(response: Any, status: Status, source: str) -> Any:

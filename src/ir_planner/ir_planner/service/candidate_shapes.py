@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from ir_msgs_py.stations import ServiceCandidate
+from ir_msgs_py.candidates import ServiceCandidate
 
 from ir_planner.checks import CLOSEST, WAY, ZONES, Colour, Shape
 from ir_planner.scene import PlanningScene

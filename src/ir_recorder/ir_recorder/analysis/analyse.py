@@ -11,6 +11,7 @@ import numpy as np
 
 from ir_description import Cell, DescriptionError, Load, cell_from_yaml, load_power_data
 from ir_kernels import KernelError
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES, LOAD_SEPARATOR
 from ir_recorder.analysis.clearance import StepClearance, held_part, step_clearances
 from ir_recorder.analysis.grid import check_grid
@@ -114,7 +115,7 @@ class _Analyser:
             return (None,) * len(steps)
         try:
             return step_clearances(cell, self.recording.joints, steps)
-        except (DescriptionError, KernelError) as error:
+        except (DescriptionError, InvalidValueError, KernelError) as error:
             self.problems.append(f"clearance can't be computed: {error}")
             return (None,) * len(steps)
 

@@ -1,52 +1,14 @@
-"""Places where the tool works, and the ways to get the robot there: values mirrored by messages."""
+"""Configurations that reach a pose, and withdrawals and entries: values mirrored by messages."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.checks import finite, not_nan, one_of, read_only, set_field
+from ir_msgs_py.checks import finite, not_nan, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import DistancePair, TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-
-
-class ZoneKind(StrEnum):
-    """How much a machine encloses its work area."""
-
-    OPEN = "open"
-    SEMI_CLOSED = "semi_closed"
-    CLOSED = "closed"
-
-
-@dataclass(frozen=True)
-class AllowedContact:
-    """Two bodies that may come nearer than S_m at a station, down to their own safety distance [m]."""
-
-    body_a: str
-    body_b: str
-    safety_distance: float
-
-    def __post_init__(self) -> None:
-        what = f"safety distance of {self.body_a} and {self.body_b}"
-        set_field(self, "safety_distance", finite(self.safety_distance, what, "m"))
-
-
-@dataclass(frozen=True, eq=False)
-class Station:
-    """A place where the tool works; pose (4, 4) of the tcp in the cell [m]."""
-
-    name: str
-    equipment: str
-    pose: FloatArray
-    zone: str
-    allowed_contacts: tuple[AllowedContact, ...] = ()
-
-    def __post_init__(self) -> None:
-        set_field(self, "pose", read_only(self.pose, f"pose of station {self.name}", (4, 4)))
-        set_field(self, "zone", ZoneKind(one_of(self.zone, list(ZoneKind), f"zone of station {self.name}")))
-        set_field(self, "allowed_contacts", tuple(self.allowed_contacts))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

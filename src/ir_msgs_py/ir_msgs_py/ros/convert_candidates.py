@@ -1,4 +1,4 @@
-"""Plan options, stations, configurations that reach a pose and service movements, to and from messages."""
+"""Plan options, configurations that reach a pose and service movements, to and from messages."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ from dataclasses import fields
 
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 
-from ir_msgs.msg import AllowedContact as AllowedContactMsg
 from ir_msgs.msg import IkSolution as IkSolutionMsg
 from ir_msgs.msg import PlanOptions as PlanOptionsMsg
 from ir_msgs.msg import ServiceCandidate as ServiceCandidateMsg
-from ir_msgs.msg import Station as StationMsg
+from ir_msgs_py.candidates import IkSolution, ServiceCandidate
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.convert_basics import configuration_from_msg, configuration_to_msg
-from ir_msgs_py.ros.convert_pose import stamped_pose_from_msg, stamped_pose_to_msg
 from ir_msgs_py.ros.convert_report import (
     distance_pair_from_msg,
     distance_pair_to_msg,
@@ -21,7 +19,6 @@ from ir_msgs_py.ros.convert_report import (
     report_to_msg,
 )
 from ir_msgs_py.ros.convert_trajectory import trajectory_from_msg, trajectory_given, trajectory_to_msg
-from ir_msgs_py.stations import AllowedContact, IkSolution, ServiceCandidate, Station
 
 _OPTIONS = tuple(field.name for field in fields(PlanOptions))
 _IK_NUMBERS = ("position_error", "rotation_error", "clearance", "movement_cost")
@@ -35,26 +32,6 @@ def plan_options_to_msg(options: PlanOptions) -> PlanOptionsMsg:
 def plan_options_from_msg(msg: PlanOptionsMsg) -> PlanOptions:
     """Choices of a request, checked."""
     return PlanOptions(**{name: getattr(msg, name) for name in _OPTIONS})
-
-
-def station_to_msg(station: Station) -> StationMsg:
-    """Place where the tool works."""
-    return StationMsg(
-        name=station.name,
-        equipment=station.equipment,
-        pose=stamped_pose_to_msg(station.pose),
-        zone=str(station.zone),
-        allowed_contacts=[
-            AllowedContactMsg(body_a=c.body_a, body_b=c.body_b, safety_distance=c.safety_distance)
-            for c in station.allowed_contacts
-        ],
-    )
-
-
-def station_from_msg(msg: StationMsg) -> Station:
-    """Place where the tool works."""
-    contacts = tuple(AllowedContact(c.body_a, c.body_b, c.safety_distance) for c in msg.allowed_contacts)
-    return Station(msg.name, msg.equipment, stamped_pose_from_msg(msg.pose), msg.zone, contacts)
 
 
 def ik_solution_to_msg(solution: IkSolution) -> IkSolutionMsg:
