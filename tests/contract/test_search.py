@@ -1,0 +1,195 @@
+"""What every search for free paths must do: the contract of `Search`, for each registered one."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ir_msgs_py.settings import describe
+from ir_planner import CancelledError, Goal, Planner, PlannerSettings, PlanOptions, RequestError
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.scene import PlanningScene, path_cost
+from ir_planner.search import SEARCHES, Ends, Found, Search
+
+SEED, WORK = 7, 60_000
+SAFETY_DISTANCE = 0.02  # m
+SAMPLES = 0.01  # rad between the configurations at which distances are computed
+# Tasks from easy to hard; a search need not solve all of them, but at least one.
+TASKS = (
+    ("open", "home->p1"),
+    ("table_columns", "tL->tR"),
+    ("cnc_door", "cnc->pal"),
+    ("deep_box", "tun->bin"),
+)
+WALLED_IN = """
+format: ir_cell/1
+name: walled_in
+robot: kr210_r2700_extra
+equipment:
+  - name: wall
+    pose: {xyz: [0.0, 0.0, 0.0]}
+    bodies:
+      - {name: wall_left, kind: box, xyz: [0.0, 2.4, 2.5], size: [0.05, 3.6, 5.0]}
+      - {name: wall_right, kind: box, xyz: [0.0, -2.4, 2.5], size: [0.05, 3.6, 5.0]}
+      - {name: wall_above, kind: box, xyz: [0.0, 0.0, 3.6], size: [0.05, 4.8, 2.8]}
+"""
+
+Answer = tuple[Found, FreeSpace, Ends]
+
+
+def unhurried(most: int = WORK, cancelled: Callable[[], bool] = lambda: False) -> Work:
+    """Work on a clock that stands still: nothing is cut by time."""
+    return Work(most, 1.0, lambda: 0.0, cancelled)
+
+
+def scene_of(cell: str) -> PlanningScene:
+    planner = Planner(itertools.repeat(0.0).__next__)
+    planner.set_cell("", cell)
+    return planner.scene()
+
+
+@pytest.fixture(params=list(SEARCHES))
+def search(request: pytest.FixtureRequest) -> Search:
+    return SEARCHES[request.param]
+
+
+def asked(scene: PlanningScene, task: str) -> Ends:
+    """The task's start and its one goal."""
+    chosen = scene.cell.task(task)
+    return Ends(np.array(chosen.start), np.array([chosen.goal]))
+
+
+def answers(search: Search, seed: int = SEED) -> list[Answer]:
+    """What the search finds for every task."""
+    found = []
+    for cell, task in TASKS:
+        scene = scene_of(cell)
+        space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried())
+        ends = asked(scene, task)
+        found.append((search.find(ends, space, seed, space.work), space, ends))
+    return found
+
+
+def sampled(path: np.ndarray) -> np.ndarray:
+    """Configurations (K, n) along a path, no joint moving more than SAMPLES from one to the next."""
+    parts = [np.linspace(a, b, 2 + int(np.abs(b - a).max() / SAMPLES)) for a, b in itertools.pairwise(path)]
+    return np.concatenate(parts)
+
+
+def test_paths_join_the_ends_and_are_free(search: Search) -> None:
+    solved = 0
+    for found, space, ends in answers(search):
+        for path in found.paths:
+            solved += 1
+            assert np.array_equal(path[0], ends.start)
+            assert any(np.array_equal(path[-1], goal) for goal in ends.goals)
+            assert (path >= space.low).all()
+            assert (path <= space.high).all()
+            assert space.edges_free(path[:-1].copy(), path[1:].copy()).all()
+            assert (space.scene.collision.distances(sampled(path)) > space.threshold - 1e-6).all()
+    assert solved > 0
+
+
+def test_the_cheapest_path_by_w_is_the_first(search: Search) -> None:
+    for found, space, _ in answers(search):
+        costs = [path_cost(space.scene.weights, path) for path in found.paths]
+        assert costs == sorted(costs)
+
+
+def test_the_same_seed_gives_the_same_bytes(search: Search) -> None:
+    for (one, space, _), (other, again, _) in zip(answers(search), answers(search), strict=True):
+        assert [path.tobytes() for path in one.paths] == [path.tobytes() for path in other.paths]
+        assert one.note == other.note
+        assert space.work.iterations == again.work.iterations
+
+
+def test_work_is_charged(search: Search) -> None:
+    assert all(space.work.iterations > 0 for _, space, _ in answers(search))
+
+
+@pytest.mark.parametrize("most", [1, 300])
+def test_it_ends_when_its_work_is_spent(search: Search, most: int) -> None:
+    """A batch that has begun may be finished: at most as much again as a first look costs."""
+    scene = scene_of("deep_box")
+    space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried(most))
+    search.find(asked(scene, "tun->bin"), space, SEED, space.work)
+    assert space.work.iterations <= most + 2_000
+
+
+def test_it_stops_when_it_is_asked_to(search: Search) -> None:
+    scene = scene_of("deep_box")
+    space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried(cancelled=lambda: True))
+    with pytest.raises(CancelledError):
+        search.find(asked(scene, "tun->bin"), space, SEED, space.work)
+
+
+def test_it_finds_nothing_where_no_path_leads(search: Search) -> None:
+    """The ends lie on different sides of a wall that nothing passes."""
+    planner = Planner(itertools.repeat(0.0).__next__)
+    planner.set_cell(WALLED_IN, "")
+    scene = planner.scene()
+    ends = Ends(
+        np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]), np.radians([[180.0, -90.0, 90.0, 0.0, 0.0, 0.0]])
+    )
+    reach = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried())
+    assert reach.states_free(np.vstack((ends.start, ends.goals))).all()
+    space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried(2_000))
+    assert search.find(ends, space, SEED, space.work).paths == []
+
+
+def test_its_settings_are_fields_with_a_sentence_and_a_range(search: Search) -> None:
+    assert dataclasses.is_dataclass(search)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        search.anything = 1  # type: ignore[attr-defined]
+    for setting in describe(type(search)):
+        assert setting.sentence.endswith(".")
+        assert setting.bounds or setting.type is bool, f"{setting.name} has no range"
+    assert (type(search).__doc__ or "").splitlines()[0].endswith(".")
+
+
+@pytest.mark.parametrize("name", list(SEARCHES))
+def test_a_request_can_ask_for_it_by_name(name: str) -> None:
+    planner = Planner(itertools.repeat(0.0).__next__)
+    task = planner.set_cell("", "open").tasks[0]
+    plan = planner.plan_regional(
+        np.array(task.start), Goal(configuration=np.array(task.goal)), PlanOptions(planner_id=name)
+    )
+    assert plan.info.planner_id == name
+    assert plan.report.certified or not plan.status.ok
+    assert plan.info.stages[0].name == name
+    assert plan.info.stages[0].note
+
+
+def test_an_unknown_name_lists_the_known() -> None:
+    planner = Planner(itertools.repeat(0.0).__next__)
+    task = planner.set_cell("", "open").tasks[0]
+    options = PlanOptions(planner_id="teleport")
+    with pytest.raises(RequestError) as refused:
+        planner.plan_regional(np.array(task.start), Goal(configuration=np.array(task.goal)), options)
+    assert all(name in str(refused.value) for name in SEARCHES)
+
+
+def test_the_settings_tree_holds_every_search() -> None:
+    assert list(PlannerSettings().searches) == list(SEARCHES)
+
+
+@dataclasses.dataclass(frozen=True)
+class Careless:
+    """Answers with the straight movement, free or not, and looks at nothing."""
+
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        return Found([np.stack([ends.start, ends.goals[0]])])
+
+
+@pytest.mark.parametrize(
+    "contract",
+    [test_paths_join_the_ends_and_are_free, test_work_is_charged, test_it_finds_nothing_where_no_path_leads],
+)
+def test_the_contract_notices_a_search_that_breaks_it(contract: Callable[[Search], None]) -> None:
+    with pytest.raises(AssertionError):
+        contract(Careless())
