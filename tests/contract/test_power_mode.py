@@ -1,0 +1,94 @@
+"""What every power mode to rest in must have beside its row: the contract of the table `ir_msgs_py.modes`."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ir_description import cell_from_yaml, load_power_data
+from ir_msgs.msg import PowerMode
+from ir_msgs_py.modes import MODES, RESTS, ModeRow
+from ir_msgs_py.plc import PlcInputs
+from ir_msgs_py.transitions import TransitionTimes
+from ir_planner import Planner
+from ir_recorder.report.picture import MODE_COLOURS
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
+
+ROOT = Path(__file__).resolve().parents[2]
+STYLE = ROOT / "src" / "ir_recorder" / "ir_recorder" / "report" / "assets" / "page.css"
+CELL = """
+format: ir_cell/1
+name: resting
+robot: kr210_r2700_extra
+program:
+  - {{pause: 600.0, power_mode: {mode}}}
+"""
+
+
+@pytest.fixture(params=MODES, ids=lambda row: row.mode.name)
+def row(request: pytest.FixtureRequest) -> ModeRow:
+    found: ModeRow = request.param
+    return found
+
+
+def test_the_message_has_its_numbers(row: ModeRow) -> None:
+    for mode in (row.mode, row.entering, row.leaving):
+        assert getattr(PowerMode, mode.name) == mode
+
+
+def test_it_has_times_and_a_shortest_stay(row: ModeRow) -> None:
+    times, name = TransitionTimes(), row.mode.name
+    least = times.enter(name) + times.minimum_stay(name) + times.leave(name)
+    assert (least > 0.0) == (row in RESTS)
+    assert times.of(row.mode).time_min_pause == least
+
+
+def test_the_controllers_data_has_its_watts_and_its_number(row: ModeRow) -> None:
+    figures = load_power_data().mode(row.mode.name)
+    assert figures.controller_watts > 0.0
+    assert figures.pe_mode_id > 0
+
+
+def test_its_bit_is_an_input_that_a_plc_can_set(row: ModeRow) -> None:
+    if row.bit:
+        assert getattr(PlcInputs().with_bit(row.bit, True), row.bit)
+        assert row.bit in {bit.name.lower() for bit in load_power_data().plc_inputs}
+
+
+def test_a_program_may_rest_in_it_and_the_planner_knows_what_that_costs(row: ModeRow) -> None:
+    cell = cell_from_yaml(CELL.format(mode=row.mode.name))
+    assert cell.program[0].power_mode == row.mode.name
+    planner = Planner(itertools.repeat(0.0).__next__)
+    planner.set_cell(CELL.format(mode=row.mode.name), "")
+    alternatives = planner.standby(600.0, None, "").alternatives
+    assert row.mode in {mode.mode for mode in alternatives}
+
+
+def test_the_plant_rests_in_it_as_the_row_says(row: ModeRow) -> None:
+    controller = ControllerSettings(start_mode=row.mode.name)
+    simulation = make_simulation("open", backend="ideal", settings=SimulationSettings(controller=controller))
+    if row.bit:
+        simulation.plc.rest = row.mode
+    simulation.run(0.1)
+    assert simulation.modes.mode is row.mode
+    assert simulation.on_the_network == row.on_the_network
+    before = simulation.meter.reading()
+    simulation.run(0.2)
+    after = simulation.meter.reading()
+    watts = (after.energy - before.energy) / (after.time - before.time)
+    assert watts == pytest.approx(simulation.standing_power(row.mode), rel=1e-6)
+
+
+def test_the_report_has_a_colour_for_it(row: ModeRow) -> None:
+    assert row.mode.name in MODE_COLOURS
+    assert f".m-{row.mode.name} " in STYLE.read_text("utf-8")
+
+
+def test_a_row_that_is_forgotten_elsewhere_is_noticed() -> None:
+    forgotten = replace(MODES[-1], bit="nap")
+    with pytest.raises(ValueError, match="nap"):
+        test_its_bit_is_an_input_that_a_plc_can_set(forgotten)
