@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pytest
@@ -83,6 +83,58 @@ def test_package_knows_only_those_below_it(package: str) -> None:
 
     assert modules(package), f"{package} has no modules: nothing was checked"
     assert violations(package, forbidden) == []
+
+
+def known_modules(package: str) -> dict[str, set[str]]:
+    """Modules of a package by dotted name, each with the modules of the package that it imports."""
+    root = SRC / package
+    paths = {
+        ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in modules(package)
+    }
+    return {
+        name: known_by(ast.parse(path.read_text(encoding="utf-8")), paths.keys()) - {name}
+        for name, path in paths.items()
+    }
+
+
+def known_by(tree: ast.AST, modules: Collection[str]) -> set[str]:
+    """Which of the modules a module imports: of `from a import b` a.b where that is one, else a."""
+    wanted = {name for name, _ in imports(tree)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            wanted |= names
+            if names <= set(modules):
+                wanted.discard(node.module)
+    return wanted & set(modules)
+
+
+def circle(knows: dict[str, set[str]]) -> list[str]:
+    """Modules that are left when those that know nobody left are taken away again and again."""
+    left = dict(knows)
+    while ground := [name for name, others in left.items() if not others & left.keys()]:
+        for name in ground:
+            del left[name]
+    return sorted(left)
+
+
+@pytest.mark.parametrize("package", sorted(PROJECT))
+def test_no_imports_run_in_a_circle(package: str) -> None:
+    assert circle(known_modules(package)) == []
+
+
+def test_the_walk_sees_circles_through_functions_faces_and_modules() -> None:
+    names = ("a", "a.b", "a.c", "a.d")
+    knows = {
+        "a": known_by(ast.parse("from a.b import x"), names),
+        "a.b": known_by(ast.parse("def f():\n    from a import c"), names),
+        "a.c": known_by(ast.parse("if TYPE_CHECKING:\n    from a.b import x"), names),
+        "a.d": known_by(ast.parse("import os"), names),
+    }
+    assert knows["a.b"] == {"a.c"}
+    assert circle(knows) == ["a", "a.b", "a.c"]
+    assert circle({**knows, "a.c": {"a.d"}}) == []
 
 
 @pytest.mark.parametrize("package", sorted(PROJECT))

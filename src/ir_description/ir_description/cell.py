@@ -21,7 +21,7 @@ from ir_description.cell_checks import (
     check_program,
     check_single_places,
 )
-from ir_description.equipment import AllowedContact, Equipment, EquipmentState, Station, Zone, station_at
+from ir_description.equipment import Equipment, Station, station_at
 from ir_description.errors import UnknownNameError
 from ir_description.load import Load
 from ir_description.part import Part
@@ -29,23 +29,6 @@ from ir_description.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.robot import RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.plc import Signal
-
-__all__ = [
-    "AllowedContact",
-    "Body",
-    "Cell",
-    "CellSignal",
-    "Equipment",
-    "EquipmentState",
-    "Load",
-    "Part",
-    "ProgramStep",
-    "Signal",
-    "Station",
-    "Task",
-    "Zone",
-]
 
 
 class _Named(Protocol):

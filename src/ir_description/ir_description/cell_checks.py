@@ -5,12 +5,12 @@ The rules are small objects and functions so that the reader of cell files can a
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Sequence
+from typing import Protocol
 
 from ir_description.body import Body
 from ir_description.capsule import Capsule
-from ir_description.equipment import AllowedContact
+from ir_description.equipment import AllowedContact, Equipment, Station
 from ir_description.errors import UnknownNameError
 from ir_description.load import Load, total_mass
 from ir_description.part import Part
@@ -18,11 +18,37 @@ from ir_description.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.robot import RobotModel
 from ir_msgs_py.errors import InvalidValueError
 
-if TYPE_CHECKING:
-    from ir_description.cell import Cell
-
 BODIES_MAX = 20_000
 """Most bodies a cell may have."""
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+class _Cell(Protocol):
+    """The things of a cell, whatever else it is."""
+
+    @property
+    def robot(self) -> RobotModel: ...
+    @property
+    def tool(self) -> Load | None: ...
+    @property
+    def parts(self) -> tuple[Part, ...]: ...
+    @property
+    def equipment(self) -> tuple[Equipment, ...]: ...
+    @property
+    def stations(self) -> tuple[Station, ...]: ...
+    @property
+    def signals(self) -> tuple[CellSignal, ...]: ...
+    @property
+    def program(self) -> tuple[ProgramStep, ...]: ...
+    @property
+    def tasks(self) -> Sequence[_Named]: ...
+    @property
+    def base_contacts(self) -> tuple[tuple[str, str], ...]: ...
+    def parts_at_start(self) -> PartPlaces: ...
 
 
 class NameRegister:
@@ -91,7 +117,7 @@ def check_follows(signals: Iterable[CellSignal]) -> None:
             raise UnknownNameError(f"signal that {signal.name} follows", signal.follows, names)
 
 
-def check_names(cell: Cell) -> None:
+def check_names(cell: _Cell) -> None:
     """Refuse names that are given twice or that nobody has."""
     shapes = shape_register(cell.robot)
     for shape in _load_capsules(cell):
@@ -121,14 +147,14 @@ def check_names(cell: Cell) -> None:
         raise InvalidValueError(f"the cell has more than {BODIES_MAX} bodies")
 
 
-def check_payload(cell: Cell) -> None:
+def check_payload(cell: _Cell) -> None:
     """Refuse loads that the robot can't carry."""
     check_part_mass(cell.robot, cell.tool)
     for part in cell.parts:
         check_part_mass(cell.robot, cell.tool, part.load)
 
 
-def check_contacts(cell: Cell) -> None:
+def check_contacts(cell: _Cell) -> None:
     """Refuse allowed contacts and base contacts with names that nobody has."""
     capsules = {capsule.name for capsule in (*cell.robot.capsules, *_load_capsules(cell))}
     bodies = {body.name for body in _all_bodies(cell)} | {"floor"}
@@ -148,7 +174,7 @@ def check_base_contact(robot: RobotModel, capsule: str, body: str, bodies: Colle
         raise UnknownNameError("body", body, bodies)
 
 
-def check_program(cell: Cell) -> None:
+def check_program(cell: _Cell) -> None:
     """Refuse a program with unknown names or with parts where they can't be."""
     state = cell.parts_at_start()
     stations = dict.fromkeys(station.name for station in cell.stations)
@@ -165,11 +191,11 @@ def check_single_places(parts: Iterable[Part]) -> None:
             register.add(part.station)
 
 
-def _load_capsules(cell: Cell) -> tuple[Capsule, ...]:
+def _load_capsules(cell: _Cell) -> tuple[Capsule, ...]:
     loads = (*((cell.tool,) if cell.tool is not None else ()), *(part.load for part in cell.parts))
     return tuple(capsule for load in loads for capsule in load.capsules)
 
 
-def _all_bodies(cell: Cell) -> tuple[Body, ...]:
+def _all_bodies(cell: _Cell) -> tuple[Body, ...]:
     machines = (body for machine in cell.equipment for body in machine.bodies)
     return (*machines, *(body for part in cell.parts for body in part.bodies))

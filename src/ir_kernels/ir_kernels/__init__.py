@@ -21,7 +21,8 @@ from ir_kernels.inverse_kinematics import IkSet, SphericalWristIk
 from ir_kernels.limits import Extrema, MotionExtrema, motion_extrema, polynomial_extrema
 from ir_kernels.power import DcBus, DcBusParameters, DriveEnergy, dc_bus, drive_energy
 from ir_kernels.search import BidirectionalTree
-from ir_kernels.spline import SplineCost, SplineDescent, SplineTerms, SplineValue
+from ir_kernels.spline import SplineCost, SplineDescent, SplineValue
+from ir_kernels.spline_terms import SplineTerms
 from ir_kernels.torque_bounds import EXCEEDS, WITHIN, TorqueBounds
 
 __all__ = [

@@ -68,3 +68,18 @@ def same_length(**arrays: FloatArray) -> None:
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
         raise InputError(f"batches of different length: {told}")
+
+
+def number(name: str, value: Any, least: float, most: float = np.inf, *, above: bool = False) -> float:
+    """`value` as a finite float within least and most, not least itself where `above`; or InputError."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    fits = np.isfinite(number) and least <= number <= most and not (above and number == least)
+    if not fits:
+        bound = f"{'above' if above else 'at least'} {least:g}" + (
+            f" and at most {most:g}" if most < np.inf else ""
+        )
+        raise InputError(f"{name} is {value!r}: expected a finite number {bound}")
+    return number

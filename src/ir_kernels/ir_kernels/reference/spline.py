@@ -7,7 +7,6 @@ the interval.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +14,8 @@ from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import collision, dynamics
 from ir_kernels.reference.descent import bending_metric, descend
+from ir_kernels.spline_terms import SplineTerms
 from ir_msgs_py.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from ir_kernels.spline import SplineTerms
 
 SAMPLES = 2  # per interval
 STILL = 0.02  # [rad/s] friction and |qd| are smoothed below
@@ -117,7 +114,7 @@ def bus(power: FloatArray, step: float, capacity: float, regeneration: str) -> t
 class SplineCost:
     """Cost of one robot in one scene. See ir_kernels.spline.SplineCost for what the methods promise."""
 
-    def __init__(self, geometry: Geometry, data: DynamicsData, terms: "SplineTerms") -> None:
+    def __init__(self, geometry: Geometry, data: DynamicsData, terms: SplineTerms) -> None:
         self.geometry, self.data, self.terms = geometry, data, terms
 
     def value(

@@ -1,0 +1,99 @@
+"""What a motion along a spline is judged by: bounds, costs and thresholds, checked once."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ir_kernels import arguments, data
+from ir_kernels.errors import InputError
+from ir_kernels.power import REGENERATIONS, Regeneration
+from ir_msgs_py.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SplineTerms:
+    """What a motion is judged by; n joints, Z pairs.
+
+    velocity, acceleration, jerk, low, high (n,): bounds, rad and s. travel (n,): cost per rad. threshold
+    (R, Z) m: rows of safety distances, each interval of a spline says which row holds; -inf leaves a pair
+    out. torque_share: of the envelope. energy_value: cost per joule; time_value: per second. capacity_energy
+    [J] and regeneration: see DcBusParameters. clearance_margin, clearance_scale [m]. penalty,
+    clearance_penalty: cost per second of a relative excess of 1.
+    """
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    low: FloatArray
+    high: FloatArray
+    travel: FloatArray
+    threshold: FloatArray
+    torque_share: float = 0.98
+    energy_value: float = 1.0
+    time_value: float = 500.0
+    capacity_energy: float = 0.0
+    regeneration: Regeneration = "shared"
+    clearance_margin: float = 0.001
+    clearance_scale: float = 0.01
+    penalty: float = 1e4
+    clearance_penalty: float = 1e4
+
+
+def _copy(value: ArrayLike) -> Any:
+    """The same numbers, contiguous, where nobody else writes; what is no array is left to the checks."""
+    return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
+    """The terms as contiguous arrays and floats, or InputError naming the one that makes no sense."""
+    names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
+    arrays: dict[str, Any] = {
+        name: data.array(_copy(getattr(terms, name)), f"terms.{name}", (n,)) for name in names
+    }
+    for name in names[:3]:
+        if (arrays[name] <= 0.0).any():
+            raise InputError(f"terms.{name} holds {arrays[name].min()}: bounds have to be above 0")
+    if (arrays["low"] > arrays["high"]).any():
+        j = int(np.argmax(arrays["low"] > arrays["high"]))
+        raise InputError(f"terms.low[{j}] is {arrays['low'][j]}, above terms.high[{j}] {arrays['high'][j]}")
+    if (arrays["travel"] < 0.0).any():
+        raise InputError(f"terms.travel holds {arrays['travel'].min()}: a cost per rad can't be negative")
+    if terms.regeneration not in REGENERATIONS:
+        raise InputError(
+            f"terms.regeneration is {terms.regeneration!r}: known are {', '.join(REGENERATIONS)}"
+        )
+    free = (
+        "energy_value",
+        "time_value",
+        "capacity_energy",
+        "clearance_margin",
+        "penalty",
+        "clearance_penalty",
+    )
+    numbers: dict[str, Any] = {
+        name: arguments.number(f"terms.{name}", getattr(terms, name), 0.0) for name in free
+    }
+    return SplineTerms(
+        **arrays,
+        **numbers,
+        threshold=_thresholds(terms.threshold, pairs),
+        torque_share=arguments.number("terms.torque_share", terms.torque_share, 0.0, 1.0, above=True),
+        clearance_scale=arguments.number("terms.clearance_scale", terms.clearance_scale, 0.0, above=True),
+        regeneration=terms.regeneration,
+    )
+
+
+def _thresholds(value: ArrayLike, pairs: int) -> FloatArray:
+    """(R, Z), R >= 1; without pairs there is nothing to read."""
+    name = "terms.threshold"
+    if pairs == 0:
+        rows = np.shape(value)
+        if len(rows) != 2 or rows[0] == 0 or rows[1] != 0:
+            raise InputError(f"{name} has shape {rows}: expected (R, 0), there are no pairs")
+        return np.zeros(rows)
+    limits = arguments.shaped(name, _copy(value), None, pairs)
+    if np.isnan(limits).any() or (limits == np.inf).any():
+        raise InputError(f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair")
+    return limits
