@@ -93,7 +93,7 @@ def test_tasks_stand_at_their_stations_with_the_published_clearance(name: str) -
             assert pose == pytest.approx(cell.station(station).pose, abs=5e-6)
 
 
-def test_zone_kinds_tell_how_closed_a_machine_is() -> None:
+def test_zone_kinds_say_how_closed_a_machine_is() -> None:
     kinds = {m.name: m.zone.kind for name in CLEARANCE for m in load_cell(name).equipment}
     assert {n for n, kind in kinds.items() if kind == "SEMI_CLOSED"} == {"cnc", "press"}
     assert {n for n, kind in kinds.items() if kind == "CLOSED"} == {"bin", "tun"}
@@ -124,7 +124,7 @@ def test_the_demo_s_postures_are_free(state: str) -> None:
 
 
 def test_every_station_of_the_demo_can_be_entered_and_left_straight() -> None:
-    """There is a configuration that keeps 30 mm along the whole retreat, allowed contacts apart."""
+    """There is a configuration that keeps 30 mm along the whole retraction, allowed contacts apart."""
     cell = load_cell("demo")
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)
     ik = SphericalWristIk(chain, cell.robot.position_min, cell.robot.position_max)
@@ -175,7 +175,7 @@ def test_every_move_of_the_demo_is_free_straight_or_by_way_of_park() -> None:
         places, here = places.after(step), there
 
 
-def test_the_demo_s_tool_is_out_of_the_zone_after_the_retreat() -> None:
+def test_the_demo_s_tool_is_out_of_the_zone_after_the_retraction() -> None:
     """Every capsule from link_3 to the tool is farther than the safety distance from the zone's box."""
     cell = load_cell("demo")
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)

@@ -1,4 +1,4 @@
-"""Every value survives the way into a message and back; what a message can't mean is named."""
+"""Every value survives the conversion into a message and back; what a message can't mean is named."""
 
 from __future__ import annotations
 

@@ -49,9 +49,9 @@ def test_a_node_may_fix_all_settings_at_the_start(node):
     assert parameters.value == Search()
 
 
-def test_a_good_change_is_taken_and_told(node):
-    told = []
-    parameters = Parameters(node, Search, on_change=told.append)
+def test_a_good_change_is_taken_and_reported(node):
+    changes = []
+    parameters = Parameters(node, Search, on_change=changes.append)
     results = node.set_parameters(
         [
             Parameter("speed", value=1.5),
@@ -61,7 +61,7 @@ def test_a_good_change_is_taken_and_told(node):
     )
     assert all(result.successful for result in results)
     assert parameters.value == Search(speed=1.5, weights=(3.0,))
-    assert told[-1] == parameters.value
+    assert changes[-1] == parameters.value
 
 
 @pytest.mark.parametrize(

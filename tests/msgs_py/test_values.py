@@ -45,7 +45,7 @@ NAN = float("nan")
             lambda: report.DistancePair("self", "a", "b", 0.0, np.zeros(2), np.zeros(3)),
             r"point_a has shape \(2,\): it must be \(3\)",
         ),
-        (lambda: report.Rejection("no way", -1), "count of 'no way' is -1"),
+        (lambda: report.Rejection("no path", -1), "count of 'no path' is -1"),
         (
             lambda: report.PlanningInfo(start=np.zeros(2), start_names=("a",)),
             "start has 2 values for 1 joint names",

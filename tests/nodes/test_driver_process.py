@@ -1,4 +1,4 @@
-"""The driver as a process: it says what is wrong with its parameters, and it ends when it is told to."""
+"""The driver as a process: it says what is wrong with its parameters, and it ends when it is asked to."""
 
 from __future__ import annotations
 

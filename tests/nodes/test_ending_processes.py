@@ -53,7 +53,7 @@ def watcher(monkeypatch):
 
 @pytest.mark.parametrize("signals", [[INT], [TERM], [INT, INT], [TERM, INT]])
 @pytest.mark.parametrize("name", MODULES)
-def test_a_node_that_is_told_to_end_ends_well(name, signals, recording, tmp_path, watcher, wait_for):
+def test_a_node_that_is_asked_to_end_ends_well(name, signals, recording, tmp_path, watcher, wait_for):
     file = recording if name == "ir_play" else tmp_path / "new.mcap"
     words = [str(file) if word == "FILE" else word for word in MODULES[name]]
     process = subprocess.Popen([sys.executable, "-m", *words], stderr=subprocess.PIPE, text=True)

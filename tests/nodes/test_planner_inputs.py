@@ -26,7 +26,7 @@ def test_a_standing_robot_is_one_start_however_its_measurement_trembles() -> Non
     assert len(seen) == 1
 
 
-def test_no_state_and_an_old_one_are_told_apart() -> None:
+def test_no_state_and_an_old_one_are_distinguished() -> None:
     state = LastState()
     assert state.known(0.0, 1.0) is None
     with pytest.raises(RequestError, match="no joint_states have come yet"):
@@ -54,13 +54,13 @@ def test_a_moving_robot_is_no_start_but_a_state() -> None:
 
 
 @pytest.mark.parametrize(
-    ("velocity", "told"),
+    ("velocity", "stated"),
     [([0.1] * 6, True), ([], False), ([float("nan")] * 6, False), ([0.1] * 5, False)],
 )
-def test_joint_states_without_velocities_do_not_tell_them(velocity: list[float], told: bool) -> None:
+def test_joint_states_without_velocities_do_not_state_them(velocity: list[float], stated: bool) -> None:
     message = JointState(name=list(JOINT_NAMES), position=[0.0] * 6, velocity=velocity)
     measured = measured_velocity(message, JOINT_NAMES)
-    assert (measured is not None) == told
+    assert (measured is not None) == stated
 
 
 CELL = load_cell("demo")

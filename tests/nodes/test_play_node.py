@@ -54,7 +54,7 @@ def test_messages_arrive_in_order_and_latched_ones_later_too(
     player.stop()
 
 
-def test_a_loop_ends_when_it_is_told(
+def test_a_loop_ends_when_it_is_asked_to(
     ros_context: Any, ros_executor: Any, wait_for: Any, tmp_path: Path
 ) -> None:
     player = PlayNode(

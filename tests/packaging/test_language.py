@@ -46,7 +46,7 @@ WORDS = (
     Word("guilty", "violating"),
     Word("hopeless", "infeasible"),
     Word("tells?|telling|told", "state; report; notify", (r"\w+\.tell\(\)",)),  # a file's position
-    Word("(more|less|enough|no|little|leaves?|leaving) room|room (for|to|above|below)", "margin"),
+    Word("(more|less|enough|no|little|leaves?|leaving) room", "margin"),
     Word("then prove it", "run the tests"),
 )
 

@@ -27,14 +27,14 @@ def test_steps_know_when_they_moved_and_what_they_took(analysis: Analysis) -> No
         np.testing.assert_allclose(result.joint_energy, result.step.movement.report.joint_energy, atol=0.5)
 
 
-def test_energy_is_base_and_axes_and_burnt_and_what_the_capacitor_took(analysis: Analysis) -> None:
+def test_energy_is_base_axes_brake_resistor_and_capacitor(analysis: Analysis) -> None:
     capacity = 106.0  # J, data of the drive
     for result in analysis.movements:
         rest = result.energy - result.base_energy - result.joint_energy.sum() - result.dissipated_energy
         assert abs(rest) <= capacity + 1.0
 
 
-def test_motion_and_torque_tell_the_same_energy_as_the_meter(analysis: Analysis) -> None:
+def test_motion_and_torque_give_the_same_energy_as_the_meter(analysis: Analysis) -> None:
     for result in analysis.movements:
         assert result.indirect_energy == pytest.approx(result.energy, abs=110.0)  # the capacitor's charge
 

@@ -28,8 +28,8 @@ def test_clearance_may_only_lack_what_the_tool_was_off(analysis: Analysis, devia
         near = replace(moved.clearance, least=0.02 - short, contact_margin=-short)
         result = replace(moved, tool_deviation=deviation, clearance=near)
         one = replace(analysis, steps=(result,))
-        told = {check.name.split(" on ")[0]: check.ok for check in findings(one)}
-        assert (told["clearance"], told["allowed contacts"]) == (ok, ok)
+        held = {check.name.split(" on ")[0]: check.ok for check in findings(one)}
+        assert (held["clearance"], held["allowed contacts"]) == (ok, ok)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ def test_the_load_is_unknown_between_two_that_differ() -> None:
     assert timeline.at(-1.0) == ""
 
 
-def test_a_step_of_the_base_load_tells_when_the_tool_came(new_run: Callable[[], Any], tmp_path: Path) -> None:
+def test_a_step_of_the_base_load_shows_when_the_tool_came(new_run: Callable[[], Any], tmp_path: Path) -> None:
     run = new_run()
     run.rest(1.0, Mode.STAND_ON_MOTORS, HOME, "none")
     run.rest(2.0, Mode.STAND_ON_MOTORS, HOME, "gripper")

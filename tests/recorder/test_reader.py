@@ -48,7 +48,7 @@ def test_levels_in_force_are_preferred_to_those_that_were_sent(tmp_path: Path) -
         assert (levels["ab"], levels["hib"]) == ((1, 0) if len(topics) == 1 else (0, 1))
 
 
-def test_json_channels_and_missing_topics_are_told(tmp_path: Path) -> None:
+def test_json_channels_and_missing_topics_are_reported(tmp_path: Path) -> None:
     path = tmp_path / "json.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream)
@@ -63,7 +63,7 @@ def test_json_channels_and_missing_topics_are_told(tmp_path: Path) -> None:
     assert any("power_state isn't in the recording" in problem for problem in recording.problems)
 
 
-def test_messages_that_do_not_fit_their_definition_are_told(tmp_path: Path) -> None:
+def test_messages_that_do_not_fit_their_definition_are_reported(tmp_path: Path) -> None:
     path = tmp_path / "short.mcap"
     schema = SchemaLibrary().schema("sensor_msgs/msg/JointState")
     with path.open("wb") as stream:

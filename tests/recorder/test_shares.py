@@ -14,7 +14,7 @@ def test_modes_and_steps_share_all_time_and_energy(analysis: Analysis) -> None:
     assert total == pytest.approx(analysis.energy)
 
 
-def test_stations_get_their_pauses_service_movements_and_ways(analysis: Analysis) -> None:
+def test_stations_get_their_pauses_service_movements_and_travel(analysis: Analysis) -> None:
     uses = {use.station: use for use in analysis.stations}
     assert set(uses) == {"table", "press"}
     assert uses["table"].travel.seconds == pytest.approx(1.5, abs=1e-6)

@@ -79,7 +79,7 @@ def test_times_never_run_back_but_for_a_clock_that_was_set_back(tmp_path: Path) 
     assert times == [5_000_000_000, 5_000_000_000, 6_000_000_000, 1_000_000_000, 1_100_000_000]
 
 
-def test_an_existing_file_is_kept_unless_told_otherwise(tmp_path: Path) -> None:
+def test_an_existing_file_is_kept_unless_it_may_be_replaced(tmp_path: Path) -> None:
     path = tmp_path / "mine.mcap"
     path.write_text("mine")
     with pytest.raises(PathError, match="is there already"):

@@ -243,7 +243,7 @@ def test_the_robot_is_woken_as_late_as_possible():
     assert woken == [pytest.approx(100.0 + 60.0 - LEAVE - 0.5)]
 
 
-def test_times_come_from_the_settings_when_the_driver_does_not_tell_them():
+def test_times_come_from_the_settings_when_the_driver_does_not_state_them():
     world = World(knows_modes=False)
     settings = ProgramSettings(wake_margin=0.0)
     woken = []

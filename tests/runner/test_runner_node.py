@@ -91,9 +91,9 @@ class FakeDriver(Node):
         response.status = OK
         times = TransitionTimes(
             **{
-                f"{name}_{way}": 0.0
+                f"{name}_{what}": 0.0
                 for name in ("bus_power_off", "hibernation")
-                for way in ("enter", "leave", "minimum_stay")
+                for what in ("enter", "leave", "minimum_stay")
             }
         )
         response.modes = [

@@ -35,9 +35,9 @@ def parameters(values):
 @pytest.fixture
 def client(ros_context, ros_executor):
     times = {
-        f"transitions.{mode}_{way}": seconds
+        f"transitions.{mode}_{what}": seconds
         for mode, row in TRANSITIONS.items()
-        for way, seconds in zip(("enter", "leave", "minimum_stay"), row, strict=True)
+        for what, seconds in zip(("enter", "leave", "minimum_stay"), row, strict=True)
     }
     settings = parameters({"backend": "ideal", "wake_port": 0, **times})
     with BackgroundExecutor(ros_context) as driver_executor:

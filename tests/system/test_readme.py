@@ -1,4 +1,4 @@
-"""What the README tells people to type works, in the order in which it stands there."""
+"""What the README asks people to type works, in the order in which it stands there."""
 
 from __future__ import annotations
 
