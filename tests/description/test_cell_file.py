@@ -145,7 +145,9 @@ def cells(draw: st.DrawFn) -> Cell:
     return Cell(
         name="drawn",
         description=draw(
-            st.text(st.characters(codec="utf-8", categories=["L", "N", "P", "Zs"]), max_size=30)
+            st.text(
+                st.characters(codec="utf-8", categories=["L", "N", "P"], include_characters=" "), max_size=30
+            )
         ).strip(),
         robot=ROBOT,
         base_pose=draw(poses()),

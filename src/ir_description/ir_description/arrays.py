@@ -18,7 +18,7 @@ ROTATION_TOLERANCE = 1e-9
 
 
 def frozen(value: Any, shape: tuple[int | None, ...], name: str) -> FloatArray:
-    """Return a read-only float64 copy of that shape (None: any length), refusing NaN and infinity."""
+    """Return a read-only float64 copy of that shape, (None, 3) for (N, 3), refusing NaN and infinity."""
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:

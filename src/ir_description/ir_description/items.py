@@ -173,14 +173,14 @@ class Item:
     def numbers(
         self, count: int, low: float, high: float, unit: str = "", *, above: bool = False
     ) -> FloatArray:
-        """Return `count` numbers as an array (count,)."""
+        """Return n = `count` numbers as an array (n,)."""
         values = [item.number(low, high, unit, above=above) for item in self.list(count, count)]
         return np.array(values, dtype=np.float64)
 
     def rows(
         self, columns: int, low: float, high: float, unit: str = "", *, count: tuple[int, int]
     ) -> FloatArray:
-        """Return a list of rows of numbers as an array (rows, columns)."""
+        """Return a list of R rows of n = `columns` numbers as an array (R, n)."""
         rows = [row.numbers(columns, low, high, unit) for row in self.list(*count)]
         return np.array(rows, dtype=np.float64).reshape(-1, columns)
 

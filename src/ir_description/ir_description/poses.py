@@ -36,7 +36,7 @@ def inverse(pose: FloatArray) -> FloatArray:
 
 
 def composed(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return first @ second as a read-only pose whose last row is exact."""
+    """Return first @ second (4, 4) as a read-only pose (4, 4) whose last row is exact."""
     pose = first @ second
     pose[3] = (0.0, 0.0, 0.0, 1.0)
     return frozen(pose, (4, 4), "pose")

@@ -14,8 +14,9 @@ FLOAT64 = np.dtype(np.float64)
 
 
 def shaped(name: str, value: Any, *shape: int | None) -> FloatArray:
-    """`value` as a C-contiguous float64 array of that shape (None: any length but 0); values are not
-    looked at.
+    """`value` as a C-contiguous float64 array of that shape; values are not looked at.
+
+    None in the shape is any length but 0: (None, 3) for (N, 3).
 
     Lists and integers are converted. An array that is not contiguous is refused rather than copied behind the
     caller's back.
@@ -50,7 +51,7 @@ def _all_finite(array: FloatArray) -> bool:
 
 
 def finite(name: str, array: FloatArray) -> FloatArray:
-    """`array`, or InputError that says where it is not finite."""
+    """`array` of any shape, (n,) or (N, n), or InputError that says where it is not finite."""
     if not _all_finite(array):
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise InputError(f"{name}{where} is {array[tuple(where)]}: it has to be finite")
@@ -58,7 +59,7 @@ def finite(name: str, array: FloatArray) -> FloatArray:
 
 
 def checked(name: str, value: Any, *shape: int | None) -> FloatArray:
-    """`shaped` and `finite`."""
+    """`shaped` and `finite`: (None, 3) for (N, 3)."""
     return finite(name, shaped(name, value, *shape))
 
 

@@ -45,7 +45,7 @@ class CcdSettings:
 class CcdResult:
     """Where every start ended, in the order of the starts.
 
-    q (P,n) rad within the limits; psi (P,) of eq. 2, m^2; position_error (P,) m; rotation_error (P,) rad;
+    q (P, n) rad within the limits; psi (P,) of eq. 2, m^2; position_error (P,) m; rotation_error (P,) rad;
     sweeps (P,) and newton_steps (P,): the work spent.
     """
 
@@ -72,7 +72,7 @@ def ccd(
     *,
     core: Any = compiled.MODULE,
 ) -> CcdResult:
-    """Bring `chain`'s tcp to `pose` (4,4) in the world from each of `starts` (P,n) rad.
+    """Bring `chain`'s tcp to `pose` (4, 4) in the world from each of `starts` (P, n) rad.
 
     Each joint in turn, from the tool to the base, takes the value within [position_min, position_max] (n,)
     that minimises Psi: closed form per joint, so Psi never grows. Starts outside the limits are moved onto

@@ -88,12 +88,15 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-    """`value` as a finite, C-contiguous float64 array of `shape` (None: any length but 0), or InputError."""
+    """`value` as a finite, C-contiguous float64 array of `shape`, or InputError.
+
+    None in the shape is any length but 0: (None, 3) for (N, 3).
+    """
     return arguments.finite(name, arguments.shaped(name, value, *shape))
 
 
 def indices(value: ArrayLike, name: str, shape: tuple[int | None, ...], bound: int) -> IntArray:
-    """`value` as an int64 array of `shape` with entries 0 <= i < bound, or InputError naming it."""
+    """`value` as an int64 array of `shape`, such as (n,), with 0 <= i < bound, or InputError naming it."""
     raw = np.asarray(value)
     if raw.dtype.kind not in "iu":
         raise InputError(f"{name} has dtype {raw.dtype}, expected whole numbers")

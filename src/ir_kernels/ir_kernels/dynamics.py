@@ -25,7 +25,7 @@ MAX_TERMS = 8  # of a polynomial segment
 
 @dataclass(frozen=True)
 class Gradients:
-    """Derivatives of a joint quantity y (torque, power): q, qd, qdd are (N,n,n), [k, i, j] = d y_i / d
+    """Derivatives of a joint quantity y (torque, power): q, qd, qdd are (N, n, n), [k, i, j] = d y_i / d
     x_j.
     """
 
@@ -70,7 +70,7 @@ class DynamicsModel:
         return result if self._core is not None else getattr(reference, function)(self.data, *arrays)
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
-        """Motor torque (N,n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
+        """Motor torque (N, n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
         return np.asarray(self._run("inverse_dynamics", q=q, qd=qd, qdd=qdd))
 
     def inverse_dynamics_single(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
@@ -82,39 +82,39 @@ class DynamicsModel:
         return np.asarray(self._run("inverse_dynamics_single", q=q, qd=qd, qdd=qdd))
 
     def bias(self, q: ArrayLike, qd: ArrayLike) -> FloatArray:
-        """C qd + g (N,n) Nm of the arm and its loads, without friction and counterbalance."""
+        """C qd + g (N, n) Nm of the arm and its loads, without friction and counterbalance."""
         return np.asarray(self._run("bias", q=q, qd=qd))
 
     def gravity(self, q: ArrayLike) -> FloatArray:
-        """Torque (N,n) Nm that holds arm and loads against gravity, without the counterbalance."""
+        """Torque (N, n) Nm that holds arm and loads against gravity, without the counterbalance."""
         return np.asarray(self._run("gravity", q=q))
 
     def counterbalance(self, q: ArrayLike) -> FloatArray:
-        """What the counterbalance does about each joint's +axis (N,n) Nm; zero for joints without one."""
+        """What the counterbalance does about each joint's +axis (N, n) Nm; zero for joints without one."""
         return np.asarray(self._run("counterbalance", q=q))
 
     def mass_matrix(self, q: ArrayLike) -> FloatArray:
-        """H (N,n,n) kg m^2 of arm and loads, without rotor inertia."""
+        """H (N, n, n) kg m^2 of arm and loads, without rotor inertia."""
         return np.asarray(self._run("mass_matrix", q=q))
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Accelerations (N,n) rad/s^2 under motor torques `tau`, with H + J_r, friction and
+        """Accelerations (N, n) rad/s^2 under motor torques `tau`, with H + J_r, friction and
         counterbalance.
         """
         return np.asarray(self._run("forward_dynamics", q=q, qd=qd, tau=tau))
 
     def torque_limit(self, qd: ArrayLike) -> FloatArray:
-        """Torque (N,n) Nm available at the speeds |qd|: the envelope of gear and motor."""
+        """Torque (N, n) Nm available at the speeds |qd|: the envelope of gear and motor."""
         return np.asarray(self._run("torque_limit", qd=qd))
 
     def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Power (N,n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2; negative while
+        """Power (N, n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2; negative while
         braking.
         """
         return np.asarray(self._run("axis_power", qd=qd, tau=tau))
 
     def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
-        """Power (N,n) W each axis takes from the DC bus along a motion: `axis_power` of
+        """Power (N, n) W each axis takes from the DC bus along a motion: `axis_power` of
         `inverse_dynamics`.
         """
         return self.axis_power(qd, self.inverse_dynamics(q, qd, qdd))
@@ -147,7 +147,7 @@ class DynamicsModel:
         """Enclose max |tau| / limit per joint along q(t) = sum_k c_k t^k: torque limits proved between
         samples too.
 
-        coefficients (S,n,d+1), d <= 7, lowest power first in the local time of each segment; durations
+        coefficients (S, n, d + 1), d <= 7, lowest power first in the local time of each segment; durations
         (S,) s. Interval arithmetic over pieces of time that are halved until upper - sampled <=
         `tolerance` and every joint is decided, or `max_intervals` pieces are spent. Raises InputError.
         """

@@ -37,10 +37,10 @@ class CounterbalanceData:
 class DynamicsData:
     """Inertias, drives and gravity of an n-joint serial chain; arrays are read-only.
 
-    origin (n,4,4), axis (n,3): the joints, each in the frame of the link before. mass (n,), com (n,3),
-    inertia (n,3,3) about the centre of mass: the moving links 1..n with the loads in the last one. gravity
+    origin (n, 4, 4), axis (n, 3): the joints, each in the frame of the link before. mass (n,), com (n, 3),
+    inertia (n, 3, 3) about the centre of mass: the moving links 1..n with the loads in the last one. gravity
     (3,): the acceleration of free fall in the frame of link 0. rotor_inertia, viscous, coulomb,
-    gear_ratio, copper_loss (n,): the drives. envelope_speed (n,K), envelope_torque (n,K+1): torque
+    gear_ratio, copper_loss (n,): the drives. envelope_speed (n, K), envelope_torque (n, K + 1): torque
     available, a step down at the first speed.
     """
 
@@ -78,7 +78,10 @@ def _frozen(name: str, value: Any, shape: tuple[int, ...]) -> FloatArray:
 def lump(
     mass: float, com: FloatArray, inertia: FloatArray, loads: Sequence[Any]
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Mass, centre of mass and inertia about it of a link with loads bolted on (parallel axis theorem)."""
+    """Mass, centre of mass (3,) and inertia (3, 3) about it of a link with loads bolted on.
+
+    com (3,) and inertia (3, 3) are the link's own; parallel axis theorem.
+    """
     masses = [float(mass), *(float(load.mass) for load in loads)]
     centres = [np.asarray(com, float), *(np.asarray(load.com, float) for load in loads)]
     inertias = [np.asarray(inertia, float), *(np.asarray(load.inertia, float) for load in loads)]
@@ -123,7 +126,7 @@ def _counterbalance(data: Any) -> CounterbalanceData | None:
 def dynamics_data(robot: Any, loads: Sequence[Any], base_pose: Any, gravity: float) -> DynamicsData:
     """Pack a robot (see `ir_kernels.data.Robot`), its loads and its mounting.
 
-    `base_pose` (4,4): pose of link 0 in the world, whose z points up. `gravity` [m/s^2]. Raises InputError.
+    `base_pose` (4, 4): pose of link 0 in the world, whose z points up. `gravity` [m/s^2]. Raises InputError.
     """
     n = len(robot.joint_axis)
     mass = np.array(robot.link_mass[1:], float)

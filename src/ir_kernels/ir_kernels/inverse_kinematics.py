@@ -19,7 +19,7 @@ from ir_msgs_py.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class IkSet:
-    """Solutions sorted by pose, branch, q: q (M,6) rad, pose_index (M,) which pose each belongs to, branch
+    """Solutions sorted by pose, branch, q: q (M, 6) rad, pose_index (M,) which pose each belongs to, branch
     (M,) 0..7.
 
     Branch bits: 4 the arm reaches backwards over its base, 2 the other elbow, 1 the other wrist.
@@ -30,7 +30,7 @@ class IkSet:
     branch: IntArray
 
     def of_pose(self, index: int) -> FloatArray:
-        """(m,6): the solutions of one pose."""
+        """(m, 6): the solutions of one pose."""
         begin, end = np.searchsorted(self.pose_index, [index, index + 1])
         solutions: FloatArray = self.q[begin:end]
         return solutions
@@ -68,7 +68,7 @@ class SphericalWristIk:
             self._core = core.SphericalWristIk(self.geometry, self._to_base, self._from_tcp, *limits)
 
     def solve(self, poses: ArrayLike) -> IkSet:
-        """All solutions for poses (N,4,4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
+        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
         1e-9 rad.
         """
         targets = shaped("poses", poses, None, 4, 4)

@@ -19,7 +19,7 @@ COMPILED_TERMS = 16  # of a polynomial, beyond them the reference works
 
 @dataclass(frozen=True)
 class Extrema:
-    """Smallest and largest values of polynomials (S,n) and when they are taken, s from the start of the
+    """Smallest and largest values of polynomials (S, n) and when they are taken, s from the start of the
     segment.
     """
 
@@ -49,7 +49,7 @@ class MotionExtrema:
 
 
 def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (S,n,d+1) and durations (S,) checked, or InputError."""
+    """Coefficients (S, n, d + 1) and durations (S,) checked, or InputError."""
     c = checked("coefficients", coefficients, None, None, None)
     T = checked("durations", durations, len(c))
     if (T <= 0.0).any():
@@ -62,7 +62,7 @@ def polynomial_extrema(
 ) -> Extrema:
     """Extremes of the `derivative`-th derivative of q(t) = sum_k c_k t^k, t in [0, duration], to rounding.
 
-    coefficients (S,n,d+1), durations (S,) s. Raises InputError.
+    coefficients (S, n, d + 1), durations (S,) s. Raises InputError.
     """
     c, T = segments(coefficients, durations)
     if derivative < 0:
@@ -77,7 +77,7 @@ def polynomial_extrema(
 
 
 def motion_extrema(coefficients: ArrayLike, durations: ArrayLike) -> MotionExtrema:
-    """Extremes of q, |qd|, |qdd|, |qddd| per joint over all segments: coefficients (S,n,d+1), durations
+    """Extremes of q, |qd|, |qdd|, |qddd| per joint over all segments: coefficients (S, n, d + 1), durations
     (S,) s.
     """
     c, T = segments(coefficients, durations)

@@ -82,7 +82,7 @@ def dc_bus(
     *,
     core: Any = compiled.MODULE,
 ) -> DcBus:
-    """Run the DC bus over N steps in which the axes take constant powers `axis_power` (N,n) W.
+    """Run the DC bus over N steps in which the axes take constant powers `axis_power` (N, n) W.
 
     `dt`: length of the steps, one number or (N,), s. `stored` [J]: in the capacitor (above its rest
     voltage) before the first step. In every step, with P the signed sum of the axes:
@@ -114,7 +114,7 @@ def dc_bus(
 def drive_energy(
     axis_power: ArrayLike, dt: ArrayLike, parameters: DcBusParameters, stored: float = 0.0
 ) -> DriveEnergy:
-    """Drive energy of N steps with constant axis powers (N,n) W; the base load of the controller is not in
+    """Drive energy of N steps with constant axis powers (N, n) W; the base load of the controller is not in
     it.
 
     Sample the power at the middles of the steps and the error falls with dt^2. Raises InputError.

@@ -34,7 +34,7 @@ class TorqueBounds:
 
 
 def torque_bounds(upper: FloatArray, sampled: FloatArray, time: FloatArray, intervals: int) -> TorqueBounds:
-    """The verdicts that follow from the bounds."""
+    """The verdicts that follow from the bounds: upper, sampled (n,), time (n,) [s]."""
     verdict = np.where(upper <= 1.0, WITHIN, np.where(sampled > 1.0, EXCEEDS, UNDECIDED)).astype(np.uint8)
     for array in (upper, sampled, time, verdict):
         array.setflags(write=False)

@@ -23,8 +23,8 @@ ANGLE_TOLERANCE = 1e-9  # of the scalar products that have to vanish
 class WristGeometry:
     """See the module. All in the frame of link 0 at q = 0; arrays are read-only."""
 
-    axis: FloatArray  # (6,3) z_i
-    plane: FloatArray  # (3,3) rows x, y = z2, z = z1
+    axis: FloatArray  # (6, 3) z_i
+    plane: FloatArray  # (3, 3) rows x, y = z2, z = z1
     axis_point: FloatArray  # (3,) foot of axis 1: a point on it
     lateral: float  # m, distance of the wrist centre from axis 1 along z2
     forward: float  # +1 or -1: the side of axis 1, along x, to which the arm reaches forwards at q1 = 0
@@ -33,7 +33,7 @@ class WristGeometry:
     forearm: complex  # from axis 3 to the wrist centre
     elbow_sign: float  # +1 where z3 = z2, -1 where z3 = -z2
     wrist_zero: float  # rad, angle from z4 to z6 about z5
-    hand: FloatArray  # (4,4) pose of link 6 at q = 0
+    hand: FloatArray  # (4, 4) pose of link 6 at q = 0
     wrist_in_hand: FloatArray  # (3,) wrist centre in the frame of link 6
 
 

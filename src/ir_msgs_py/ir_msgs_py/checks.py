@@ -54,7 +54,7 @@ def one_of(value: str, known: Collection[str], name: str) -> str:
 
 
 def read_only(value: Any, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-    """Return a read-only float64 copy of the array; None in the shape means any length.
+    """Return a read-only float64 copy of the array; (None, 3) stands for any (N, 3).
 
     A copy that is already read-only float64 and owns its data is passed on as it is.
     """

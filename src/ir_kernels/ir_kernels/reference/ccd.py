@@ -17,7 +17,7 @@ DAMPING_LEAST, DAMPING_MOST = 1e-12, 1e6
 
 @dataclass(frozen=True)
 class Problem:
-    """Chain (origins, axes, base, tcp), pose (4,4) in the world, limits (n,), lambda [m/rad] of eq. 2."""
+    """Chain (origins, axes, base, tcp), pose (4, 4) in the world, limits (n,), lambda [m/rad] of eq. 2."""
 
     joint_origin: FloatArray
     joint_axis: FloatArray
@@ -30,13 +30,13 @@ class Problem:
 
 
 def tcp_poses(problem: Problem, q: FloatArray) -> FloatArray:
-    """(P,4,4) in the world."""
+    """Poses of the tcp (P, 4, 4) in the world at q (P, n)."""
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     return np.asarray(links[:, -1] @ problem.tcp)
 
 
 def psi(problem: Problem, poses: FloatArray) -> FloatArray:
-    """Eq. 2 for tcp poses (P,4,4)."""
+    """Eq. 2 for tcp poses (P, 4, 4)."""
     step = poses[:, :3, 3] - problem.pose[:3, 3]
     turn = poses[:, :3, :3] - problem.pose[:3, :3]
     weight = problem.rotation_length**2 / 2.0
@@ -44,7 +44,7 @@ def psi(problem: Problem, poses: FloatArray) -> FloatArray:
 
 
 def rotation_vector(R: FloatArray) -> FloatArray:
-    """Axis times angle (P,3) of rotations (P,3,3), accurate for small angles and usable near pi."""
+    """Axis times angle (P, 3) of rotations (P, 3, 3), accurate for small angles and usable near pi."""
     twice_sine = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     length = np.linalg.norm(twice_sine, axis=1)
     angle = np.arctan2(length, np.trace(R, axis1=1, axis2=2) - 1.0)
@@ -52,7 +52,7 @@ def rotation_vector(R: FloatArray) -> FloatArray:
 
 
 def errors(problem: Problem, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Psi, distance [m] and rotation angle [rad] (P,) at q (P,n)."""
+    """Psi, distance [m] and rotation angle [rad] (P,) at q (P, n)."""
     poses = tcp_poses(problem, q)
     relative = np.swapaxes(poses[:, :3, :3], 1, 2) @ problem.pose[:3, :3]
     sine = np.linalg.norm(
@@ -72,7 +72,7 @@ def errors(problem: Problem, q: FloatArray) -> tuple[FloatArray, FloatArray, Flo
 def coefficients(
     problem: Problem, z: FloatArray, o: FloatArray, pose: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """k1, k2, k3 (P,) of eq. 3 for axes z (P,3) through o (P,3) and tcp poses (P,4,4)."""
+    """k1, k2, k3 (P,) of eq. 3 for axes z (P, 3) through o (P, 3) and tcp poses (P, 4, 4)."""
     wo = problem.rotation_length**2 / 2.0
     Pc, Pt = pose[:, :3, 3] - o, problem.pose[:3, 3] - o
     uc, ut = pose[:, :3, :3], problem.pose[:3, :3]
@@ -102,7 +102,7 @@ def best_value(
 
 
 def sweep(problem: Problem, q: FloatArray) -> FloatArray:
-    """One pass over the joints, from the tool to the base (P,n)."""
+    """One pass over the joints, from the tool to the base (P, n)."""
     q = q.copy()
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     origin, direction = axes(problem.joint_axis, links)
@@ -120,7 +120,7 @@ def sweep(problem: Problem, q: FloatArray) -> FloatArray:
 
 
 def newton_step(problem: Problem, q: FloatArray, damping: FloatArray) -> FloatArray:
-    """Damped least-squares step (P,n), held at limits: joints at a limit that would leave it are fixed."""
+    """Damped least-squares step (P, n), held at limits: joints at a limit that would leave it are fixed."""
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     J = jacobian(problem.joint_axis, links, problem.tcp)
     pose = links[:, -1] @ problem.tcp
@@ -143,7 +143,7 @@ def run(
     newton_steps: int,
     newton_tolerance: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
-    """q (P,n), Psi, distance, angle (P,), sweeps and Newton steps spent (P,) of every start on its own."""
+    """q (P, n), Psi, distance, angle (P,), sweeps and Newton steps spent (P,) of every start on its own."""
     q = np.clip(starts, problem.position_min, problem.position_max)
     value = psi(problem, tcp_poses(problem, q))
     sweeps, steps = np.zeros(len(q), np.int64), np.zeros(len(q), np.int64)

@@ -93,7 +93,7 @@ def counterbalance_torque(
 
 
 def counterbalance(data: DynamicsData, q: FloatArray) -> FloatArray:
-    """What the counterbalance does about each joint's +axis (N,n); zero where there is none."""
+    """What the counterbalance does about each joint's +axis (N, n); zero where there is none."""
     torque = np.zeros(q.shape, q.dtype)
     if data.counterbalance is not None:
         j = data.counterbalance.joint
@@ -106,7 +106,7 @@ def counterbalance(data: DynamicsData, q: FloatArray) -> FloatArray:
 def rigid(
     data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray, with_gravity: bool = True
 ) -> FloatArray:
-    """H qdd + h (N,n), the arm alone."""
+    """H qdd + h (N, n), the arm alone."""
     columns = rigid_body_torque(
         data, list(np.sin(q).T), list(np.cos(q).T), list(qd.T), list(qdd.T), with_gravity
     )
@@ -114,12 +114,12 @@ def rigid(
 
 
 def friction(data: DynamicsData, qd: FloatArray) -> FloatArray:
-    """F_v qd + F_c sign(qd), zero at rest."""
+    """F_v qd + F_c sign(qd) (N, n), zero at rest."""
     return data.viscous * qd + data.coulomb * np.sign(qd.real)
 
 
 def inverse_dynamics(data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-    """Torque of the motors, seen at the joint, with rotor inertia and friction, less the counterbalance."""
+    """Torque (N, n) of the motors at the joint: with rotor inertia and friction, less the counterbalance."""
     arm = rigid(data, q, qd, qdd)
     return arm + data.rotor_inertia * qdd + friction(data, qd) - counterbalance(data, q)
 
@@ -128,18 +128,18 @@ inverse_dynamics_single = inverse_dynamics  # the compiled core has one in singl
 
 
 def gravity(data: DynamicsData, q: FloatArray) -> FloatArray:
-    """Torque that holds the arm against gravity, without the counterbalance."""
+    """Torque (N, n) that holds the arm against gravity, without the counterbalance."""
     zero = np.zeros_like(q)
     return rigid(data, q, zero, zero)
 
 
 def bias(data: DynamicsData, q: FloatArray, qd: FloatArray) -> FloatArray:
-    """h = C qd + g of the arm."""
+    """h = C qd + g (N, n) of the arm."""
     return rigid(data, q, qd, np.zeros_like(q))
 
 
 def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
-    """H (N,n,n) without rotor inertia, by composite bodies in the frame of link 0."""
+    """H (N, n, n) without rotor inertia, by composite bodies in the frame of link 0."""
     N, n = q.shape
     R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
     axes, origins = np.empty((n, N, 3)), np.empty((n, N, 3))
@@ -169,20 +169,20 @@ def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
 
 
 def _about_origin(d: FloatArray) -> FloatArray:
-    """|d|^2 1 - d d' (N,3,3)."""
+    """|d|^2 1 - d d' (N, 3, 3)."""
     squared = np.einsum("ni,ni->n", d, d)[:, None, None] * np.eye(3)
     return np.asarray(squared - d[:, :, None] * d[:, None, :])
 
 
 def forward_dynamics(data: DynamicsData, q: FloatArray, qd: FloatArray, tau: FloatArray) -> FloatArray:
-    """Accelerations under the motor torques `tau`: (H + J_r) qdd = tau - h - friction + T_cb."""
+    """Accelerations (N, n) under the motor torques tau (N, n): (H + J_r) qdd = tau - h - friction + T_cb."""
     effort = tau - bias(data, q, qd) - friction(data, qd) + counterbalance(data, q)
     H = mass_matrix(data, q) + np.diag(data.rotor_inertia)
     return np.asarray(np.linalg.solve(H, effort[:, :, None])[:, :, 0])
 
 
 def torque_limit(data: DynamicsData, qd: FloatArray) -> FloatArray:
-    """Torque available at the speed |qd| (N,n)."""
+    """Torque available at the speed |qd| (N, n)."""
     limit = np.empty_like(qd)
     for j in range(data.n):
         speeds, torques = data.envelope_speed[j], data.envelope_torque[j]
@@ -192,7 +192,7 @@ def torque_limit(data: DynamicsData, qd: FloatArray) -> FloatArray:
 
 
 def axis_power(data: DynamicsData, qd: FloatArray, tau: FloatArray) -> FloatArray:
-    """Power each axis takes from the DC bus (N,n) W: mechanical plus copper losses, negative while
+    """Power each axis takes from the DC bus (N, n) W: mechanical plus copper losses, negative while
     braking.
     """
     return tau * qd + data.copper_loss * (tau / data.gear_ratio) ** 2
@@ -204,7 +204,7 @@ STEP = 1e-100  # of the complex steps: so small that no digit is lost
 def torque_gradients(
     data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """d tau_i / d q_j, d qd_j, d qdd_j, each (N,n,n) [i, j], by complex steps: exact to rounding."""
+    """d tau_i / d q_j, d qd_j, d qdd_j, each (N, n, n) [i, j], by complex steps: exact to rounding."""
     N, n = q.shape
     of_q, of_qd = np.empty((N, n, n)), np.empty((N, n, n))
     for j in range(n):

@@ -85,7 +85,7 @@ def interval(x: Any) -> Interval:
 
 
 def outward(lo: FloatArray, hi: FloatArray) -> Interval:
-    """[lo, hi] widened by two units in the last place."""
+    """[lo, hi] (N,) widened by two units in the last place."""
     return Interval(lo - (np.abs(lo) * OUTWARD + TINY), hi + (np.abs(hi) * OUTWARD + TINY))
 
 

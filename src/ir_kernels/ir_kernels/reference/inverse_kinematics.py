@@ -18,7 +18,7 @@ SINGULAR_WRIST = 1e-10  # sine of the wrist angle below which only q4 +- q6 is d
 
 
 def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """q1, q2, q3 (N,4,3) for wrist centres (N,3) in the frame of link 0, and which exist (N,4); branches
+    """q1, q2, q3 (N, 4, 3) for wrist centres (N, 3) in the frame of link 0, and which exist (N, 4); branches
     00 01 10 11.
 
     Where the arm is stretched both elbows are the same: only the first exists. On axis 1 any q1 serves: 0
@@ -58,8 +58,8 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
 def wrist_branches(
     geometry: WristGeometry, arm: FloatArray, hand: FloatArray, free_q4: float
 ) -> tuple[FloatArray, BoolArray]:
-    """q4, q5, q6 (N,2,3) for arm angles (N,3) and the hand's rotation (N,3,3) in link 0, and which exist
-    (N,2).
+    """q4, q5, q6 (N, 2, 3) for arm angles (N, 3) and the hand's rotation (N, 3, 3) in link 0, and which exist
+    (N, 2).
 
     Where axes 4 and 6 are parallel only their sum is determined: one representative with q4 = `free_q4`
     exists.
@@ -96,7 +96,7 @@ def turns(angle: float, low: float, high: float) -> list[float]:
 def solve(
     geometry: WristGeometry, hand: FloatArray, position_min: FloatArray, position_max: FloatArray
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """All q (M,6) for poses of link 6 (N,4,4) in link 0, with pose index (M,) and branch (M,), sorted by
+    """All q (M, 6) for poses of link 6 (N, 4, 4) in link 0, with pose index (M,) and branch (M,), sorted by
     pose, branch, q.
     """
     centre = hand[:, :3, 3] + hand[:, :3, :3] @ geometry.wrist_in_hand

@@ -64,7 +64,7 @@ def critical_points(coefficients: FloatArray) -> FloatArray:
 def polynomial_extrema(
     coefficients: FloatArray, durations: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Smallest and largest value (S,n) of p(t) = sum_k c_k t^k on [0, duration], and their times."""
+    """Smallest and largest value (S, n) of p(t) = sum_k c_k t^k on [0, duration], and their times."""
     scale = durations[:, None, None] ** np.arange(coefficients.shape[2])
     scaled = coefficients * scale
     points = critical_points(scaled)

@@ -28,7 +28,7 @@ class Model:
         return collision.distances(self.geometry, self._segments(q))
 
     def min_distance(self, q: FloatArray, offset: FloatArray) -> NearestPairs:
-        """Distance, pair, point a, point b, normal."""
+        """Distance (N,), pair (N,), point a, point b, normal (N, 3) at q (N, n) with offset (Z,)."""
         segments = self._segments(q)
         pair = collision.nearest(collision.distances(self.geometry, segments), offset)
         found = pair >= 0
@@ -42,7 +42,7 @@ class Model:
     def witnesses(
         self, q: FloatArray, pair: IntArray, gradient: bool
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Distance, point a, point b, normal, gradient (empty unless asked for)."""
+        """Distance (N,), point a, point b, normal (N, 3), gradient (N, n), empty unless asked for."""
         poses = collision.poses(self.geometry, q)
         found = collision.witnesses(self.geometry, collision.ends(self.geometry, poses), pair)
         slope = (
@@ -55,13 +55,13 @@ class Model:
         return collision.is_free(self.distances(q), threshold)
 
     def certify_edges(self, q0: FloatArray, q1: FloatArray, threshold: FloatArray) -> Verdicts:
-        """Verdict, t0, t1, pair."""
+        """Verdict, t0, t1, pair (N,) of edges q0, q1 (N, n) with threshold (Z,)."""
         return certify.certify(self.geometry, certify.Edges(q0, q1), threshold)[:4]
 
     def certify_trajectory(
         self, coefficients: FloatArray, durations: FloatArray, threshold: FloatArray
     ) -> tuple[int, float, float, int, float]:
-        """Verdict, interval from the start, pair, proven bound."""
+        """Verdict, interval from the start, pair, proven bound; coefficients (S, n, 6), durations (S,)."""
         found = certify.certify(self.geometry, certify.Polynomials(coefficients, durations), threshold)
         unsafe = np.flatnonzero(found.verdict != FREE)
         if not len(unsafe):

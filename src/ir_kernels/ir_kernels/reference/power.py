@@ -8,7 +8,7 @@ from ir_msgs_py.arrays import FloatArray
 def dc_bus(
     axis_power: FloatArray, dt: FloatArray, capacity: float, regeneration: str, stored: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mains W, burnt W and stored J after each of the N steps; see `ir_kernels.power.dc_bus`."""
+    """Mains W, dissipated W and stored J (N,) for axis_power (N, n) W; see `ir_kernels.power.dc_bus`."""
     N = len(axis_power)
     mains, burnt, level = np.empty(N), np.zeros(N), np.empty(N)
     for k in range(N):

@@ -26,7 +26,7 @@ Work = Generator[int, None, Any]
 
 
 class Tree:
-    """Nodes with their parents, -1 for roots, and the roots they hang on."""
+    """Nodes (n,) with their parents, -1 for roots, and the roots they hang on."""
 
     def __init__(self, roots: FloatArray, scale: FloatArray) -> None:
         self.scale = scale
@@ -65,7 +65,7 @@ class Tree:
 
 
 class Search:
-    """One search; arguments as search.BidirectionalTree has checked them."""
+    """One search; arguments as search.BidirectionalTree has checked them: start (n,), goals (G, n)."""
 
     def __init__(
         self,

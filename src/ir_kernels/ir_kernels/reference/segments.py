@@ -69,7 +69,7 @@ def _from_solid(
 
 
 def segment_segment(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> Witness:
-    """Nearest points of two segments per row: of the ends of each with the other, and of both insides."""
+    """Nearest points of two segments (N, 3) per row: ends of each with the other, and both insides."""
     da, db, r = a1 - a0, b1 - b0, a0 - b0
     aa, bb, ab = (np.sum(x * y, axis=1) for x, y in ((da, da), (db, db), (da, db)))
     ra, rb = np.sum(r * da, axis=1), np.sum(r * db, axis=1)

@@ -153,7 +153,7 @@ class SplineCost:
         evaluations: int,
         tolerance: float,
     ) -> tuple[FloatArray, float, float, int]:
-        """New control, interval, value, evaluations."""
+        """New control (K, n), interval, value, evaluations."""
         m, n = len(control) - 6, control.shape[1]
         metric = bending_metric(m, HOLDING)
 

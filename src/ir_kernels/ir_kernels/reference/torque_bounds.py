@@ -68,7 +68,7 @@ def least_limit(data: DynamicsData, joint: int, slowest: FloatArray, fastest: Fl
 def upper_ratios(
     data: DynamicsData, coefficients: FloatArray, rests: FloatArray, pieces: Pieces
 ) -> FloatArray:
-    """(K,n): |tau| / limit is nowhere in a piece above this."""
+    """(K, n): |tau| / limit is nowhere in a piece above this."""
     middle = 0.5 * (pieces.begin + pieces.end)
     step = Interval((interval(pieces.begin) - middle).lo, (interval(pieces.end) - middle).hi)
     points: list[list[Interval]] = [[], [], []]
@@ -110,7 +110,7 @@ def upper_ratios(
 def sampled_ratios(
     data: DynamicsData, coefficients: FloatArray, rests: FloatArray, segment: Any, t: FloatArray
 ) -> FloatArray:
-    """(K,n): |tau| / limit at local times t (K,) of the segments (K,)."""
+    """(K, n): |tau| / limit at local times t (K,) of the segments (K,)."""
     c = coefficients[segment]
     motion = []
     for _ in range(3):

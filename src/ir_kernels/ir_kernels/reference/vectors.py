@@ -17,13 +17,13 @@ Matrix = tuple[Vector, Vector, Vector]
 
 
 def vector(constants: FloatArray) -> Vector:
-    """The three constants as floats."""
+    """The constants (3,) as floats."""
     x, y, z = constants.tolist()
     return x, y, z
 
 
 def matrix(constants: FloatArray) -> Matrix:
-    """The nine constants as rows of floats."""
+    """The constants (3, 3) as rows of floats."""
     return vector(constants[0]), vector(constants[1]), vector(constants[2])
 
 
@@ -60,7 +60,7 @@ def transpose(m: Matrix) -> Matrix:
 def joint_rotation(origin: FloatArray, axis: FloatArray, sin: Number, cos: Number) -> Matrix:
     """Rotation of the frame after a revolute joint in the frame before it (Rodrigues), entry by entry.
 
-    R(q) = E (a a' + cos q (1 - a a') + sin q [a]x) with E = origin[:3, :3] and a = axis.
+    R(q) = E (a a' + cos q (1 - a a') + sin q [a]x) with origin (4, 4), E = origin[:3, :3] and a = axis (3,).
     """
     E = origin[:3, :3]
     along = np.outer(axis, axis)

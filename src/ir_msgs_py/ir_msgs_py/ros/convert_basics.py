@@ -19,7 +19,7 @@ NS_PER_S = 1_000_000_000
 
 
 def float_array(values: FloatArray) -> array[float]:
-    """What a float64[] field takes without looking at each element."""
+    """Values (n,) as a float64[] field takes them without looking at each element."""
     return array("d", values.tobytes())
 
 
