@@ -188,7 +188,9 @@ class _Recorder:
         self.session.message(topic, self.encode[topic](message), ns)
 
     def _diagnostics(self, load: str) -> None:
-        status = DiagnosticStatus(name="ir_sim_driver", values=[KeyValue(key="load", value=load)])
+        status = DiagnosticStatus(
+            name="ir_sim_driver", hardware_id="KR210, simulated", values=[KeyValue(key="load", value=load)]
+        )
         message = DiagnosticArray(status=[status])
         message.header.stamp = stamp(self.now)
         self._put("/diagnostics", message, self.now)
@@ -255,7 +257,9 @@ class _Recorder:
         message = PowerState(mode=int(phase.mode), target_mode=int(phase.target or phase.mode))
         message.header.stamp = stamp(ns)
         message.power, message.energy, message.base_power = power, self.energy, base
-        message.bus_voltage, message.burnt_power = 560.0, float(bus.burnt[part].mean())
+        link = self.power.dc_link
+        message.bus_voltage = float(np.sqrt(link.voltage**2 + 2.0 * bus.stored[k] / link.capacitance))
+        message.burnt_power = float(bus.burnt[part].mean())
         message.joint_power, message.joint_torque = axis[part].mean(axis=0), tau[k]
         self._put("/ir_sim_driver/power_state", message, ns)
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ir_msgs_py.settings import describe
+from ir_msgs_py.settings import describe, settings_table
+from ir_recorder import Tolerances
 from ir_recorder.settings import RecorderSettings
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recording.md").read_text(encoding="utf-8")
@@ -23,3 +24,7 @@ def test_snippets_run(code: str, demo_file: Path, capsys: pytest.CaptureFixture[
 def test_every_parameter_is_in_the_table() -> None:
     for setting in describe(RecorderSettings):
         assert f"| `{setting.name}` |" in PAGE
+
+
+def test_the_table_of_bounds_is_that_of_the_settings() -> None:
+    assert settings_table(Tolerances).replace("Parameter", "Bound") in PAGE

@@ -13,9 +13,122 @@ import pytest
 
 from ir_msgs.msg import PlannedMovement
 from ir_msgs_py.modes import Mode
-from ir_recorder import Analysis, Tolerances, analyse, findings, read_recording
+from ir_recorder import Analysis, Finding, Tolerances, Verdict, analyse, findings, read_recording, summary
+from ir_recorder.read.recording import GoalEnd
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+NEAR = Tolerances(resting_rows=8, safety_distance=-1.0)  # the synthetic run passes through its machines
+
+
+def named(checks: tuple[Finding, ...], start: str) -> list[Finding]:
+    return [check for check in checks if check.name.startswith(start)]
+
+
+def test_checks_hold_for_a_run_as_planned(analysis: Analysis) -> None:
+    checks = findings(analysis, NEAR)
+    assert [check.name for check in checks if not check.ok] == []
+    assert len(checks) > 30
+    assert summary(checks)[0] is Verdict.HOLDS
+
+
+def test_every_check_gives_the_reason_of_its_bound(analysis: Analysis) -> None:
+    for check in findings(analysis):
+        assert check.reason or check.verdict is Verdict.NOT_CHECKED
+
+
+def test_a_run_whose_planning_failed_is_not_green(analysis: Analysis) -> None:
+    """Power and joint states alone: the grid holds, but nothing of a program was shown."""
+    alone = replace(analysis.recording, events=(), loads=(), goals=())
+    checks = findings(analyse(alone))
+    (program,) = named(checks, "program executed")
+    assert program.verdict is Verdict.NOT_CHECKED
+    assert any(check.ok for check in checks)
+    assert summary(checks)[0] is Verdict.NOT_CHECKED
+    refused = replace(alone, goals=(GoalEnd("ir_planner/plan", 6, "aborted"),))
+    (goals,) = named(findings(analyse(refused)), "goals of ir_planner/plan")
+    assert (goals.verdict, goals.note) == (Verdict.FAILS, "aborted")
+
+
+def test_a_program_that_stopped_early_fails(analysis: Analysis) -> None:
+    shorter = replace(analysis, steps=analysis.steps[:3])
+    (check,) = named(findings(shorter), "steps of the program")
+    assert (check.measured, check.low, check.verdict) == (3, 5, Verdict.FAILS)
+
+
+def test_a_step_without_an_end_is_named(demo_file: Path) -> None:
+    recording = read_recording(demo_file)
+    cut = replace(recording, events=recording.events[:-1])
+    (check,) = named(findings(analyse(cut)), "steps of the program")
+    assert check.verdict is Verdict.FAILS
+    assert check.note == "5 press → home: open"
+
+
+@pytest.mark.parametrize(("planned", "beyond"), [(500.0, 20.0), (5000.0, 75.0)])
+def test_a_movement_may_differ_by_one_percent_or_ten_joules(
+    analysis: Analysis, planned: float, beyond: float
+) -> None:
+    moved = analysis.movements[0]
+    report = replace(moved.step.movement.report, energy=planned)
+    step = replace(moved.step, movement=replace(moved.step.movement, report=report))
+    for off, ok in ((0.45 * beyond, True), (beyond, False)):
+        for sign in (-1.0, 1.0):
+            result = replace(moved, step=step, energy=planned + sign * off, stored_energy=0.0)
+            (check,) = named(findings(replace(analysis, steps=(result,))), "energy of 1 home → table")[:1]
+            assert check.ok == ok, check
+
+
+def test_what_the_capacitors_held_may_be_missing_but_not_more(analysis: Analysis) -> None:
+    moved = analysis.movements[0]
+    planned = moved.step.movement.report.energy
+    for short, ok in ((50.0, True), (50.0 + 0.02 * planned + 10.0, False)):
+        result = replace(moved, energy=planned - short, stored_energy=50.0)
+        check = named(findings(replace(analysis, steps=(result,))), "energy of")[0]
+        assert check.ok == ok
+        assert "50 J that the capacitors held" in check.reason
+
+
+def test_pauses_are_checked_too(analysis: Analysis) -> None:
+    names = [check.name for check in findings(analysis) if "pause" in check.name]
+    assert len(names) == 4  # energy and duration of both
+    rested = analysis.steps[3]
+    for more, ok in ((0.4, True), (0.7, False)):
+        result = replace(rested, energy=rested.energy + more * rested.motors_power)
+        check = named(findings(replace(analysis, steps=(result,))), "energy of")[0]
+        assert check.ok == ok
+
+
+def test_a_movement_that_took_more_than_planned_fails_its_check(
+    new_run: Callable[[], Any], tmp_path: Path
+) -> None:
+    run = new_run()
+    goal = HOME + np.radians([60.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    run.rest(0.1, Mode.STAND_ON_MOTORS, HOME, "gripper")
+    run.move(1.0, HOME, goal, "gripper", PlannedMovement(kind="regional", to_station="table"))
+    checks = findings(analyse(read_recording(run.record(tmp_path / "a.mcap", plan_factor=0.5))))
+    energy = named(checks, "energy of")[0]
+    assert energy.verdict is Verdict.FAILS
+    assert energy.measured == pytest.approx(2.0 * energy.expected, rel=1e-6)
+
+
+def test_a_movement_without_a_meter_is_not_checked(demo_file: Path) -> None:
+    checks = findings(analyse(replace(read_recording(demo_file), power=None)))
+    assert {check.verdict for check in named(checks, "energy of")} == {Verdict.NOT_CHECKED}
+    assert summary(checks)[0] is not Verdict.HOLDS
+
+
+def test_an_empty_recording_is_not_checked(demo_file: Path) -> None:
+    recording = read_recording(demo_file)
+    checks = findings(analyse(replace(recording, power=None, joints=None, events=(), loads=(), goals=())))
+    assert summary(checks) == (Verdict.NOT_CHECKED, "nothing was checked")
+
+
+def test_a_tool_of_ones_own_is_not_held_against_table_2(new_run: Callable[[], Any], tmp_path: Path) -> None:
+    run = new_run()
+    run.rest(1.0, Mode.STAND_ON_MOTORS, HOME, "gripper+part")
+    checks = findings(analyse(read_recording(run.record(tmp_path / "own.mcap"))))
+    (own,) = named(checks, "power at rest")
+    assert own.ok
+    assert named(checks, "Table II") == []
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.002, 0.1, math.nan])
@@ -27,22 +140,25 @@ def test_clearance_may_only_lack_what_the_tool_was_off(analysis: Analysis, devia
         short = tolerated + 1e-4 + beyond
         near = replace(moved.clearance, least=0.02 - short, contact_margin=-short)
         result = replace(moved, tool_deviation=deviation, clearance=near)
-        one = replace(analysis, steps=(result,))
-        held = {check.name.split(" on ")[0]: check.ok for check in findings(one)}
-        assert (held["clearance"], held["allowed contacts"]) == (ok, ok)
+        checks = findings(replace(analysis, steps=(result,)))
+        for name in ("clearance on", "allowed contacts on"):
+            (check,) = named(checks, name)
+            assert check.ok == ok
 
 
 @pytest.mark.parametrize(
-    ("certified", "planned", "kept", "whose"),
+    ("recorded", "certified", "planned", "kept", "source"),
     [
-        (True, 0.006, 0.006, "6.0 mm, the certified plan's clearance"),
-        (False, 0.006, 0.02, "20.0 mm, the safety distance"),
-        (True, 0.05, 0.02, "20.0 mm, the safety distance"),
-        (True, math.inf, 0.02, "20.0 mm, the safety distance"),
+        (math.nan, True, 0.006, 0.006, "clearance of the certified plan 6.0 mm"),
+        (math.nan, False, 0.006, 0.02, "default safety distance (none is recorded) 20.0 mm"),
+        (math.nan, True, 0.05, 0.02, "default safety distance (none is recorded) 20.0 mm"),
+        (math.nan, True, math.inf, 0.02, "default safety distance (none is recorded) 20.0 mm"),
+        (0.035, True, 0.006, 0.035, "safety distance of the plan 35.0 mm"),
+        (0.001, False, 0.5, 0.001, "safety distance of the plan 1.0 mm"),
     ],
 )
-def test_a_plan_with_a_smaller_safety_distance_is_held_against_its_own_clearance(
-    analysis: Analysis, certified: bool, planned: float, kept: float, whose: str
+def test_clearance_is_held_against_the_safety_distance_it_was_planned_with(
+    analysis: Analysis, recorded: float, certified: bool, planned: float, kept: float, source: str
 ) -> None:
     moved = analysis.movements[1]
     assert moved.clearance is not None
@@ -51,33 +167,8 @@ def test_a_plan_with_a_smaller_safety_distance_is_held_against_its_own_clearance
     for beyond, ok in ((-2e-5, True), (2e-5, False)):
         near = replace(moved.clearance, least=kept - 1e-4 - beyond)
         result = replace(moved, step=step, tool_deviation=0.0, clearance=near)
-        checks = findings(replace(analysis, steps=(result,)))
-        (clearance,) = [check for check in checks if check.name.startswith("clearance on")]
-        assert clearance.ok == ok
-        assert clearance.note.endswith(f"to keep: {whose}")
-
-
-def test_checks_hold_for_a_run_as_planned(analysis: Analysis) -> None:
-    checks = findings(analysis, Tolerances(table_2_rows=8, safety_distance=-1.0))
-    assert [check.name for check in checks if not check.ok] == []
-    assert len(checks) > 20
-
-
-def test_a_movement_that_took_more_than_planned_fails_its_check(
-    new_run: Callable[[], Any], tmp_path: Path
-) -> None:
-    run = new_run()
-    goal = HOME + np.radians([60.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    run.rest(0.1, Mode.STAND_ON_MOTORS, HOME, "gripper")
-    run.move(1.0, HOME, goal, "gripper", PlannedMovement(kind="regional", to_station="table"))
-    checks = findings(analyse(read_recording(run.record(tmp_path / "a.mcap", plan_factor=0.5))))
-    (energy,) = [check for check in checks if check.name.startswith("energy of")]
-    assert not energy.ok
-    assert energy.measured == pytest.approx(2.0 * energy.expected, rel=1e-6)
-
-
-def test_a_step_without_an_end_is_a_finding(demo_file: Path) -> None:
-    recording = read_recording(demo_file)
-    cut = replace(recording, events=recording.events[:-1])
-    failed = [check for check in findings(analyse(cut)) if check.name.startswith("end of")]
-    assert [check.note for check in failed] == ["open"]
+        (check,) = named(
+            findings(replace(analysis, steps=(result,), safety_distance=recorded)), "clearance on"
+        )
+        assert check.ok == ok
+        assert check.reason.startswith(source)

@@ -30,7 +30,7 @@ KNOWS = {
 }
 FACE = {
     *("Analysis", "Finding", "PathError", "ReadError", "RecorderError", "Recording", "SchemaError"),
-    *("Tolerances", "WriteError", "analyse", "findings", "read_recording"),
+    *("Tolerances", "Verdict", "WriteError", "analyse", "findings", "read_recording", "summary"),
 }
 ROOMS = [path.parent.name for path in sorted(FOLDER.glob("*/__init__.py"))]
 

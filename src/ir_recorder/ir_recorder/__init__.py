@@ -1,6 +1,6 @@
 """Recordings of the cell: written by a node, read and explained without ROS."""
 
-from ir_recorder.analysis import Analysis, Finding, Tolerances, analyse, findings
+from ir_recorder.analysis import Analysis, Finding, Tolerances, Verdict, analyse, findings, summary
 from ir_recorder.errors import PathError, ReadError, RecorderError, SchemaError, WriteError
 from ir_recorder.read.reader import read_recording
 from ir_recorder.read.recording import Recording
@@ -14,8 +14,10 @@ __all__ = [
     "Recording",
     "SchemaError",
     "Tolerances",
+    "Verdict",
     "WriteError",
     "analyse",
     "findings",
     "read_recording",
+    "summary",
 ]

@@ -22,6 +22,7 @@ from ir_msgs_py.ros.answers import ProgramPlan
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_program_runner.settings import LinkSettings
+from ir_recorder.format import contents
 
 from .outcome import Outcome, examine
 from .power_tour import PowerWatch, tour
@@ -47,8 +48,11 @@ class Demonstration:
     """One run: `run` returns what came out of it, or raises an error with a sentence."""
 
     def __init__(self, cell: str, out: Path, seed: int, progress: Progress) -> None:
-        self._out, self._seed, self._progress = out, seed, progress
-        self._cell = with_short_pauses(load_cell(cell), LONGEST_PAUSE)
+        self._out, self._progress = out, progress
+        full = load_cell(cell)
+        self._full_pauses = [step.dwell for step in full.program if step.kind == "PAUSE"]
+        self._cell = with_short_pauses(full, LONGEST_PAUSE)
+        self._options = PlanOptions(seed=seed)
         self._link = LinkSettings(wake_port=free_udp_port())
         self._loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
 
@@ -60,10 +64,7 @@ class Demonstration:
         progress = self._progress
         progress.say(f"Demonstration of cell {self._cell.name}: real nodes over DDS, real time")
         nodes = NodeProcesses(self._out / "log", {})
-        facts = ["shortened=pauses and the transitions of the power modes; the clock is not scaled"]
-        facts += [f"{name}={seconds:g} s" for name, seconds in TRANSITIONS.items()]
         transitions = {f"transitions.{name}": seconds for name, seconds in TRANSITIONS.items()}
-        facts.append(f"longest pause={LONGEST_PAUSE:g} s")
         with nodes, Client(timeout=START_SECONDS, node_name="ir_demo") as client:
             progress.begin("start planner, driver, runner, recorder")
             nodes.start(
@@ -72,7 +73,7 @@ class Demonstration:
                     planner=transitions,
                     driver={**transitions, "wake_port": self._link.wake_port},
                     runner={"wake_port": self._link.wake_port},
-                    recorder={"facts": facts},
+                    recorder={"facts": self._facts()},
                 )
             )
             self._start_recording(client, recording)
@@ -89,6 +90,18 @@ class Demonstration:
         progress.end(f"{self._out / 'report.html'}, {self._out / 'demo.png'}")
         return outcome
 
+    def _facts(self) -> list[str]:
+        """What the recording keeps of this run: how it was planned, and what is shortened."""
+        facts = {
+            "shortened": "pauses and the transitions of the power modes; the clock is not scaled",
+            "seed": str(self._options.seed),
+            contents.SAFETY_DISTANCE: f"{self._options.safety_distance:g} m",
+            **{name: f"{seconds:g} s" for name, seconds in TRANSITIONS.items()},
+        }
+        if self._full_pauses:
+            facts[contents.UNSHORTENED_PAUSES] = ", ".join(f"{seconds:g} s" for seconds in self._full_pauses)
+        return [f"{key}={value}" for key, value in facts.items()]
+
     def _start_recording(self, client: Client, path: Path) -> None:
         request = StartRecording.Request(path=str(path.resolve()), overwrite=True)
         client.ask("/" + names.START_RECORDING, request)
@@ -96,7 +109,7 @@ class Demonstration:
     def _plan(self, client: Client) -> ProgramPlan:
         self._progress.begin("plan the program")
         plan = client.plan_program(
-            options=PlanOptions(seed=self._seed),
+            options=self._options,
             progress=lambda at: self._progress.update(f"{at.phase} {at.done}/{at.total}"),
         )
         report = plan.report

@@ -1,7 +1,22 @@
 """Offline analysis of a recording, without ROS."""
 
 from ir_recorder.analysis.analyse import analyse
-from ir_recorder.analysis.findings import Finding, Tolerances, findings
-from ir_recorder.analysis.results import Analysis, Share, StationUse, StepResult
+from ir_recorder.analysis.finding import Finding, Verdict, summary
+from ir_recorder.analysis.findings import findings
+from ir_recorder.analysis.results import Analysis, ProgramTotals, Share, StationUse, StepResult, Unshortened
+from ir_recorder.analysis.tolerances import Tolerances
 
-__all__ = ["Analysis", "Finding", "Share", "StationUse", "StepResult", "Tolerances", "analyse", "findings"]
+__all__ = [
+    "Analysis",
+    "Finding",
+    "ProgramTotals",
+    "Share",
+    "StationUse",
+    "StepResult",
+    "Tolerances",
+    "Unshortened",
+    "Verdict",
+    "analyse",
+    "findings",
+    "summary",
+]

@@ -1,5 +1,5 @@
-"""A recording explained: joules, seconds and clearance per step, shares of modes and stations, Table II,
-the grid.
+"""A recording explained: joules, seconds and clearance per step, totals of the program, shares of modes and
+stations, power at rest, the grid.
 """
 
 from __future__ import annotations
@@ -9,22 +9,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, Load, cell_from_yaml, load_power_data
+from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, load_power_data
 from ir_kernels import KernelError
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.names import JOINT_NAMES, LOAD_SEPARATOR
-from ir_recorder.analysis.clearance import StepClearance, held_part, step_clearances
+from ir_msgs_py.names import JOINT_NAMES
+from ir_recorder.analysis.clearance import StepClearance, step_clearances
 from ir_recorder.analysis.grid import check_grid
 from ir_recorder.analysis.indirect import IndirectMeter
-from ir_recorder.analysis.loads import load_timeline, normal
+from ir_recorder.analysis.loads import carried, load_timeline
 from ir_recorder.analysis.meter import Meter
-from ir_recorder.analysis.plateaus import table_2_plateaus
-from ir_recorder.analysis.results import Analysis, StepResult
+from ir_recorder.analysis.plateaus import plateaus
+from ir_recorder.analysis.resting import MOTORS, resting_watts
+from ir_recorder.analysis.results import NAN, Analysis, StepResult, Unshortened
 from ir_recorder.analysis.shares import mode_shares, station_uses
 from ir_recorder.analysis.steps import ExecutedStep, executed_steps
+from ir_recorder.analysis.totals import program_totals, unshortened_cycle
+from ir_recorder.format import contents
 from ir_recorder.read.recording import Recording
-
-NAN = float("nan")
 
 
 def analyse(recording: Recording) -> Analysis:
@@ -36,6 +37,7 @@ def analyse(recording: Recording) -> Analysis:
 class _Analyser:
     recording: Recording
     problems: list[str] = field(default_factory=list)
+    data: PowerData = field(default_factory=load_power_data)
 
     def analysis(self) -> Analysis:
         recording = self.recording
@@ -43,15 +45,9 @@ class _Analyser:
         meter = Meter(power) if power is not None else None
         cell = self._cell()
         loads = load_timeline(recording)
-        steps = executed_steps(recording)
-        results = self._results(steps, meter, cell)
+        results = self._results(executed_steps(recording), meter, cell)
         span = float(power.time[-1] - power.time[0]) if power is not None else recording.duration
         energy = meter.energy(-np.inf, np.inf) if meter is not None else NAN
-        plateaus = (
-            table_2_plateaus(recording, meter, loads, cell, load_power_data())
-            if meter is not None and cell is not None
-            else ()
-        )
         return Analysis(
             recording=recording,
             cell=cell,
@@ -61,10 +57,12 @@ class _Analyser:
             mean_power=energy / span if span > 0.0 else NAN,
             peak_power=float(power.power.max()) if power is not None else NAN,
             steps=results,
+            program=program_totals(results, meter, self._unshortened(results, meter, cell)),
+            safety_distance=self._safety_distance(),
             stations=station_uses(results),
             modes=mode_shares(power) if power is not None else (),
             grid=check_grid(recording.joints, power) if recording.joints is not None else None,
-            plateaus=plateaus,
+            plateaus=plateaus(recording, meter, loads, cell, self.data) if meter and cell else (),
             problems=(*recording.problems, *self.problems),
         )
 
@@ -78,35 +76,78 @@ class _Analyser:
             self.problems.append(f"the attached cell can't be read: {error}")
             return None
 
+    def _safety_distance(self) -> float:
+        fact = self.recording.fact(contents.SAFETY_DISTANCE).removesuffix("m")
+        try:
+            return float(fact) if fact else NAN
+        except ValueError:
+            self.problems.append(f"the recorded safety distance {fact[:40]!r} is not a number")
+            return NAN
+
+    def _unshortened(
+        self, results: tuple[StepResult, ...], meter: Meter | None, cell: Cell | None
+    ) -> Unshortened | None:
+        fact = self.recording.fact(contents.UNSHORTENED_PAUSES)
+        if not fact or meter is None or cell is None or not results:
+            return None
+
+        def watts(mode: str, result: StepResult) -> float:
+            return self._resting(mode, result.step, cell)
+
+        def change(mode: str) -> float:
+            own = self.data.mode(mode)
+            return own.time_to_pause + own.regular_time_to_operate
+
+        return unshortened_cycle(results, fact, change, watts, meter)
+
+    def _resting(self, mode: str, step: ExecutedStep, cell: Cell | None) -> float:
+        """W at rest where a step begins, by the data; NaN where posture or cell are missing."""
+        joints = self.recording.joints
+        if cell is None or joints is None or joints.position.shape[1] != cell.robot.n or not len(joints.time):
+            return NAN
+        row = int(np.clip(np.searchsorted(joints.time, step.start), 0, len(joints.time) - 1))
+        loads = carried(cell, step.movement.load)
+        return resting_watts(mode, joints.position[row], cell, loads, self.data)
+
     def _results(
         self, steps: Sequence[ExecutedStep], meter: Meter | None, cell: Cell | None
     ) -> tuple[StepResult, ...]:
         indirect = self._indirect(cell)
         clearances = self._clearances(steps, cell)
-        results = []
-        for step, clearance in zip(steps, clearances, strict=True):
-            start, end = step.start, step.end
-            moved = indirect is not None and not step.movement.is_pause
-            loads = _loads(cell, step.movement.load)
-            results.append(
-                StepResult(
-                    step=step,
-                    energy=meter.energy(start, end) if meter else NAN,
-                    joint_energy=meter.joints(start, end) if meter else np.full(len(JOINT_NAMES), NAN),
-                    base_energy=meter.base(start, end) if meter else NAN,
-                    dissipated_energy=meter.dissipated(start, end) if meter else NAN,
-                    peak_power=meter.peak(start, end) if meter else NAN,
-                    indirect_energy=indirect.energy(start, end, loads) if indirect and moved else NAN,
-                    tool_deviation=self._deviation(step),
-                    clearance=clearance,
-                )
-            )
-        return tuple(results)
+        return tuple(
+            self._result(step, clearance, meter, cell, indirect)
+            for step, clearance in zip(steps, clearances, strict=True)
+        )
+
+    def _result(
+        self,
+        step: ExecutedStep,
+        clearance: StepClearance | None,
+        meter: Meter | None,
+        cell: Cell | None,
+        indirect: IndirectMeter | None,
+    ) -> StepResult:
+        start, end = step.start, step.end
+        moved = indirect is not None and not step.movement.is_pause
+        loads = carried(cell, step.movement.load)
+        return StepResult(
+            step=step,
+            energy=meter.energy(start, end) if meter else NAN,
+            joint_energy=meter.joints(start, end) if meter else np.full(len(JOINT_NAMES), NAN),
+            base_energy=meter.base(start, end) if meter else NAN,
+            dissipated_energy=meter.dissipated(start, end) if meter else NAN,
+            peak_power=meter.peak(start, end) if meter else NAN,
+            indirect_energy=indirect.energy(start, end, loads) if indirect and moved else NAN,
+            stored_energy=meter.stored(start, self.data.dc_link) if meter else NAN,
+            motors_power=self._resting(MOTORS, step, cell),
+            tool_deviation=self._deviation(step),
+            clearance=clearance,
+        )
 
     def _indirect(self, cell: Cell | None) -> IndirectMeter | None:
         if self.recording.joints is None or cell is None:
             return None
-        return IndirectMeter(self.recording.joints, cell.robot, load_power_data())
+        return IndirectMeter(self.recording.joints, cell.robot, self.data)
 
     def _clearances(
         self, steps: Sequence[ExecutedStep], cell: Cell | None
@@ -125,10 +166,3 @@ class _Analyser:
             return NAN
         inside = (controller.time >= step.start) & (controller.time <= step.end)
         return float(controller.tool_deviation[inside].max()) if inside.any() else NAN
-
-
-def _loads(cell: Cell | None, load: str) -> tuple[Load, ...]:
-    if cell is None:
-        return ()
-    names = normal(load).split(LOAD_SEPARATOR)
-    return tuple(item for item in cell.loads(held_part(cell, load)) if item.name in names)

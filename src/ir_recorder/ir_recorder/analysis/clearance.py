@@ -16,7 +16,7 @@ from ir_description.program import PartPlaces
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR
-from ir_recorder.analysis.loads import normal
+from ir_recorder.analysis.loads import held_part, normal
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import JointSeries
 
@@ -66,12 +66,6 @@ def places_after(cell: Cell, places: PartPlaces, step: ExecutedStep) -> PartPlac
         station = movement.to_station if movement.to_station in stations else ""
         return PartPlaces("", {**lying, movement.detach: station})
     return places
-
-
-def held_part(cell: Cell, load: str) -> str:
-    """The part named in a load text, "" for none."""
-    names = normal(load).split(LOAD_SEPARATOR)
-    return next((part.name for part in cell.parts if part.name in names), "")
 
 
 def collision_model(cell: Cell, load: str, places: PartPlaces) -> CollisionModel:

@@ -1,143 +1,103 @@
-"""Comparisons with a tolerance: what a recording has to show for the run to count as good."""
+"""All checks of a recording: of the requests, the program, its steps, the power at rest, the joint states."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
-from ir_msgs_py.report import TrajectoryReport
+from ir_recorder.analysis.finding import Finding, at_least, at_most, near, unchecked
+from ir_recorder.analysis.movement_checks import step_checks
 from ir_recorder.analysis.plateaus import Plateau
-from ir_recorder.analysis.results import Analysis, StepResult
+from ir_recorder.analysis.results import Analysis
+from ir_recorder.analysis.steps import ExecutedStep
+from ir_recorder.analysis.tolerances import Tolerances
 
-
-@dataclass(frozen=True)
-class Tolerances:
-    """How far measured may be from planned.
-
-    energy_relative or energy_absolute [J], whichever is larger, per movement; duration [s]; tool_deviation
-    [m]; safety_distance [m]: S_m, that the executed clearance keeps but for the deviation that was measured
-    (or tolerated, where none was) and `slack` [m]; where a certified plan comes nearer, its clearance stands
-    for the S_m it was made with, which no message carries; allowed pairs keep their own distance alike;
-    table_2_relative; table_2_rows: how many rows the recording has to show; indirect_relative: indirect
-    against direct measurement.
-    """
-
-    energy_relative: float = 0.05
-    energy_absolute: float = 200.0
-    duration: float = 0.05
-    tool_deviation: float = 0.005
-    safety_distance: float = 0.02
-    slack: float = 1e-4
-    table_2_relative: float = 0.01
-    table_2_rows: int = 0
-    indirect_relative: float = 0.05
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One check: what was measured, what was expected, within which bound, in which unit, and whether it
-    holds.
-    """
-
-    name: str
-    measured: float
-    expected: float
-    bound: float
-    unit: str
-    ok: bool
-    note: str = ""
+ENDED = "ended"
+_SUCCEEDED = 4  # action_msgs/GoalStatus
 
 
 def findings(analysis: Analysis, tolerances: Tolerances | None = None) -> tuple[Finding, ...]:
-    """All checks that the recording allows; a movement whose meter is missing fails."""
+    """All checks of the cell and of this run; what can't be checked is listed as such."""
     bounds = tolerances or Tolerances()
-    checks = [check for result in analysis.movements for check in _movement(result, bounds)]
-    return (*checks, *_unfinished(analysis), *_table_2(analysis, bounds), *_grid(analysis))
+    steps = [result for result in analysis.steps if result.step.outcome == ENDED]
+    return (
+        *_requests(analysis),
+        *_program(analysis),
+        *(check for result in steps for check in step_checks(result, analysis.safety_distance, bounds)),
+        *_at_rest(analysis, bounds),
+        *_grid(analysis),
+    )
 
 
-def _unfinished(analysis: Analysis) -> Iterator[Finding]:
+def _requests(analysis: Analysis) -> Iterator[Finding]:
+    """Goals that were asked of planner and runner: all of them have to succeed."""
+    for action in sorted({goal.action for goal in analysis.recording.goals}):
+        own = [goal for goal in analysis.recording.goals if goal.action == action]
+        done = sum(goal.status == _SUCCEEDED for goal in own)
+        others = ", ".join(goal.outcome for goal in own if goal.status != _SUCCEEDED)
+        why = "every goal that was sent has to succeed"
+        yield at_least(f"goals of {action} that succeeded", done, len(own), "", why, others)
+
+
+def _program(analysis: Analysis) -> Iterator[Finding]:
+    """Whether a program was executed, and all of it."""
+    if not analysis.steps:
+        yield unchecked("program executed", "no step of a program was recorded")
+        return
+    for steps in _runs(analysis):
+        ended = sum(step.outcome == ENDED for step in steps)
+        open_ = [
+            f"{s.index + 1} {s.label}: {s.outcome} {s.note}".strip() for s in steps if s.outcome != ENDED
+        ]
+        why = "every step of the program has to end"
+        yield at_least("steps of the program that ended", ended, steps[0].total, "", why, "; ".join(open_))
+
+
+def _runs(analysis: Analysis) -> Iterator[list[ExecutedStep]]:
+    """The steps of each run of a program: a run begins where the index doesn't rise."""
+    run: list[ExecutedStep] = []
     for result in analysis.steps:
-        step = result.step
-        if step.outcome != "ended":
-            note = f"{step.outcome} {step.note}".strip()
-            yield Finding(f"end of {step.index + 1} {step.label}", 0.0, 1.0, 0.0, "", False, note)
+        if run and result.step.index <= run[-1].index:
+            yield run
+            run = []
+        run.append(result.step)
+    yield run
 
 
-def _movement(result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
-    planned, name = result.step.movement.report, f"{result.step.index + 1} {result.step.label}"
-    bound = max(bounds.energy_relative * abs(planned.energy), bounds.energy_absolute)
-    yield _near(f"energy of {name}", result.energy, planned.energy, bound, "J")
-    yield _near(f"duration of {name}", result.seconds, planned.duration, bounds.duration, "s")
-    if not math.isnan(result.indirect_energy):
-        bound = max(bounds.indirect_relative * abs(result.energy), bounds.energy_absolute)
-        yield _near(
-            f"indirect measurement of {name}",
-            result.indirect_energy,
-            result.energy,
-            bound,
-            "J",
-            "from torque",
-        )
-    if not math.isnan(result.tool_deviation):
-        yield _below(f"tool deviation on {name}", result.tool_deviation, bounds.tool_deviation)
-    near = result.clearance
-    if near is not None:
-        off = bounds.tool_deviation if math.isnan(result.tool_deviation) else result.tool_deviation
-        off = min(off, bounds.tool_deviation) + bounds.slack
-        kept, whose = _kept(planned, bounds)
-        note = f"{near.least_pair}; to keep: {kept * 1e3:.1f} mm, {whose}"
-        yield _above(f"clearance on {name}", near.least, kept - off, note)
-        if math.isfinite(near.contact_margin):
-            yield _above(f"allowed contacts on {name}", near.contact_margin, -off, "over their own")
-
-
-def _kept(planned: TrajectoryReport, bounds: Tolerances) -> tuple[float, str]:
-    """The distance [m] that the executed clearance is held against, and what it is."""
-    if planned.certified and planned.min_clearance < bounds.safety_distance:
-        return planned.min_clearance, "the certified plan's clearance"
-    return bounds.safety_distance, "the safety distance"
-
-
-def _table_2(analysis: Analysis, bounds: Tolerances) -> Iterator[Finding]:
+def _at_rest(analysis: Analysis, bounds: Tolerances) -> Iterator[Finding]:
     for row in analysis.plateaus:
-        yield _near(
-            _row_name(row),
-            row.power,
-            row.expected,
-            bounds.table_2_relative * row.expected,
-            "W",
-            f"{row.seconds:.1f} s",
-        )
-    if bounds.table_2_rows:
-        count, wanted = len(analysis.plateaus), bounds.table_2_rows
-        yield Finding("rows of Table II shown", count, wanted, 0.0, "", count >= wanted)
+        share = f"{bounds.resting_relative * 100.0:g} %"
+        note = f"{row.seconds:.1f} s at machine home"
+        why = f"{share} of the data of controller, tool and robot"
+        if math.isnan(row.expected):
+            yield unchecked(f"power at rest, {row_name(row)}", "the load is unknown to the cell")
+            continue
+        bound = bounds.resting_relative * row.expected
+        yield near(f"power at rest, {row_name(row)}", row.power, row.expected, bound, "W", why, note)
+        if not math.isnan(row.table_2):
+            bound, why = bounds.resting_relative * row.table_2, f"{share} of the paper's Table II"
+            yield near(f"Table II, {row_name(row)}", row.power, row.table_2, bound, "W", why, note)
+    if bounds.resting_rows:
+        why = "the demonstration visits every mode with every load"
+        yield at_least("modes shown at machine home", len(analysis.plateaus), bounds.resting_rows, "", why)
 
 
-def _row_name(row: Plateau) -> str:
-    return f"Table II: {row.mode.lower().replace('_', ' ')}, {row.payload:g} kg"
+def row_name(row: Plateau) -> str:
+    """A mode with its load in words: "bus power off, gripper (155 kg)"."""
+    mass = "" if math.isnan(row.payload) or not row.payload else f" ({row.payload:g} kg)"
+    return f"{row.mode.lower().replace('_', ' ')}, {'no load' if row.load == 'none' else row.load}{mass}"
 
 
 def _grid(analysis: Analysis) -> Iterator[Finding]:
     grid = analysis.grid
     if grid is None:
-        yield Finding("joint states on a 2 ms grid", 0.0, 1.0, 0.0, "", False, "none are recorded")
+        yield unchecked("joint states on a 2 ms grid", "none are recorded")
         return
-    faults = len(grid.gaps) + grid.off_grid + grid.backward
     note = f"{grid.count} states, {grid.excused} pauses of hibernation"
     if grid.gaps:
         note += f"; first gap {grid.gaps[0][1] * 1e3:.0f} ms at {grid.gaps[0][0]:.2f} s"
-    yield Finding("joint states off a gap-free 2 ms grid", faults, 0.0, 0.0, "", grid.clean, note)
-
-
-def _near(name: str, measured: float, expected: float, bound: float, unit: str, note: str = "") -> Finding:
-    ok = abs(measured - expected) <= bound  # false for NaN
-    return Finding(name, measured, expected, bound, unit, ok, note)
-
-
-def _below(name: str, measured: float, bound: float) -> Finding:
-    return Finding(name, measured, 0.0, bound, "m", measured <= bound)
-
-
-def _above(name: str, measured: float, bound: float, note: str) -> Finding:
-    return Finding(name, measured, bound, 0.0, "m", measured >= bound, note)
+    faults = len(grid.gaps) + grid.off_grid + grid.backward
+    why = "500 Hz without a gap by contract"
+    yield at_most(
+        "joint states off a gap-free 2 ms grid", faults if grid.count else math.nan, 0.0, "", why, note
+    )

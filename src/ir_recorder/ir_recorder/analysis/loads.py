@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator
 
 import numpy as np
 
+from ir_description import Cell, Load
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.steps import STARTED
 from ir_recorder.read.recording import PowerSeries, Recording
@@ -22,17 +22,11 @@ class LoadTimeline:
 
     def __init__(self, observations: tuple[tuple[float, str], ...]) -> None:
         self.observations = tuple(sorted(observations, key=lambda observation: observation[0]))
-        self._times = [time for time, _ in self.observations]
-
-    def at(self, time: float) -> str:
-        """The load last seen at `time`; "" before the first observation."""
-        position = bisect_right(self._times, time)
-        return self.observations[position - 1][1] if position else ""
 
     def certain(self, end: float) -> Iterator[tuple[float, float, str]]:
         """Intervals (from, to, load) in which the load is known, up to `end` [s]."""
         start = None
-        following = [*self.observations[1:], None]
+        following = [*self.observations[1:], None][: len(self.observations)]
         for (time, load), after in zip(self.observations, following, strict=True):
             start = time if start is None else start
             if after is None:
@@ -80,6 +74,20 @@ def _sharpened(reported: list[tuple[float, str]], power: PowerSeries) -> list[tu
                 result += [(before, old), (behind, load)]
         result.append((time, load))
     return result
+
+
+def carried(cell: Cell | None, load: str) -> tuple[Load, ...]:
+    """The loads of the cell that a load text names."""
+    if cell is None:
+        return ()
+    attached = normal(load).split(LOAD_SEPARATOR)
+    return tuple(item for item in cell.loads(held_part(cell, load)) if item.name in attached)
+
+
+def held_part(cell: Cell, load: str) -> str:
+    """The part named in a load text, "" for none."""
+    attached = normal(load).split(LOAD_SEPARATOR)
+    return next((part.name for part in cell.parts if part.name in attached), "")
 
 
 def normal(load: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ir_description.power import DcLink
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.read.recording import PowerSeries
 
@@ -18,6 +19,7 @@ class Meter:
     def __init__(self, power: PowerSeries) -> None:
         self.time = power.time
         self.power = power.power
+        self._volts = power.bus_voltage
         step = np.diff(power.time, prepend=power.time[:1])
         self._energy = power.energy - power.energy[:1]
         self._joints = np.cumsum(np.nan_to_num(power.joint_power) * step[:, None], axis=0)
@@ -44,6 +46,13 @@ class Meter:
         """Largest W of a reading in the interval; NaN where there is none."""
         inside = (self.time > start) & (self.time <= end + 1e-6)
         return float(self.power[inside].max()) if inside.any() else float("nan")
+
+    def stored(self, time: float, link: DcLink) -> float:
+        """J in the capacitors of the DC link at a time, by the bus voltage; NaN where it wasn't recorded."""
+        volts = float(np.interp(time, self.time, self._volts))
+        return (
+            max(0.5 * link.capacitance * (volts**2 - link.voltage**2), 0.0) if volts > 0.0 else float("nan")
+        )
 
     def _between(self, cumulative: FloatArray, start: float, end: float) -> float:
         ends: FloatArray = np.interp([start, end], self.time, cumulative)

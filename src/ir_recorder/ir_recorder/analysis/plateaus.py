@@ -1,4 +1,8 @@
-"""Table II from a recording alone: mean power while mode and load stay, at machine home."""
+"""Power at rest from a recording alone: its mean while mode and load stay, at machine home.
+
+Each is held against the data of controller and tool; Table II of the paper stands beside it only where the
+load is the paper's.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell, PowerData
+from ir_description import Cell, Load, PowerData
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
-from ir_recorder.analysis.loads import LoadTimeline
+from ir_recorder.analysis.loads import LoadTimeline, carried
 from ir_recorder.analysis.meter import Meter
+from ir_recorder.analysis.resting import resting_watts
 from ir_recorder.read.recording import PowerSeries, Recording
 
 AT_HOME = 0.005  # rad: gravity torque changes by less than 0.1 % within it
@@ -22,54 +27,81 @@ _RESTING = [Mode[name].value for name in REST_MODES]
 SETTLING = 0.1
 SHORTEST = 0.1  # s: ten readings, so that a mean has the meter's resolution
 SAME_MASS = 0.5  # kg: masses in Table II are whole kilograms
+SAME_WATTS = 0.5  # W: powers in Table II are whole watts
+NAN = float("nan")
 
 
 @dataclass(frozen=True)
 class Plateau:
-    """Power [W] in a mode with a payload [kg] of Table II, over `seconds` in total, and the value of
-    the table.
+    """Power [W] in a mode with a load over `seconds` in total.
+
+    payload [kg]: mass of the load. expected [W]: by the data of controller, tool and robot. table_2 [W]:
+    the paper's value, NaN where the load is another one.
     """
 
     mode: str
+    load: str
     payload: float
     power: float
     expected: float
+    table_2: float
     seconds: float
 
     @property
     def error(self) -> float:
-        """Relative deviation from the table."""
+        """Relative deviation from the data."""
         return self.power / self.expected - 1.0
 
 
-def table_2_plateaus(
-    recording: Recording, meter: Meter, loads: LoadTimeline, cell: Cell, data: PowerData
+def plateaus(
+    recording: Recording, meter: Meter, timeline: LoadTimeline, cell: Cell, data: PowerData
 ) -> tuple[Plateau, ...]:
-    """The rows of Table II that the recording shows, each the mean over all its plateaus."""
+    """Each mode and load that the recording shows at rest, as the mean over all its stretches."""
     power = recording.power
     if power is None or recording.joints is None:
         return ()
     home = _at_home(recording, cell, power.time)
-    seconds: dict[tuple[str, float], float] = {}
-    joules: dict[tuple[str, float], float] = {}
-    for start, end, load in loads.certain(float(power.time[-1])):
-        payload = _payload(cell, load)
+    seconds: dict[tuple[str, str], float] = {}
+    joules: dict[tuple[str, str], float] = {}
+    for start, end, load in timeline.certain(float(power.time[-1])):
         for first, last, mode in _stays(power, home, start, end):
-            key = (Mode(mode).name, payload)
+            key = (Mode(mode).name, load)
             first, last = first + SETTLING, last - SETTLING
             if last - first >= SHORTEST:
                 seconds[key] = seconds.get(key, 0.0) + last - first
                 joules[key] = joules.get(key, 0.0) + meter.energy(first, last)
-    rows = []
-    for row in data.table_2:
-        for key, time in seconds.items():
-            if key[0] == row.mode and abs(key[1] - row.payload) < SAME_MASS:
-                rows.append(Plateau(row.mode, row.payload, joules[key] / time, row.watts, time))
-    return tuple(rows)
+    rows = [
+        _plateau(mode, load, joules[mode, load] / time, time, cell, data)
+        for (mode, load), time in seconds.items()
+    ]
+    return tuple(sorted(rows, key=lambda row: (-row.payload, REST_MODES.index(row.mode))))
+
+
+def _plateau(mode: str, load: str, power: float, seconds: float, cell: Cell, data: PowerData) -> Plateau:
+    loads = carried(cell, load)
+    known = load == NO_LOAD or len(loads) == len(load.split(LOAD_SEPARATOR))
+    payload = float(sum(item.mass for item in loads)) if known else NAN
+    expected = resting_watts(mode, cell.robot.machine_home, cell, loads, data) if known else NAN
+    table_2 = data.measured(round(payload), mode) if known and _of_the_paper(loads, payload, data) else NAN
+    return Plateau(mode, load, payload, power, expected, table_2, seconds)
+
+
+def _of_the_paper(loads: tuple[Load, ...], payload: float, data: PowerData) -> bool:
+    """Whether Table II was measured with this load: its mass, and the watts that its rows contain."""
+    listed = {row.payload for row in data.table_2}
+    if not any(abs(payload - mass) < SAME_MASS for mass in listed):
+        return False
+    always = sum(load.watts_always for load in loads)
+    awake = always + sum(load.watts_drive_bus for load in loads)
+    for mode, watts in (("HIBERNATION", always), ("STAND_ON_BRAKES", awake)):
+        tool = data.measured(round(payload), mode) - data.mode(mode).controller_watts
+        if abs(tool - watts) > SAME_WATTS:
+            return False
+    return True
 
 
 def _stays(
-    power: PowerSeries, home: np.ndarray, start: float, end: float
+    power: PowerSeries, home: BoolArray, start: float, end: float
 ) -> Iterator[tuple[float, float, int]]:
     """Stretches within [start, end] in which a resting mode stays, at machine home."""
     good = home & (power.mode == power.target_mode) & np.isin(power.mode, _RESTING)
@@ -91,12 +123,3 @@ def _at_home(recording: Recording, cell: Cell, times: FloatArray) -> BoolArray:
     near = np.abs(joints.position[nearest] - cell.robot.machine_home).max(axis=1) < AT_HOME
     still = np.nan_to_num(np.abs(joints.velocity[nearest])).max(axis=1) < STILL
     return np.asarray(near & still)
-
-
-def _payload(cell: Cell, load: str) -> float:
-    """Mass [kg] of a load text; NaN where a name isn't the cell's."""
-    masses = {part.name: part.load.mass for part in cell.parts}
-    if cell.tool is not None:
-        masses[cell.tool.name] = cell.tool.mass
-    names = [name for name in load.split(LOAD_SEPARATOR) if name != NO_LOAD]
-    return float(sum(masses.get(name, float("nan")) for name in names))

@@ -13,14 +13,17 @@ from ir_recorder.analysis.plateaus import Plateau
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import Recording
 
+NAN = float("nan")
+
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
     """A step with what it took, measured at the mains meter.
 
     energy, base_energy, dissipated_energy [J]; joint_energy (n,) [J] at the DC bus; peak_power [W];
-    indirect_energy [J]: from recorded motion and torque; tool_deviation [m]: largest between commanded and
-    simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
+    indirect_energy [J]: from recorded motion and torque; stored_energy [J]: in the capacitors at the
+    start; motors_power [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
+    commanded and simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
     """
 
     step: ExecutedStep
@@ -30,6 +33,8 @@ class StepResult:
     dissipated_energy: float
     peak_power: float
     indirect_energy: float
+    stored_energy: float
+    motors_power: float
     tool_deviation: float
     clearance: StepClearance | None
 
@@ -75,11 +80,50 @@ class StationUse:
         return self.rest.energy + self.service.energy + self.travel.energy
 
 
+@dataclass(frozen=True)
+class Unshortened:
+    """The cycle with its pauses in power modes at full length: seconds [s] and energy [J], computed.
+
+    NaN where the pauses of the run don't match. run_pauses, full_pauses [s]: their sums.
+    """
+
+    seconds: float
+    energy: float
+    run_pauses: float
+    full_pauses: float
+
+
+@dataclass(frozen=True)
+class ProgramTotals:
+    """Seconds and joules of the whole program, of its movements and of its pauses, measured and planned.
+
+    unshortened: the cycle as it is in production, None where the run's pauses are not shortened.
+    """
+
+    whole: Share
+    movements: Share
+    pauses: Share
+    planned_movements: Share
+    planned_pauses: Share
+    unshortened: Unshortened | None
+
+    @property
+    def waiting(self) -> Share:
+        """Between the steps: signals of machines and answers of nodes, which no plan contains."""
+        steps = (self.movements, self.pauses)
+        return Share(
+            "waiting between steps",
+            self.whole.seconds - sum(share.seconds for share in steps),
+            self.whole.energy - sum(share.energy for share in steps),
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Analysis:
     """All results; parts whose topics are missing are empty or NaN, `problems` names which and why.
 
     seconds, energy [J], mean_power, peak_power [W]: of the whole recording, at the mains meter.
+    safety_distance [m]: S_m that the movements were planned with, NaN where the recording carries none.
     """
 
     recording: Recording
@@ -90,6 +134,8 @@ class Analysis:
     mean_power: float
     peak_power: float
     steps: tuple[StepResult, ...]
+    program: ProgramTotals | None
+    safety_distance: float
     stations: tuple[StationUse, ...]
     modes: tuple[Share, ...]
     grid: GridCheck | None

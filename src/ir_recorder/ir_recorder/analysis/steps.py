@@ -17,13 +17,15 @@ _FEWEST = 3  # states of the executor: fewer give no speed to extrapolate its st
 
 @dataclass(frozen=True, eq=False)
 class ExecutedStep:
-    """A step of the program. start, end [s]: from the executor's path time where it moved, else from the
-    events.
+    """Step `index` of the `total` of a program.
+
+    start, end [s]: from the executor's path time where it moved, else from the events.
 
     outcome: "ended", "failed", "canceled", or "open" where the recording ends before.
     """
 
     index: int
+    total: int
     movement: PlannedMovement
     start: float
     end: float
@@ -72,7 +74,13 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
         start, stop = ran or (event.time - late, last - late)
         steps.append(
             ExecutedStep(
-                event.index, event.movement, start, stop, end.event if end else OPEN, end.note if end else ""
+                event.index,
+                event.total,
+                event.movement,
+                start,
+                stop,
+                end.event if end else OPEN,
+                end.note if end else "",
             )
         )
     return tuple(steps)

@@ -25,6 +25,7 @@ from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
     BitSeries,
     ControllerSeries,
+    GoalEnd,
     JointSeries,
     PowerSeries,
     ProgramEvent,
@@ -35,6 +36,8 @@ from ir_recorder.read.recording import (
 
 _T = TypeVar("_T")
 _WARN = 30  # rcl_interfaces/Log
+# action_msgs/GoalStatus
+_OUTCOMES = {1: "accepted", 2: "executing", 3: "canceling", 4: "succeeded", 5: "canceled", 6: "aborted"}
 _IN_BITS = tuple(bit.name for bit in fields(PlcInputs) if bit.type == "bool")
 _OUT_BITS = tuple(bit.name for bit in fields(PlcOutputs) if bit.type == "bool")
 
@@ -74,6 +77,8 @@ class _Reader:
             loads=tuple(self._loads()),
             signals=tuple(self._signals()),
             warnings=tuple(self._warnings()),
+            goals=tuple(self._goals()),
+            hardware=self._hardware(),
             cell_yaml=self._attached(contents.CELL),
             urdf=self._attached(contents.URDF) or self._description(),
             facts=raw.facts,
@@ -201,6 +206,23 @@ class _Reader:
         for time, message in self._messages("/rosout"):
             if message.level >= _WARN:
                 yield TextEvent(time, message.name, message.msg)
+
+    def _goals(self) -> Iterator[GoalEnd]:
+        """How every goal of planner and runner ended, by the status of their actions."""
+        for action in (names.PLAN, names.RUN_PROGRAM):
+            last: dict[bytes, int] = {}
+            for _, message in self._messages(f"{action}/_action/status"):
+                for goal in message.status_list:
+                    last[bytes(goal.goal_info.goal_id.uuid)] = int(goal.status)
+            for status in last.values():
+                yield GoalEnd(action, status, _OUTCOMES.get(status, f"status {status}"))
+
+    def _hardware(self) -> str:
+        for _, message in self._messages(names.DIAGNOSTICS):
+            for status in message.status:
+                if names.SIM_DRIVER in status.name and status.hardware_id:
+                    return str(status.hardware_id)
+        return ""
 
     def _description(self) -> str:
         for _, message in self._messages(names.ROBOT_DESCRIPTION):

@@ -110,11 +110,21 @@ class TextEvent:
     text: str
 
 
+@dataclass(frozen=True)
+class GoalEnd:
+    """The last state of a goal: its action ("plan"), the number of action_msgs/GoalStatus, and in words."""
+
+    action: str
+    status: int
+    outcome: str
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """All that could be read; a series is None where its topic is missing, `problems` names what is wrong.
 
-    start_ns: node clock of time 0. cell_yaml and urdf are "" where none is attached. facts: texts by key.
+    start_ns: node clock of time 0. hardware: the driver's name of its plant ("..., simulated"). cell_yaml and
+    urdf are "" where none is attached. facts: texts by key.
     """
 
     path: Path
@@ -130,6 +140,8 @@ class Recording:
     loads: tuple[TextEvent, ...]
     signals: tuple[TextEvent, ...]
     warnings: tuple[TextEvent, ...]
+    goals: tuple[GoalEnd, ...]
+    hardware: str
     cell_yaml: str
     urdf: str
     facts: tuple[tuple[str, str], ...]

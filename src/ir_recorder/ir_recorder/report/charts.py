@@ -9,7 +9,15 @@ from collections.abc import Callable, Mapping
 
 from ir_recorder.analysis import Analysis
 from ir_recorder.report.bars import joule_bars
-from ir_recorder.report.tables import fact_table, mode_table, problem_list, station_table, step_table, table_2
+from ir_recorder.report.tables import (
+    fact_table,
+    mode_table,
+    problem_list,
+    resting_table,
+    station_table,
+    step_table,
+    warning_table,
+)
 
 Chart = Callable[[Analysis], str]
 """HTML or SVG of an analysis, whatever is missing in it; texts of the recording are escaped."""
@@ -20,6 +28,7 @@ CHARTS: Mapping[str, Chart] = {
     "steps": lambda analysis: step_table(analysis.steps),
     "stations": station_table,
     "modes": mode_table,
-    "table2": table_2,
+    "resting": resting_table,
+    "warnings": warning_table,
     "facts": fact_table,
 }

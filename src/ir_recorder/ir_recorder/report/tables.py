@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from ir_recorder.analysis import Analysis, Finding
+from ir_recorder.analysis import Analysis, Finding, Verdict
+from ir_recorder.analysis.findings import row_name
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.report.words import (
     DASH,
+    interval,
     joules,
     millimetres,
     mode_words,
@@ -18,6 +20,9 @@ from ir_recorder.report.words import (
     text,
     watts,
 )
+
+MOST_WARNINGS = 100  # a node that repeats itself must not fill the page
+LONGEST_TEXT = 500  # characters of one warning
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
@@ -32,7 +37,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -
 
 def step_table(results: Sequence[StepResult]) -> str:
     """Every step: planned against measured."""
-    heads = ("#", "step", "load", ">time", ">planned", ">measured", ">deviation", ">mean", ">clearance")
+    heads = ("#", "step", "load", ">time", ">planned", ">measured", ">deviation", ">mean power", ">clearance")
     return table((*heads, ">tool deviation"), (_step(result) for result in results))
 
 
@@ -48,8 +53,8 @@ def _step(result: StepResult) -> tuple[str, ...]:
         text(step.movement.load or DASH),
         f"{result.seconds:.2f} s",
         joules(plan) if plan else DASH,
-        joules(result.energy) + _small("from torque", joules(result.indirect_energy)),
-        percent(result.energy / plan - 1.0) if plan and not step.movement.is_pause else DASH,
+        joules(result.energy) + _small("from joint states", joules(result.indirect_energy)),
+        percent(result.energy / plan - 1.0) if plan else DASH,
         watts(result.mean_power) + _small("peak", watts(result.peak_power)),
         f"{millimetres(near.least)}<small>{text(near.least_pair)}</small>" if near else DASH,
         millimetres(result.tool_deviation),
@@ -89,35 +94,48 @@ def mode_table(analysis: Analysis) -> str:
     return table(("mode", ">time", ">energy", ">mean", ""), rows)
 
 
-def table_2(analysis: Analysis) -> str:
-    """Table II of the paper beside what the recording shows."""
+def resting_table(analysis: Analysis) -> str:
+    """Power at rest beside the data; the paper's Table II where the load is the paper's."""
     rows = [
         (
-            text(mode_words(row.mode)),
-            f"{row.payload:g} kg",
+            text(row_name(row)),
             watts(row.expected),
             f"{row.power:.2f} W",
             percent(row.error),
+            watts(row.table_2),
             f"{row.seconds:.1f} s",
         )
         for row in analysis.plateaus
     ]
-    return table(("mode at machine home", ">payload", ">Table II", ">measured", ">deviation", ">over"), rows)
+    heads = ("mode and load at machine home", ">by the data", ">measured", ">deviation", ">Table II", ">over")
+    return table(heads, rows)
 
 
 def check_table(findings: Sequence[Finding]) -> str:
-    """All checks, what fails first."""
-    rows = [
-        (
-            f'<b class="{"good" if f.ok else "bad"}">{"holds" if f.ok else "fails"}</b>',
-            text(f.name),
-            text(number(f.measured, f.unit)),
-            text(number(f.expected, f.unit)) + (f" ± {text(number(f.bound, f.unit))}" if f.bound else ""),
-            text(f.note),
-        )
-        for f in sorted(findings, key=lambda finding: finding.ok)
-    ]
-    return table(("", "check", ">measured", ">expected", "note"), rows, "checks")
+    """All checks: what fails and what was not checked first, what holds folded away."""
+    shown = [f for f in findings if not f.ok]
+    held = [f for f in findings if f.ok]
+    rows = [_check(f) for f in sorted(shown, key=lambda f: f.verdict is not Verdict.FAILS)]
+    heads = ("", "check", ">measured", ">allowed", ">expected", "reason of the bound", "note")
+    top = table(heads, rows, "checks") if rows else ""
+    if not held:
+        return top or '<p class="empty">Nothing was checked.</p>'
+    below = table(heads, [_check(f) for f in held], "checks")
+    count = f"{len(held)} checks hold" if len(held) > 1 else "1 check holds"
+    return f"{top}<details><summary>{count}</summary>{below}</details>"
+
+
+def _check(finding: Finding) -> tuple[str, ...]:
+    style = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}[finding.verdict]
+    return (
+        f'<b class="{style}">{finding.verdict}</b>',
+        text(finding.name),
+        text(number(finding.measured, finding.unit)),
+        text(interval(finding.low, finding.high, finding.unit)),
+        text(number(finding.expected, finding.unit)),
+        text(finding.reason),
+        text(finding.note),
+    )
 
 
 def fact_table(analysis: Analysis) -> str:
@@ -136,6 +154,17 @@ def fact_table(analysis: Analysis) -> str:
         ),
     )
     return facts + topics
+
+
+def warning_table(analysis: Analysis) -> str:
+    """Warnings and errors of the nodes' logs, the first MOST_WARNINGS of them."""
+    warnings = analysis.recording.warnings
+    if not warnings:
+        return '<p class="empty">None.</p>'
+    rows = [(f"{w.time:.2f} s", text(w.name), text(w.text[:LONGEST_TEXT])) for w in warnings[:MOST_WARNINGS]]
+    more = len(warnings) - MOST_WARNINGS
+    left = f'<p class="empty">{more} more in the recording.</p>' if more > 0 else ""
+    return table((">time", "node", "text"), rows) + left
 
 
 def problem_list(problems: Sequence[str]) -> str:

@@ -53,6 +53,17 @@ def number(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}".strip() if abs(value) < 1e4 else f"{value:,.0f} {unit}".replace(",", " ")
 
 
+def interval(low: float, high: float, unit: str) -> str:
+    """Bounds as bounds: "at most 5.0 mm", "at least 20.0 mm", "520 J to 545 J"."""
+    if math.isinf(low) and math.isfinite(high):
+        return f"at most {number(high, unit)}"
+    if math.isinf(high) and math.isfinite(low):
+        return f"at least {number(low, unit)}"
+    if math.isfinite(low) and math.isfinite(high):
+        return f"{number(low, unit)} to {number(high, unit)}"
+    return DASH
+
+
 def mode_words(name: str) -> str:
     """A mode's name as words: "bus power off"."""
     return name.lower().replace("_", " ")

@@ -60,10 +60,11 @@
     hud.textContent = "";
     for (const [name, value] of rows()) {
       if (!value) continue;
-      const label = document.createElement("span"), content = document.createElement("b");
+      const item = document.createElement("div"), label = document.createElement("span"), content = document.createElement("b");
       label.textContent = name;
       content.textContent = value;
-      hud.append(label, content);
+      item.append(label, content);
+      hud.append(item);
     }
   });
 
@@ -73,6 +74,9 @@
       find(`show-${name}`).addEventListener("change", (e) => { motion.show[name] = e.target.checked; motion.schedule(); });
     }
   }
+
+  /* paper: everything that is folded away, charts at the width of the page */
+  addEventListener("beforeprint", () => { for (const part of document.querySelectorAll("details")) part.open = true; });
 
   /* light and dark */
   const repaint = () => { power.schedule(); clearance.schedule(); if (motion) motion.recolour(); };

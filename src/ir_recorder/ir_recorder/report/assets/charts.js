@@ -87,13 +87,14 @@ class TimeChart {
     this.tip.style.left = `${Math.min(event.clientX + 14, innerWidth - this.tip.offsetWidth - 8)}px`;
     this.tip.style.top = `${event.clientY + 16}px`;
   }
-  up() {
+  up(event) {
     const drag = this.drag;
     this.drag = null;
     if (!drag) return;
     if (Math.abs(drag.now - drag.start) < 5) this.timeline.seek(this.time(drag.start));
     else this.timeline.zoom(this.time(Math.min(drag.start, drag.now)), this.time(Math.max(drag.start, drag.now)));
     this.schedule();
+    this.move(event);
   }
   wheel(event) {
     if (!event.ctrlKey && !event.metaKey) return;

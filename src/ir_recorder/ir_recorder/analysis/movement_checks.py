@@ -1,0 +1,122 @@
+"""Checks of one step of the program: energy, duration, tool, clearance; each with the reason of its bound."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from ir_msgs_py.report import PlannedMovement
+from ir_recorder.analysis.finding import Finding, at_least, at_most, near, unchecked
+from ir_recorder.analysis.results import StepResult
+from ir_recorder.analysis.tolerances import Tolerances
+
+_PLAN = "planned from empty capacitors"
+
+
+def step_checks(result: StepResult, safety_distance: float, bounds: Tolerances) -> Iterator[Finding]:
+    """All checks of a movement or pause that ended; safety_distance [m]: S_m as recorded, NaN where not."""
+    name = f"{result.step.index + 1} {result.step.label}"
+    if result.step.movement.is_pause:
+        yield from _pause(name, result, bounds)
+        return
+    yield from _energy(name, result, bounds)
+    planned = result.step.movement.report.duration
+    if planned > 0.0:
+        why = "ends are extrapolated from states at 50 Hz"
+        yield near(f"duration of {name}", result.seconds, planned, bounds.duration, "s", why)
+    bound = max(bounds.indirect_relative * abs(result.energy), bounds.energy_absolute)
+    why = (
+        f"{_share(bounds.indirect_relative, bounds.energy_absolute)}, or the capacitors' charge at the start"
+    )
+    yield _between(
+        f"energy of {name} from joint states",
+        result.indirect_energy,
+        result.energy - bound,
+        result.energy + bound + _stored(result),
+        result.energy,
+        why,
+    )
+    why = "beyond it the planned clearance is no proof"
+    yield at_most(f"tool deviation on {name}", result.tool_deviation, bounds.tool_deviation, "m", why)
+    yield from _clearance(name, result, safety_distance, bounds)
+
+
+def _energy(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
+    planned, stored = result.step.movement.report.energy, _stored(result)
+    if planned <= 0.0:
+        yield unchecked(f"energy of {name}", "the movement carries no plan")
+        return
+    bound = max(bounds.energy_relative * planned, bounds.energy_absolute)
+    why = _share(bounds.energy_relative, bounds.energy_absolute)
+    if stored >= 1.0:
+        why += f"; less {stored:.0f} J that the capacitors held at the start ({_PLAN})"
+    name = f"energy of {name}"
+    yield _between(name, result.energy, planned - bound - stored, planned + bound, planned, why)
+
+
+def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
+    movement = result.step.movement
+    if movement.duration <= 0.0:
+        return  # a stop without a dwell: nothing is planned
+    why = "wake margin and answers of the nodes"
+    yield near(f"duration of {name}", result.seconds, movement.duration, bounds.pause_duration, "s", why)
+    if movement.report.energy <= 0.0:
+        yield unchecked(f"energy of {name}", "the pause carries no plan")
+        return
+    planned, stored = movement.report.energy, _stored(result)
+    if _rests(movement):
+        bound = bounds.energy_absolute + bounds.pause_duration * result.motors_power
+        why = f"{bounds.pause_duration:g} s less deep than planned, at {result.motors_power:.0f} W"
+    else:
+        planned *= result.seconds / movement.duration  # the duration is a check of its own
+        bound = max(bounds.energy_relative * planned, bounds.energy_absolute)
+        why = f"{_share(bounds.energy_relative, bounds.energy_absolute)} of the planned power"
+    if stored >= 1.0:
+        why += f"; less {stored:.0f} J that the capacitors held at the start"
+    name = f"energy of {name}"
+    yield _between(name, result.energy, planned - bound - stored, planned + bound, planned, why)
+
+
+def _clearance(name: str, result: StepResult, recorded: float, bounds: Tolerances) -> Iterator[Finding]:
+    near_ = result.clearance
+    if near_ is None:
+        yield unchecked(f"clearance on {name}", "cell or joint states are missing")
+        return
+    off = bounds.tool_deviation if math.isnan(result.tool_deviation) else result.tool_deviation
+    off = min(off, bounds.tool_deviation) + bounds.slack
+    kept, whose = kept_distance(result, recorded, bounds)
+    why = f"{whose} {kept * 1e3:.1f} mm, less {off * 1e3:.1f} mm that the tool was off its path"
+    where = f"{near_.least_pair} at {near_.least_time:.2f} s"
+    yield at_least(f"clearance on {name}", near_.least, kept - off, "m", why, where)
+    if math.isfinite(near_.contact_margin):
+        why = "excess over the own distance of pairs that may touch"
+        yield at_least(f"allowed contacts on {name}", near_.contact_margin, -off, "m", why)
+
+
+def kept_distance(result: StepResult, recorded: float, bounds: Tolerances) -> tuple[float, str]:
+    """The distance [m] that the executed clearance is held against, and its source.
+
+    S_m as it was recorded; else the clearance of a certified plan that comes nearer than the default S_m.
+    """
+    if not math.isnan(recorded):
+        return recorded, "safety distance of the plan"
+    planned = result.step.movement.report
+    if planned.certified and planned.min_clearance < bounds.safety_distance:
+        return planned.min_clearance, "clearance of the certified plan"
+    return bounds.safety_distance, "default safety distance (none is recorded)"
+
+
+def _rests(movement: PlannedMovement) -> bool:
+    return movement.power_mode not in ("", "STAND_ON_MOTORS")
+
+
+def _stored(result: StepResult) -> float:
+    return 0.0 if math.isnan(result.stored_energy) else result.stored_energy
+
+
+def _share(relative: float, absolute: float) -> str:
+    return f"{relative * 100.0:g} % or {absolute:g} J"
+
+
+def _between(name: str, measured: float, low: float, high: float, expected: float, reason: str) -> Finding:
+    return Finding(name, measured, low, high, "J", reason, expected)

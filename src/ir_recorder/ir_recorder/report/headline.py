@@ -1,0 +1,137 @@
+"""The top of the page: the source of the figures, the verdict, and what people look for first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
+from ir_recorder.format.contents import OWN_FACTS, VERSION
+from ir_recorder.report.words import DASH, joules, millimetres, number, percent, seconds, text, watts
+
+_STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One figure: its name, the value, and lines that explain it."""
+
+    name: str
+    value: str
+    notes: tuple[str, ...]
+
+    def html(self) -> str:
+        """As an element of the page."""
+        notes = "".join(f"<small>{text(note)}</small>" for note in self.notes if note)
+        return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'
+
+
+def subtitle(analysis: Analysis) -> str:
+    """File, start, length and energy of the whole recording."""
+    recording = analysis.recording
+    start = datetime.fromtimestamp(recording.start_ns * 1e-9, UTC)
+    version = recording.fact(VERSION)
+    return text(
+        f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, recorded {seconds(recording.duration)}, "
+        f"{joules(analysis.energy)} at the mains" + (f", recorder {version}" if version else "")
+    )
+
+
+def source(analysis: Analysis) -> str:
+    """Whether the figures are simulated, and by which plant."""
+    hardware = analysis.recording.hardware
+    if not hardware:
+        return '<p class="source open">plant not recorded</p>'
+    simulated = "simulated" in hardware
+    kind = "Simulated, not measured" if simulated else "Measured"
+    style = "simulated" if simulated else "measured"
+    return f'<p class="source {style}"><b>{kind}</b> {text(hardware.removesuffix(", simulated"))}</p>'
+
+
+def verdict(checks: Sequence[Finding]) -> str:
+    """The verdict over all checks; green only where every check was made and holds."""
+    kind, sentence = summary(tuple(checks))
+    words = sentence[0].upper() + sentence[1:]
+    return f'<p class="verdict {_STYLES[kind]}"><a href="#checks">{text(words)}</a></p>'
+
+
+def notes(analysis: Analysis) -> str:
+    """Facts of this run from the recorder's parameter, as shortened transitions."""
+    facts = [(key, value) for key, value in analysis.recording.facts if key not in OWN_FACTS]
+    if not facts:
+        return ""
+    items = "".join(f"<li>{text(key.replace('_', ' '))} <b>{text(value)}</b></li>" for key, value in facts)
+    return f'<ul class="notes"><li class="head">Settings of this run</li>{items}</ul>'
+
+
+def tiles(analysis: Analysis) -> str:
+    """The figures; those of the program where one was executed."""
+    program = analysis.program
+    shown = (
+        [_whole(program), _unshortened(program), *_parts(program)]
+        if program is not None
+        else [Tile("program", "none executed", ("figures of the whole recording only",)), _recorded(analysis)]
+    )
+    peak = Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
+    return "".join(tile.html() for tile in [*shown, peak, _clearance(analysis)] if tile is not None)
+
+
+def _recorded(analysis: Analysis) -> Tile:
+    note = f"mean {watts(analysis.mean_power)} over {seconds(analysis.seconds)}"
+    return Tile("energy at the mains", joules(analysis.energy), (note,))
+
+
+def _whole(program: ProgramTotals) -> Tile:
+    whole, shortened = program.whole, program.unshortened is not None
+    planned = program.planned_movements.energy + program.planned_pauses.energy
+    return Tile(
+        "this run, pauses shortened" if shortened else "program, one cycle",
+        joules(whole.energy),
+        (
+            f"{number(whole.energy / 3600.0, 'Wh')} in {seconds(whole.seconds)}",
+            f"planned {joules(planned)}, {_against(whole.energy, planned)}",
+        ),
+    )
+
+
+def _unshortened(program: ProgramTotals) -> Tile | None:
+    full = program.unshortened
+    if full is None:
+        return None
+    cut = f"pauses of {seconds(full.full_pauses)} instead of {seconds(full.run_pauses)}"
+    if math.isnan(full.energy):
+        return Tile("cycle with full pauses", "not known", ("the pauses of the run don't match the cell's",))
+    energy = f"{number(full.energy / 3600.0, 'Wh')} in {seconds(full.seconds)}"
+    return Tile(
+        "cycle with full pauses", joules(full.energy), (energy, cut, "computed from this run and the data")
+    )
+
+
+def _parts(program: ProgramTotals) -> list[Tile]:
+    parts = [
+        _part("movements", program.movements, program.planned_movements, program.whole),
+        _part("pauses", program.pauses, program.planned_pauses, program.whole),
+    ]
+    waiting = program.waiting
+    share = f"{percent(waiting.energy / program.whole.energy).lstrip('+')} of the run"
+    lines = (f"{seconds(waiting.seconds)}, {share}", "signals and answers; in no plan")
+    return [*parts, Tile("waiting between steps", joules(waiting.energy), lines)]
+
+
+def _part(name: str, measured: Share, planned: Share, whole: Share) -> Tile:
+    share = f"{percent(measured.energy / whole.energy).lstrip('+')} of the run"
+    against = f"planned {joules(planned.energy)}, {_against(measured.energy, planned.energy)}"
+    return Tile(name, joules(measured.energy), (f"{seconds(measured.seconds)}, {share}", against))
+
+
+def _against(measured: float, planned: float) -> str:
+    return f"measured {percent(measured / planned - 1.0)}" if planned > 0.0 else f"measured {DASH}"
+
+
+def _clearance(analysis: Analysis) -> Tile:
+    least = min((r.clearance.least for r in analysis.movements if r.clearance is not None), default=math.nan)
+    kept = analysis.safety_distance
+    bound = "safety distance not recorded" if math.isnan(kept) else f"safety distance {millimetres(kept)}"
+    return Tile("least clearance", millimetres(least), (bound, "executed, without pairs that may touch"))

@@ -1,0 +1,45 @@
+"""The top of the page is true at first sight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ir_recorder import Analysis, analyse, findings
+from ir_recorder.report import report_html
+from ir_recorder.report.headline import source, tiles, verdict
+
+
+def test_simulated_figures_are_labelled(analysis: Analysis, page: str) -> None:
+    assert "Simulated, not measured" in page
+    real = replace(analysis, recording=replace(analysis.recording, hardware="KR210"))
+    assert "Measured" in source(real)
+    assert "plant not recorded" in source(replace(analysis, recording=replace(real.recording, hardware="")))
+
+
+def test_a_run_without_a_program_says_so_and_is_not_green(analysis: Analysis) -> None:
+    bare = analyse(replace(analysis.recording, events=()))
+    top = report_html(bare, findings(bare)).split("<main>")[0]
+    assert 'class="verdict good"' not in top
+    assert 'class="verdict open"' in top
+    assert "not checked" in top
+    assert "none executed" in tiles(bare)
+
+
+def test_nothing_checked_is_not_checked() -> None:
+    assert "Nothing was checked" in verdict(())
+    assert "good" not in verdict(())
+
+
+def test_shortened_pauses_stand_beside_the_energy_of_the_full_cycle(analysis: Analysis) -> None:
+    facts = (("unshortened_pauses", "600 s, 1800 s"),)
+    shown = tiles(analyse(replace(analysis.recording, facts=facts)))
+    assert "this run, pauses shortened" in shown
+    assert "cycle with full pauses" in shown
+    assert "pauses of 40.0 min instead of 1.20 s" in shown
+    assert "pauses shortened" not in tiles(analysis)
+
+
+def test_pauses_are_in_the_headline(analysis: Analysis) -> None:
+    shown = tiles(analysis)
+    for name in ("movements", "pauses", "waiting between steps"):
+        assert f"<span>{name}</span>" in shown

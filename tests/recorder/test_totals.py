@@ -1,0 +1,49 @@
+"""Totals of the program, and the cycle with its pauses at full length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from ir_recorder import Analysis, analyse
+
+MOTORS, BUS_OFF = 735.0, 205.0  # W with the 155 kg gripper, Table II at machine home
+CHANGE = 23.0  # s into Bus Power Off and back, by the data
+
+
+def test_movements_pauses_and_waiting_are_the_whole_program(analysis: Analysis) -> None:
+    program = analysis.program
+    assert program is not None
+    parts = (program.movements, program.pauses, program.waiting)
+    assert sum(part.energy for part in parts) == pytest.approx(program.whole.energy)
+    assert sum(part.seconds for part in parts) == pytest.approx(program.whole.seconds)
+    assert program.planned_pauses.energy == pytest.approx(program.pauses.energy, rel=0.01)
+
+
+def test_the_full_cycle_costs_what_its_pauses_are_longer(analysis: Analysis) -> None:
+    """Both pauses of the run at 600 s: the posture is not home, so motors on cost a little more or less."""
+    facts = (("unshortened_pauses", "600 s, 600 s"),)
+    program = analyse(replace(analysis.recording, facts=facts)).program
+    assert program is not None
+    full = program.unshortened
+    assert full is not None
+    standing, resting = analysis.steps[2], analysis.steps[3]
+    assert full.seconds == pytest.approx(program.whole.seconds + 1200.0 - standing.seconds - resting.seconds)
+    more = full.energy - program.whole.energy + standing.energy + resting.energy
+    motors = standing.motors_power
+    assert motors == pytest.approx(MOTORS, rel=0.3)
+    assert more == pytest.approx(motors * 600.0 + motors * CHANGE + BUS_OFF * (600.0 - CHANGE), rel=1e-6)
+
+
+def test_a_run_that_does_not_match_has_no_computed_cycle(analysis: Analysis) -> None:
+    facts = (("unshortened_pauses", "600 s"),)
+    program = analyse(replace(analysis.recording, facts=facts)).program
+    assert program is not None
+    assert program.unshortened is not None
+    assert program.unshortened.energy != program.unshortened.energy  # not a number
+
+
+def test_without_the_fact_nothing_is_shortened(analysis: Analysis) -> None:
+    assert analysis.program is not None
+    assert analysis.program.unshortened is None
