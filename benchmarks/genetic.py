@@ -23,7 +23,7 @@ from ir_planner.checks.free_space import FreeSpace
 from ir_planner.request.work import Work
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.search.correction import Correction, corrected
-from ir_planner.search.genetic_settings import GeneticSettings
+from ir_planner.search.genetic import Genetic
 from ir_planner.search.shortcuts import fewest_corners, pulled
 
 DEFAULT = "default"
@@ -66,7 +66,7 @@ def straight_is_free(task: Task) -> bool:
     return bool(space_of(task).edges_free(task.start[None], task.goal[None])[0])
 
 
-def timed(task: Task, settings: GeneticSettings, seed: int) -> tuple[Correction, float, FreeSpace]:
+def timed(task: Task, settings: Genetic, seed: int) -> tuple[Correction, float, FreeSpace]:
     """A correction, its time in ms and the space it was charged to."""
     space = space_of(task)
     begin = time.process_time()
@@ -74,18 +74,18 @@ def timed(task: Task, settings: GeneticSettings, seed: int) -> tuple[Correction,
     return found, 1e3 * (time.process_time() - begin), space
 
 
-def searched(task: Task, settings: GeneticSettings, seed: int) -> Search:
+def searched(task: Task, settings: Genetic, seed: int) -> Search:
     """One seed."""
     _, first_ms, _ = timed(task, replace(settings, settle=0, ways=1), seed)
     found, all_ms, space = timed(task, settings, seed)
     work, weights = space.work.iterations, task.scene.weights
-    if not found.ways:
+    if not found.paths:
         return Search(False, first_ms, all_ms, 0, np.nan, np.nan, work)
     straight = float(movement_cost(weights, task.start, task.goal))
-    polished = [pulled(fewest_corners(path, space, weights), space, weights) for path in found.ways]
+    polished = [pulled(fewest_corners(path, space, weights), space, weights) for path in found.paths]
     cheapest = min(path_cost(weights, path) for path in polished)
-    raw = path_cost(weights, found.ways[0])
-    return Search(True, first_ms, all_ms, len(found.ways), raw / straight, cheapest / straight, work)
+    raw = path_cost(weights, found.paths[0])
+    return Search(True, first_ms, all_ms, len(found.paths), raw / straight, cheapest / straight, work)
 
 
 def row_of(cell: str, variant: str, searches: list[Search]) -> dict[str, Any]:
@@ -145,7 +145,7 @@ def main() -> None:
     for cell in given.cell or CELLS:
         tasks = [task for task in tasks_of(cell) if not straight_is_free(task)]
         for variant, changed in variants.items():
-            settings = GeneticSettings(**changed)
+            settings = Genetic(**changed)
             searches = [searched(task, settings, seed) for task in tasks for seed in range(given.seeds)]
             if searches:
                 rows.append(row_of(tasks[0].cell, variant, searches))

@@ -39,7 +39,7 @@ def test_a_value_out_of_range_is_named(changes, sentence):
 
 
 def test_the_table_of_the_documentation_has_a_row_per_setting():
-    table = settings_table(Oven, prefix="oven.").splitlines()
+    table = settings_table(Oven(), prefix="oven.").splitlines()
     assert table[0] == "| Parameter | Default | Unit | Range | Meaning |"
     assert table[2] == "| `oven.heat` | 180.0 | degC | 0 .. 250 degC | Temperature wanted. |"
     assert table[3] == "| `oven.racks` | 2 |  | at least 1 | Racks inside. Fixed at start. |"

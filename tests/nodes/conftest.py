@@ -17,10 +17,16 @@ Call = Callable[..., Any]
 
 
 @pytest.fixture
-def planner_node(ros_context: Any) -> Iterator[PlannerNode]:
-    """The node with the demonstration cell, spun by an executor of its own threads as in production."""
+def cell_name() -> str:
+    """The cell that the node starts with; a module may override it."""
+    return "demo"
+
+
+@pytest.fixture
+def planner_node(ros_context: Any, cell_name: str) -> Iterator[PlannerNode]:
+    """The node with a cell, spun by an executor of its own threads as in production."""
     node = PlannerNode(
-        context=ros_context, parameter_overrides=[Parameter("cell", Parameter.Type.STRING, "demo")]
+        context=ros_context, parameter_overrides=[Parameter("cell", Parameter.Type.STRING, cell_name)]
     )
     executor = MultiThreadedExecutor(num_threads=4, context=ros_context)
     executor.add_node(node)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
@@ -28,27 +24,6 @@ from ir_planner.node.node import PlannerNode
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 AWAY = np.radians([60.0, -90.0, 100.0, 0.0, 20.0, 0.0])
 LITTLE = PlanOptions(planning_time=60.0, max_iterations=60_000)
-
-
-@pytest.fixture
-def planner_node(ros_context: Any) -> Iterator[PlannerNode]:
-    """The node with the demonstration cell, spun by an executor of its own threads as in production."""
-    node = PlannerNode(
-        context=ros_context, parameter_overrides=[Parameter("cell", Parameter.Type.STRING, "demo")]
-    )
-    executor = MultiThreadedExecutor(num_threads=4, context=ros_context)
-    executor.add_node(node)
-
-    def spin() -> None:
-        with contextlib.suppress(ExternalShutdownException, ShutdownException):
-            executor.spin()
-
-    thread = threading.Thread(target=spin, daemon=True)
-    thread.start()
-    yield node
-    executor.shutdown(timeout_sec=5.0)
-    thread.join(5.0)
-    node.destroy_node()
 
 
 @pytest.fixture

@@ -622,6 +622,10 @@ def test_a_parameter_out_of_range_is_refused_and_the_value_kept(
     assert planner_node.planner.settings.max_iterations > 0
 
 
+def _genetic(node: PlannerNode) -> Any:
+    return node.planner.settings.searches["genetic"]
+
+
 def test_the_genetic_settings_are_parameters(
     planner_node: PlannerNode, call: Call, ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> None:
@@ -630,8 +634,8 @@ def test_the_genetic_settings_are_parameters(
         return call(SetParameters, "set_parameters", parameters=[parameter]).results[0]
 
     assert answer("population", 96).successful
-    wait_for(lambda: planner_node.planner.genetic.population == 96)
+    wait_for(lambda: _genetic(planner_node).population == 96)
     refused = answer("elite", 24)
     assert not refused.successful
     assert "must be less than population / islands, which is 24" in refused.reason
-    assert planner_node.planner.genetic.elite == 2
+    assert _genetic(planner_node).elite == 2

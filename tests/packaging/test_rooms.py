@@ -14,7 +14,7 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 ROOMS = {
     "ir_planner": (
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
-        "regional", "trajectories", "service", "program", "settings", "store", "planner", "node",
+        "regional", "trajectories", "service", "settings", "program", "store", "planner", "node",
     ),
 }  # fmt: skip
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,8 @@ from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 
 from ir_description import Cell, PowerData, load_cell, load_power_data
+
+sys.path.insert(0, str(Path(__file__).parent))  # asking.py
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asking import planned
 from ir_kernels.collision import FREE
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.options import PlanOptions
@@ -17,20 +18,20 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
 from ir_planner.errors import CancelledError
-from ir_planner.regional.regional import plan_regional
 from ir_planner.request.work import Work
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
 from ir_planner.search.correction import colliding_stretch, corrected, different
-from ir_planner.search.genetic_settings import GeneticSettings
-from ir_planner.search.population import _Breeder, evolve, way_matrix
+from ir_planner.search.genetic import Genetic
+from ir_planner.search.population import _Breeder, evolve, path_matrix
+from ir_planner.search.registry import SEARCHES
 from numpy.typing import NDArray
 
 from ir_description import cell_from_yaml, load_cell, load_power_data
 
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]
-SETTINGS = GeneticSettings()
+SETTINGS = Genetic()
 S_M = 0.02
 TASKS = [
     (cell, task.name, flip)
@@ -73,17 +74,17 @@ def test_every_task_of_the_open_cells_is_corrected_with_every_seed(
     for seed in range(30):
         space = space_of(scene)
         found = corrected(start, goal, space, SETTINGS, np.random.default_rng(seed))
-        assert found.ways, f"seed {seed}: {found.shortfall} m are missing"
-        assert 1 <= len(found.ways) <= SETTINGS.ways
-        costs = [path_cost(scene.weights, way) for way in found.ways]
+        assert found.paths, f"seed {seed}: {found.shortfall} m are missing"
+        assert 1 <= len(found.paths) <= SETTINGS.paths
+        costs = [path_cost(scene.weights, way) for way in found.paths]
         assert costs == sorted(costs)
         assert costs[0] >= float(movement_cost(scene.weights, start, goal)) * (1.0 - 1e-12)
-        for way in found.ways:
+        for way in found.paths:
             assert np.array_equal(way[[0, -1]], np.stack([start, goal]))
             assert ((way >= space.low) & (way <= space.high)).all()
             assert space.edges_free(way[:-1], way[1:]).all()
         if seed == 0:
-            assert min(clearance(way, scene) for way in found.ways) > S_M - PROOF_TOLERANCE
+            assert min(clearance(way, scene) for way in found.paths) > S_M - PROOF_TOLERANCE
 
 
 def test_a_free_straight_movement_is_left_as_it_is(scene_of: SceneOf) -> None:
@@ -91,17 +92,17 @@ def test_a_free_straight_movement_is_left_as_it_is(scene_of: SceneOf) -> None:
     start, goal = ends(scene, "home->p1")
     found = corrected(start, goal, space_of(scene), SETTINGS, np.random.default_rng(0))
     assert found.generations == 0
-    assert np.array_equal(found.ways[0], np.stack([start, goal]))
+    assert np.array_equal(found.paths[0], np.stack([start, goal]))
 
 
 def test_the_ways_are_different(scene_of: SceneOf) -> None:
     scene = scene_of("open")
     start, goal = ends(scene, "p1->p2")
     found = corrected(start, goal, space_of(scene), SETTINGS, np.random.default_rng(0))
-    assert len(found.ways) == SETTINGS.ways
-    assert different(found.ways, 10, SETTINGS.difference) == found.ways
-    bent = found.ways[0] + np.linspace(0.0, 0.1, len(found.ways[0]))[:, None]
-    assert len(different([found.ways[0], bent], 10, SETTINGS.difference)) == 1
+    assert len(found.paths) == SETTINGS.paths
+    assert different(found.paths, 10, SETTINGS.difference) == found.paths
+    bent = found.paths[0] + np.linspace(0.0, 0.1, len(found.paths[0]))[:, None]
+    assert len(different([found.paths[0], bent], 10, SETTINGS.difference)) == 1
 
 
 def test_only_the_stretch_that_collides_is_taken_out(scene_of: SceneOf) -> None:
@@ -138,7 +139,7 @@ def test_what_is_free_before_and_after_stays(scene_of: SceneOf) -> None:
     settings = replace(SETTINGS, margin=0.0)
     way = np.stack([start, goal])
     before, after = colliding_stretch(way, space.certificates(way[:1], way[1:]), space, 0.0)
-    for found in corrected(start, goal, space, settings, np.random.default_rng(3)).ways:
+    for found in corrected(start, goal, space, settings, np.random.default_rng(3)).paths:
         assert np.array_equal(found[: len(before)], before)
         assert np.array_equal(found[-len(after) :], after)
 
@@ -158,7 +159,7 @@ def test_a_way_with_two_colliding_stretches_gives_the_first(scene_of: SceneOf) -
 @pytest.mark.parametrize("shape", ["polyline", "spline"])
 @pytest.mark.parametrize("vias", [1, 2, 3])
 def test_a_way_runs_from_start_to_end_evenly_and_through_its_vias(shape: str, vias: int) -> None:
-    matrix = way_matrix(shape, vias, 25)
+    matrix = path_matrix(shape, vias, 25)
     assert matrix.sum(axis=1) == pytest.approx(np.ones(25))
     assert matrix[0] == pytest.approx(np.eye(vias + 2)[0], abs=1e-12)
     assert matrix[-1] == pytest.approx(np.eye(vias + 2)[-1], abs=1e-12)
@@ -171,7 +172,7 @@ def test_the_spline_of_an_individual_is_that_of_eq_10() -> None:
     points = rng.uniform(-1.0, 1.0, (4, 6))
     times = np.linspace(0.0, 1.0, 4)
     spline = to_ppoly(spline_through(points, times, virtual_knots(times)))
-    way = way_matrix("spline", 2, 200) @ points
+    way = path_matrix("spline", 2, 200) @ points
     fine = spline(np.linspace(0.0, 1.0, 40_001))
     nearest = [np.abs(fine - q).max(axis=1).min() for q in way]
     assert max(nearest) < 1e-3
@@ -185,7 +186,7 @@ def test_fitness_is_cost_plus_penalties_and_never_gets_worse(scene_of: SceneOf) 
     people = breeder._first()
     k = 7
     way = np.concatenate([start[None], people.vias[k], goal[None]])
-    points = way_matrix("polyline", SETTINGS.vias, SETTINGS.samples) @ way
+    points = path_matrix("polyline", SETTINGS.vias, SETTINGS.samples) @ way
     lack = np.maximum(space.threshold - scene.collision.distances(points[1:-1]), 0.0).max(axis=1)
     cost = path_cost(scene.weights, points) / float(movement_cost(scene.weights, start, goal))
     expected = cost + SETTINGS.clearance_penalty * lack.mean() + (lack.max() > 0.0)
@@ -233,8 +234,8 @@ def test_the_spline_of_eq_10_finds_ways_too(scene_of: SceneOf) -> None:
     start, goal = ends(scene, "tL->tR")
     space = space_of(scene)
     found = evolve(start, goal, space, settings, np.random.default_rng(0))
-    assert found.ways
-    for way in found.ways:
+    assert found.paths
+    for way in found.paths:
         assert len(way) == settings.samples
         assert space.edges_free(way[:-1], way[1:]).all()
 
@@ -246,7 +247,7 @@ def test_the_planner_genetic_answers_with_a_certified_movement_and_the_same_byte
     start, goal = ends(scene, "p1->p2")
 
     def plan(seed: int) -> Any:
-        return plan_regional(
+        return planned(
             start, goal, scene, replace(options, planner_id="genetic", seed=seed), a_budget(60_000)
         )
 
@@ -264,7 +265,7 @@ def test_settings_reach_the_planner(scene_of: SceneOf, options: PlanOptions) -> 
     start, goal = ends(scene, "side1->side2")
     by_name = replace(options, planner_id="genetic")
     few = replace(SETTINGS, population=4, islands=1, first=1, generations=1, attempts=1)
-    plan = plan_regional(start, goal, scene, by_name, a_budget(60_000), few)
+    plan = planned(start, goal, scene, by_name, a_budget(60_000), {**SEARCHES, "genetic": few})
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert "1 generations" in plan.status.message
 
@@ -291,7 +292,7 @@ def caged(budget: Work, degrees: Any, options: PlanOptions) -> Any:
     cell = cell_from_yaml(CAGE)
     scene = scene_with(cell, load_text(cell), load_power_data())
     home, across = degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0)
-    return plan_regional(home, across, scene, replace(options, planner_id="genetic"), budget)
+    return planned(home, across, scene, replace(options, planner_id="genetic"), budget)
 
 
 def test_a_failure_says_how_near_it_came_and_which_pair_blocks(degrees: Any, options: PlanOptions) -> None:
@@ -334,4 +335,4 @@ def test_a_cancel_is_heard_between_generations(degrees: Any, options: PlanOption
 )
 def test_settings_that_make_no_sense_are_refused_with_a_sentence(values: Any, sentence: str) -> None:
     with pytest.raises(ParameterError, match=sentence.replace(".", r"\.")):
-        GeneticSettings(**values)
+        Genetic(**values)

@@ -9,18 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from asking import planned
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.curves.uniform_spline import UniformSpline, along_path
 from ir_planner.errors import RequestError
 from ir_planner.optimize.refinement import Refinement, movement_over
-from ir_planner.regional.regional import plan_regional
-from ir_planner.request.context import Context
-from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.service.service_movement import plan_service
-from ir_planner.service.work_configurations import ServiceRequest
+from ir_planner.service.service_movement import ServiceRequest, plan_service
+from ir_planner.service.settings import WithdrawalSettings
 from ir_planner.timing.movement import timed_movement
 from ir_planner.timing.objective import objective_value, trajectory_value
 from numpy.typing import NDArray
@@ -120,7 +118,7 @@ def test_a_movement_at_the_joint_limits_stays_within_them(scene_of: SceneOf) -> 
     goal = np.radians([20.0, -100.0, 100.0, 0.0, 0.0, 0.0])
     start[3], goal[3] = robot.position_max[3], robot.position_max[3]
     start[5], goal[5] = robot.position_min[5], robot.position_min[5]
-    plan = plan_regional(start, goal, scene, PlanOptions(safety_distance=0.0), unhurried())
+    plan = planned(start, goal, scene, PlanOptions(safety_distance=0.0), unhurried())
     assert plan.status.ok, plan.status.message
     assert plan.trajectory is not None
     assert not plan.info.rejected
@@ -162,8 +160,7 @@ def test_a_station_s_contacts_hold_in_its_zone_only(scene_of: SceneOf) -> None:
     assert stations
     for station in stations[:2]:
         request = ServiceRequest(station, "exit", None, np.array(scene.cell.park), 1)
-        context = Context(scene, PlanOptions(), Journal(unhurried(), 0))
-        plan = plan_service(request, context)
+        plan = plan_service(request, scene, PlanOptions(), WithdrawalSettings(), unhurried())
         assert plan.status.ok, plan.status.message
         trajectory = plan.candidates[0].trajectory
         assert trajectory is not None

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asking import planned
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import CancelledError
-from ir_planner.regional.regional import plan_regional
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
 
@@ -40,7 +40,7 @@ def test_every_task_of_the_open_cells_is_solved_and_certified(
     scene = scene_of(cell)
     asked = scene.cell.task(task)
     start, goal = (asked.goal, asked.start) if flip else (asked.start, asked.goal)
-    plan = plan_regional(np.array(start), np.array(goal), scene, options, budget)
+    plan = planned(np.array(start), np.array(goal), scene, options, budget)
     assert plan.status.ok, plan.status.message
     assert plan.trajectory is not None
     assert plan.report.certified
@@ -58,7 +58,7 @@ def test_trees_find_the_way_out_where_detours_do_not(
     scene = scene_of(cell)
     asked = scene.cell.task(task)
     tree = replace(options, planner_id="tree")
-    plan = plan_regional(np.array(asked.start), np.array(asked.goal), scene, tree, budget)
+    plan = planned(np.array(asked.start), np.array(asked.goal), scene, tree, budget)
     assert plan.status.ok, plan.status.message
     assert plan.report.certified
     assert plan.info.planner_id == "tree"
@@ -71,10 +71,10 @@ def test_a_tunnel_is_left_the_way_the_tool_points(
 ) -> None:
     scene = scene_of("deep_box")
     asked = scene.cell.task("tun->bin")
-    drawn = replace(options, planner_id="retreat")
-    plan = plan_regional(np.array(asked.start), np.array(asked.goal), scene, drawn, budget)
+    drawn = replace(options, planner_id="retract")
+    plan = planned(np.array(asked.start), np.array(asked.goal), scene, drawn, budget)
     assert plan.status.ok, plan.status.message
-    assert plan.info.planner_id == "retreat"
+    assert plan.info.planner_id == "retract"
     assert plan.report.certified
     assert plan.trajectory is not None
     assert clearance_along(plan.trajectory, scene) > 0.02 - PROOF_TOLERANCE
@@ -89,9 +89,7 @@ def test_the_same_request_gives_the_same_bytes_and_the_seed_is_echoed(
     def plan(seed: int) -> Any:
         budget = Work(60_000, time.monotonic() + 60.0, time.monotonic)
         fresh = scene_with(scene.cell, scene.load_text, scene.power)
-        return plan_regional(
-            np.array(task.start), np.array(task.goal), fresh, replace(options, seed=seed), budget
-        )
+        return planned(np.array(task.start), np.array(task.goal), fresh, replace(options, seed=seed), budget)
 
     first, second, other = plan(5), plan(5), plan(6)
     assert first.trajectory.trajectory_id == second.trajectory.trajectory_id
@@ -113,7 +111,7 @@ def test_an_end_in_collision_is_named_with_pair_and_depth(
 ) -> None:
     home, inside = np.array(demo_scene.cell.machine_home), degrees(0, -20, 60, 0, 0, 0)
     start, goal = (inside, home) if which == "start" else (home, inside)
-    plan = plan_regional(start, goal, demo_scene, options, budget)
+    plan = planned(start, goal, demo_scene, options, budget)
     assert plan.status.code == code
     assert which in plan.status.message
     assert "penetration: distance -" in plan.status.message
@@ -145,7 +143,7 @@ def test_where_no_way_leads_the_pair_the_place_and_what_was_tried_are_named(
     scene = scene_with(cell, load_text(cell), load_power_data())
     budget = Work(2000, time.monotonic() + 60.0, time.monotonic)
     home, across = degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0)
-    plan = plan_regional(home, across, scene, options, budget)
+    plan = planned(home, across, scene, options, budget)
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert "tree (nothing free, the trees came within" in plan.status.message
     assert any(name in plan.status.message for name in ("left", "right"))
@@ -158,7 +156,7 @@ def test_a_blocked_way_says_what_was_tried(demo_scene: PlanningScene, options: P
     scene = scene_with(cell, load_text(cell), demo_scene.power)
     task = cell.task("p1->p2")
     budget = Work(60_000, time.monotonic() + 60.0, time.monotonic)
-    plan = plan_regional(
+    plan = planned(
         np.array(task.start), np.array(task.goal), scene, replace(options, planner_id="direct"), budget
     )
     assert plan.status.code == StatusCode.PLANNING_FAILED
@@ -171,7 +169,7 @@ def test_planning_time_cuts_a_search_and_says_truncated(scene_of: SceneOf, optio
     task = scene.cell.task("p1->p2")
     clock = iter(range(10_000))
     budget = Work(60_000, 0.5, lambda: float(next(clock)))
-    plan = plan_regional(
+    plan = planned(
         np.array(task.start), np.array(task.goal), scene, replace(options, planner_id="tree"), budget
     )
     assert plan.status.code == StatusCode.PLANNING_FAILED
@@ -185,7 +183,7 @@ def test_a_cancelled_search_stops(scene_of: SceneOf, options: PlanOptions) -> No
     asked = iter([False] * 3 + [True] * 10_000)
     budget = Work(60_000, time.monotonic() + 60.0, time.monotonic, lambda: next(asked))
     with pytest.raises(CancelledError):
-        plan_regional(np.array(task.start), np.array(task.goal), scene, options, budget)
+        planned(np.array(task.start), np.array(task.goal), scene, options, budget)
 
 
 def test_a_safety_distance_of_zero_is_taken_literally(
@@ -193,7 +191,7 @@ def test_a_safety_distance_of_zero_is_taken_literally(
 ) -> None:
     scene = scene_of("table_columns")
     task = scene.cell.task("tL->tR")
-    plan = plan_regional(
+    plan = planned(
         np.array(task.start), np.array(task.goal), scene, replace(options, safety_distance=0.0), budget
     )
     assert plan.status.ok

@@ -13,13 +13,11 @@ from ir_msgs_py.report import DistancePair, PlannedMovement, PlanningInfo, Plann
 from ir_msgs_py.candidates import IkSolution
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 
 from ir_description import Cell, PowerData, cell_from_yaml, load_cell, load_power_data
 from ir_planner.checks import Evaluation, evaluate_trajectory, nearest_pairs, too_near_sentence
 from ir_planner.configurations import (
     STARTS_MAX,
-    InteractionSettings,
     free_configurations,
     no_configuration,
     ranked_solutions,
@@ -41,9 +39,7 @@ from ir_planner.request import (
     within_limits,
 )
 from ir_planner.scene import PlanningScene, load_text, scene_with
-from ir_planner.search import GeneticSettings
 from ir_planner.service import (
-    ModifiedGa,
     ServicePlan,
     ServiceRequest,
     checked_request,
@@ -98,19 +94,11 @@ class Planner:
         self,
         clock: Clock,
         settings: PlannerSettings | None = None,
-        pauses: TransitionTimes | None = None,
         power: PowerData | None = None,
-        interaction: InteractionSettings | None = None,
-        withdrawal: ModifiedGa | None = None,
-        genetic: GeneticSettings | None = None,
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
-        self.pauses = pauses or TransitionTimes()
         self.power = power or load_power_data()
-        self.interaction = interaction or InteractionSettings()
-        self.withdrawal = withdrawal or ModifiedGa()
-        self.genetic = genetic or GeneticSettings()
         self._cell: Cell | None = None
         # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
         self._scenes: dict[tuple[str, str], tuple[Cell, PlanningScene]] = {}
@@ -165,7 +153,7 @@ class Planner:
         key = load or load_text(cell), self.settings.regeneration
         known, scene = self._scenes.get(key, (None, None))
         if scene is None or known is not cell:
-            scene = scene_with(cell, key[0], self.power, self.settings.regeneration)  # type: ignore[arg-type]
+            scene = scene_with(cell, key[0], self.power, self.settings.braking_energy)
             self._scenes[key] = cell, scene
         return scene
 
@@ -220,7 +208,7 @@ class Planner:
                 found = free_configurations(goal.pose, scene, threshold, near)
             else:
                 found = searched_configurations(
-                    goal.pose, scene, threshold, near, starts, seed, self.interaction, journal.work
+                    goal.pose, scene, threshold, near, starts, seed, self.settings.interaction, journal.work
                 )
             notes.append(f"{found.reached} reach the pose")
         journal.rejected.update(found.rejected)
@@ -242,7 +230,9 @@ class Planner:
     def standby(self, pause: float, q: FloatArray | None, load: str) -> Standby:
         """The power mode of least energy for a pause [s] at q (n,), None: machine home."""
         scene = self.scene(load)
-        return plan_standby(pause, scene.cell.machine_home if q is None else q, scene, self.pauses)
+        return plan_standby(
+            pause, scene.cell.machine_home if q is None else q, scene, self.settings.transitions
+        )
 
     # -- plans -----------------------------------------------------------------------------------------------
 
@@ -250,10 +240,10 @@ class Planner:
         self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER
     ) -> MovementPlan:
         """Movement from start (n,) to a goal; a pose is reached in the configuration that serves best."""
-        options, note = checked_options(options)
+        options, note = self._checked(options)
         scene = self.scene(options.load)
         start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
-        work = self._work(options, cancelled)
+        journal = Journal(self._work(options, cancelled), options.seed)
         if goal.configuration is not None:
             candidates = goal.configuration[None]
         else:
@@ -262,10 +252,11 @@ class Planner:
             found = free_configurations(goal.pose, scene, threshold, start)
             if len(found.q) == 0:
                 status = no_configuration(goal.pose, scene, found, goal.text or "goal")
-                info = Journal(work, options.seed).info(start, scene.cell.robot.joint_names)
+                info = journal.info(start, scene.cell.robot.joint_names)
                 return MovementPlan(status, info, TrajectoryReport())
             candidates = found.q
-        plan = plan_regional(start, candidates, scene, options, work, self.genetic)
+        context = Context(scene, options, journal)
+        plan = plan_regional(start, candidates, context, self.settings.searches)
         return self._kept(plan, note)
 
     def plan_service(
@@ -292,7 +283,7 @@ class Planner:
         request = ServiceRequest(scene.station(station), direction, configuration, near, max_candidates)
         options = replace(options, planner_id=method)
         context = Context(scene, options, Journal(self._work(options, cancelled), options.seed))
-        plan = plan_service(request, context, exit_searches(self.withdrawal))
+        plan = plan_service(request, context, exit_searches(self.settings.withdrawal))
         for candidate in plan.candidates:
             if candidate.trajectory is not None:
                 self.trajectories.add(candidate.trajectory)
@@ -302,7 +293,7 @@ class Planner:
         self, reference: Reference, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER
     ) -> MovementPlan:
         """Trajectory through points."""
-        options, note = checked_options(options)
+        options, note = self._checked(options)
         scene = self.scene(options.load)
         return self._kept(plan_through(reference, scene, options, self._work(options, cancelled)), note)
 
@@ -313,11 +304,11 @@ class Planner:
         cancelled: Callable[[], bool] = _NEVER,
     ) -> OptimizationPlan:
         """A trajectory made cheaper between its end points, with the trade of time for energy."""
-        options, note = checked_options(options or PlanOptions())
+        options, note = self._checked(options or PlanOptions())
         scene = self.scene(options.load)
         names = scene.cell.robot.joint_names
         work = self._work(options, cancelled)
-        plan = optimize_trajectory(trajectory.reordered(names), scene, options, work)
+        plan = optimize_trajectory(trajectory.reordered(names), scene, options, work, self.settings.searches)
         for point in plan.front:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:
@@ -334,7 +325,7 @@ class Planner:
         cancelled: Callable[[], bool] = _NEVER,
     ) -> ProgramPlan:
         """The cell's program, or a visit of stations, from start (n,)."""
-        options, note = checked_options(options)
+        options, note = self._checked(options)
         cell = self.cell
         start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
         request = ProgramRequest(
@@ -344,10 +335,7 @@ class Planner:
             start,
             options,
             bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s"),
-            self.settings.regeneration,  # type: ignore[arg-type]
-            self.pauses,
-            self.withdrawal,
-            self.genetic,
+            self.settings,
         )
         movements = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._work(options, cancelled, movements), progress)
@@ -362,6 +350,10 @@ class Planner:
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
         return replace(plan, info=_noted(plan.info, note))
+
+    def _checked(self, options: PlanOptions) -> tuple[PlanOptions, str]:
+        chosen(options.planner_id, ("", *self.settings.searches), "planner_id")
+        return checked_options(options)
 
     def _work(self, options: PlanOptions, cancelled: Callable[[], bool], movements: int = 1) -> Work:
         most = (options.max_iterations or self.settings.max_iterations) * movements

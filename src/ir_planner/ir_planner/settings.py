@@ -1,13 +1,23 @@
-"""Settings of the planner, one class per stage; ROS parameters and the documentation derive from them."""
+"""Settings of the planner as one tree; ROS parameters and the documentation derive from it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import cast
 
-from ir_msgs_py.settings import check_settings, setting
+from ir_kernels.power import Regeneration
+from ir_msgs_py.settings import check_settings, setting, stage
+from ir_msgs_py.transitions import TransitionTimes
+
+from ir_planner.configurations import InteractionSettings
+from ir_planner.search import Search, registered
+from ir_planner.service import ModifiedGa
 
 
 @dataclass(frozen=True)
 class PlannerSettings:
-    """Budgets, memory and what the drives' bus does with braking energy."""
+    """Work, memory and what the drives' bus does with braking energy; the settings of the stages, and every
+    registered search by its name.
+    """
 
     max_iterations: int = setting(
         400_000,
@@ -43,5 +53,15 @@ class PlannerSettings:
         "", "Cell file or bundled cell to start with; empty: wait for set_cell.", read_only=True
     )
 
+    transitions: TransitionTimes = stage(TransitionTimes)
+    interaction: InteractionSettings = stage(InteractionSettings)
+    withdrawal: ModifiedGa = stage(ModifiedGa)
+    searches: Mapping[str, Search] = stage(registered)
+
     def __post_init__(self) -> None:
         check_settings(self)
+
+    @property
+    def braking_energy(self) -> Regeneration:
+        """The choice of `regeneration`, as the kernels take it."""
+        return cast(Regeneration, self.regeneration)

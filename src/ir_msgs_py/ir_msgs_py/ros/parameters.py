@@ -17,14 +17,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ir_msgs_py.errors import MsgsError, ParameterError
-from ir_msgs_py.settings import Setting, describe
+from ir_msgs_py.settings import Setting, changed, tree
 
 T = TypeVar("T")
 _INT64 = 2**63
 
 
 class Parameters(Generic[T]):
-    """The parameters of one settings class on a node; `value` is what they say now.
+    """The parameters of one settings class, its stages included, on a node; `value` is what they say now.
 
     prefix: put before each name ("search."). read_only: all are fixed at the start, also those that the class
     lets change. refuse: asked with the names to be changed, returns the reason why not now ("" = go on), for
@@ -46,12 +46,13 @@ class Parameters(Generic[T]):
         self._prefix = prefix
         self._refuse = refuse
         self._on_change = on_change
+        defaults = settings_class()
         self._settings = {
-            each.name: replace(each, read_only=read_only or each.read_only)
-            for each in describe(settings_class)
+            name: replace(each, read_only=read_only or each.read_only)
+            for name, each in tree(defaults).items()
         }
-        started_with = {each.name: self._declare(node, each) for each in self._settings.values()}
-        self._value = settings_class(**started_with)
+        started_with = {name: self._declare(node, name, each) for name, each in self._settings.items()}
+        self._value = changed(defaults, started_with)
         self._check(started_with.items())
         node.add_on_set_parameters_callback(self._answer)
         node.add_post_set_parameters_callback(self._take)
@@ -61,13 +62,13 @@ class Parameters(Generic[T]):
         """The settings in force."""
         return self._value
 
-    def _declare(self, node: Node, each: Setting) -> Any:
+    def _declare(self, node: Node, name: str, each: Setting) -> Any:
         try:
-            parameter = node.declare_parameter(self._prefix + each.name, _default(each), _descriptor(each))
+            parameter = node.declare_parameter(self._prefix + name, _default(each), _descriptor(each))
         except InvalidParameterTypeException as error:
-            raise ParameterError(f"{self._prefix}{each.name}: {error}") from error
+            raise ParameterError(f"{self._prefix}{name}: {error}") from error
         except InvalidParameterValueException as error:
-            raise ParameterError(f"{self._prefix}{each.name} must be {each.bounds}: {error}") from error
+            raise ParameterError(f"{self._prefix}{name} must be {each.bounds}: {error}") from error
         return _plain(parameter.value)
 
     def _mine(self, parameters: Iterable[Parameter]) -> dict[str, Any]:
@@ -91,7 +92,7 @@ class Parameters(Generic[T]):
             return SetParametersResult(successful=False, reason=reason)
         try:
             self._check(changes.items())
-            replace(self._value, **changes)  # type: ignore[type-var]
+            changed(self._value, changes)
         except (MsgsError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -99,7 +100,7 @@ class Parameters(Generic[T]):
     def _take(self, parameters: list[Parameter]) -> None:
         changes = self._mine(parameters)
         if changes:
-            self._value = replace(self._value, **changes)  # type: ignore[type-var]
+            self._value = changed(self._value, changes)
             self._on_change(self._value)
 
 

@@ -32,11 +32,11 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.ros.conversions import configuration_from_msg, pose_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -52,13 +52,10 @@ from ir_description import DescriptionError
 from ir_kernels import compiled
 from ir_msgs_py import names
 from ir_planner.checks import Shape, cell_shapes, movement_shapes
-from ir_planner.configurations import InteractionSettings
 from ir_planner.node.inputs import LastState, measured_velocity
-from ir_planner.node.parameters import PlannerParameters
 from ir_planner.node.requests import Requests
 from ir_planner.planner import Planner
-from ir_planner.search import GeneticSettings
-from ir_planner.service import ModifiedGa, ServicePlan, service_shapes
+from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
 _MARKER = {
@@ -78,24 +75,14 @@ class PlannerNode(Node):
 
     def __init__(
         self,
-        make_planner: Callable[[PlannerSettings, TransitionTimes], Planner] | None = None,
+        make_planner: Callable[[PlannerSettings], Planner] | None = None,
         context: Context | None = None,
         **options: Any,
     ) -> None:
         super().__init__(names.PLANNER, context=context, **options)
-        parameters = PlannerParameters(
-            self,
-            self._change_settings,
-            self._change_pauses,
-            self._change_interaction,
-            self._change_withdrawal,
-            self._change_genetic,
-        )
-        make = make_planner or (lambda settings, pauses: Planner(time.monotonic, settings, pauses))
-        self.planner = make(parameters.planner, parameters.pauses)
-        self._change_interaction(parameters.interaction)
-        self._change_withdrawal(parameters.withdrawal)
-        self._change_genetic(parameters.genetic)
+        parameters = Parameters(self, PlannerSettings, on_change=self._change_settings)
+        make = make_planner or (lambda settings: Planner(time.monotonic, settings))
+        self.planner = make(parameters.value)
         self._last_state = LastState(look=self._look)
         self._requests = Requests(
             self.planner,
@@ -118,7 +105,7 @@ class PlannerNode(Node):
         self._offer()
         self._states = LatestMessage(self, JointState, names.JOINT_STATES)
         self.create_timer(1.0, self._diagnose, callback_group=self._quick)
-        self._load_first_cell(parameters.planner.cell)
+        self._load_first_cell(parameters.value.cell)
 
     def _offer(self) -> None:
         """Advertise what works."""
@@ -186,18 +173,6 @@ class PlannerNode(Node):
 
     def _change_settings(self, settings: PlannerSettings) -> None:
         self.planner.settings = settings
-
-    def _change_pauses(self, pauses: TransitionTimes) -> None:
-        self.planner.pauses = pauses
-
-    def _change_interaction(self, settings: InteractionSettings) -> None:
-        self.planner.interaction = settings
-
-    def _change_withdrawal(self, settings: ModifiedGa) -> None:
-        self.planner.withdrawal = settings
-
-    def _change_genetic(self, settings: GeneticSettings) -> None:
-        self.planner.genetic = settings
 
     def _load_first_cell(self, cell: str) -> None:
         if not cell:

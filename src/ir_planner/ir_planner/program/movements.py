@@ -8,10 +8,9 @@ from ir_planner.program.assembly import Leg
 from ir_planner.program.request import StageError
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import Node
-from ir_planner.regional import search_regional
+from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context, Journal
 from ir_planner.scene import STILL
-from ir_planner.search import GeneticSettings
 from ir_planner.service import timed_service
 from ir_planner.timing import TimedMovement
 
@@ -19,8 +18,8 @@ from ir_planner.timing import TimedMovement
 class Movements:
     """Movements between configurations at the stops of a route, by the objective of `context`."""
 
-    def __init__(self, route: Route, context: Context, genetic: GeneticSettings) -> None:
-        self.route, self.context, self.genetic = route, context, genetic
+    def __init__(self, route: Route, context: Context, searches: Searches) -> None:
+        self.route, self.context, self.searches = route, context, searches
         self._across: dict[tuple[int, int, int], TimedMovement] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
@@ -31,14 +30,8 @@ class Movements:
         key = (place, id(first), id(second))
         if key not in self._across:
             journal = Journal(self.context.work, self.context.journal.seed)
-            status, found = search_regional(
-                first.outside,
-                second.outside,
-                self.route.arriving(place),
-                self.context.options,
-                journal,
-                self.genetic,
-            )
+            context = Context(self.route.arriving(place), self.context.options, journal)
+            status, found = search_regional(first.outside, second.outside, context, self.searches)
             self.context.journal.rejected.update(journal.rejected)
             if found is None:
                 first_name = self.route.name(place - 1) or "the start"

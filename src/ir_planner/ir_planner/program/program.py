@@ -31,7 +31,8 @@ def plan_program(request: ProgramRequest, work: Work, progress: Progress) -> Pro
     request.check()
     cell, journal = request.cell, Journal(work, request.options.seed)
     steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start())
-    scenes = Scenes(cell, request.power, request.regeneration, request.options.load == NO_LOAD)
+    bare = request.options.load == NO_LOAD
+    scenes = Scenes(cell, request.power, request.settings.braking_energy, bare)
     route = Route.over(steps, scenes)
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)
     try:
@@ -63,16 +64,16 @@ def _planned(
     request: ProgramRequest, route: Route, context: Context, progress: Progress
 ) -> tuple[PlannedMovement, ...]:
     """Movements and pauses in order. Raises StageError where a stage finds nothing."""
-    layers = layers_of(route, request.start, context, exit_searches(request.withdrawal), progress)
-    movements = Movements(route, context, request.genetic)
+    layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
+    movements = Movements(route, context, request.settings.searches)
     chain, cost = cheapest_chain(layers, movements, context, progress)
     legs = _legs(movements, chain, progress, cost)
 
     def assemble(legs: Legs) -> tuple[PlannedMovement, ...]:
-        return assembled(route.steps, legs, route.scenes, request.pauses, request.start)
+        return assembled(route.steps, legs, route.scenes, request.settings.transitions, request.start)
 
     def hurried() -> Legs:
-        faster = Movements(route, context.asking("time"), request.genetic)
+        faster = Movements(route, context.asking("time"), request.settings.searches)
         return _legs(faster, chain, progress, cost)
 
     if request.cycle_time > 0.0:

@@ -3,18 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-from ir_msgs_py.transitions import TransitionTimes
 
 from ir_description import Cell, PowerData
 from ir_planner.errors import RequestError
-from ir_planner.search import GeneticSettings
-from ir_planner.service import ModifiedGa
+from ir_planner.settings import PlannerSettings
 
 Progress = Callable[[str, int, int, float], None]  # phase, done, total, cost of the best chain
 
@@ -42,10 +39,7 @@ class ProgramRequest:
     start: FloatArray
     options: PlanOptions
     cycle_time: float = 0.0
-    regeneration: Regeneration = "shared"
-    pauses: TransitionTimes = field(default_factory=TransitionTimes)
-    withdrawal: ModifiedGa = field(default_factory=ModifiedGa)
-    genetic: GeneticSettings = field(default_factory=GeneticSettings)
+    settings: PlannerSettings = field(default_factory=PlannerSettings)
 
     def check(self) -> None:
         """Raise RequestError for options that a program doesn't take."""

@@ -8,7 +8,6 @@ from ir_msgs_py.status import StatusCode
 
 from ir_planner.errors import RequestError
 
-PLANNERS = ("", "direct", "detours", "retreat", "tree", "genetic")
 SAFETY_DISTANCE_MAX = 1.0  # m
 DURATION_MAX = 3600.0  # s
 SCALING_MIN = 1e-6
@@ -49,7 +48,6 @@ def safety_distance(value: float) -> float:
 
 def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:
     """The options within the planner's bounds, and a note where planning_time was capped ("" else)."""
-    chosen(options.planner_id, PLANNERS, "planner_id")
     safety_distance(options.safety_distance)
     bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
     bounded(options.duration, 0.0, DURATION_MAX, "duration", "s")

@@ -1,18 +1,19 @@
-"""Searches for free paths between configurations."""
+"""Searches for free paths between configurations: one port, one file each, one registry."""
 
-from ir_planner.search.genetic_settings import GeneticSettings
-from ir_planner.search.searches import BY_NAME_ONLY, EXPLORERS, SEARCHES, Ends
+from ir_planner.search.port import Ends, Found, Search, quick
+from ir_planner.search.registry import SEARCHES, registered
 from ir_planner.search.shortcuts import fewest_corners, pulled
 from ir_planner.search.tree import connect, joint_scale
 
 __all__ = [
-    "BY_NAME_ONLY",
-    "EXPLORERS",
     "SEARCHES",
     "Ends",
-    "GeneticSettings",
+    "Found",
+    "Search",
     "connect",
     "fewest_corners",
     "joint_scale",
     "pulled",
+    "quick",
+    "registered",
 ]

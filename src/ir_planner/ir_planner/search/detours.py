@@ -1,60 +1,38 @@
-"""Simple ways round: over the named postures, with the arm drawn back first, or over one configuration
-beside.
+"""Simple detours: over the named postures, with the arm retracted, over scattered via configurations."""
 
-Candidates are generated in one go and judged in one batch; which of them are free is another question.
-"""
+from dataclasses import dataclass
 
 import numpy as np
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.settings import check_settings, setting
 
-_SHARES = (0.25, 0.5, 0.75, 1.0)
-_SPREADS = (0.15, 0.35, 0.7)  # rad: how far vias are scattered around the straight movement
-
-
-def over_postures(start: FloatArray, goal: FloatArray, postures: list[FloatArray]) -> list[FloatArray]:
-    """Paths (3, n) over each posture, and over each turned to where start, goal or the middle look."""
-    paths = []
-    for posture in postures:
-        paths.append(np.stack([start, posture, goal]))
-        for first in (start[0], goal[0], 0.5 * (start[0] + goal[0])):
-            turned = posture.copy()
-            turned[0] = first
-            paths.append(np.stack([start, turned, goal]))
-    return paths
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.search.port import Ends, Found
+from ir_planner.search.variety import NEAREST_GOALS, different_paths
+from ir_planner.search.vias import over_postures, over_retracted_arm, scattered
 
 
-def drawn_back(start: FloatArray, goal: FloatArray, postures: list[FloatArray]) -> list[FloatArray]:
-    """Paths (4, n) and (3, n): draw the arm back towards a posture, turn, and reach out again.
+@dataclass(frozen=True)
+class Detours:
+    """Simple detours over one or two via configurations, all certified in one batch."""
 
-    Once with all joints but the first, once with the arm (joints 2 and 3) alone.
-    """
-    n = len(start)
-    arm = np.zeros(n, dtype=bool)
-    arm[1:3] = True
-    rest = np.ones(n, dtype=bool)
-    rest[0] = False
-    paths = []
-    for posture in postures:
-        for joints in (rest, arm):
-            for share in _SHARES:
-                back = [q + share * np.where(joints, posture - q, 0.0) for q in (start, goal)]
-                paths.append(np.stack([start, *back, goal]))
-                middle = 0.5 * (back[0] + back[1])
-                paths.append(np.stack([start, middle, goal]))
-    return paths
+    vias: int = setting(160, "Scattered via configurations per goal.", minimum=1, maximum=100_000)
 
+    def __post_init__(self) -> None:
+        check_settings(self)
 
-def scattered(
-    start: FloatArray,
-    goal: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    count: int,
-    rng: np.random.Generator,
-) -> list[FloatArray]:
-    """`count` paths (3, n) over vias scattered around the straight movement, within the limits."""
-    along = rng.uniform(0.2, 0.8, (count, 1))
-    spread = rng.choice(_SPREADS, (count, 1))
-    vias = start + along * (goal - start) + spread * rng.standard_normal((count, len(start)))
-    vias = np.clip(vias, low, high)
-    return [np.stack([start, via, goal]) for via in vias]
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        """Certify the candidates to the nearest goals."""
+        cell = space.scene.cell
+        postures = [np.array(cell.park), np.array(cell.machine_home)]
+        rng = np.random.default_rng(seed)
+        candidates: list[FloatArray] = []
+        for goal in ends.goals[:NEAREST_GOALS]:
+            candidates += over_postures(ends.start, goal, postures)
+            candidates += over_retracted_arm(ends.start, goal, postures)
+            candidates += scattered(ends.start, goal, space.low, space.high, self.vias, rng)
+        candidates = [np.clip(path, space.low, space.high) for path in candidates]
+        free = space.paths_free(candidates)
+        paths = [path for path, is_free in zip(candidates, free, strict=True) if is_free]
+        return Found(different_paths(paths, space.scene.weights))

@@ -20,16 +20,19 @@ class GeneticSettings:
     vias: int = setting(2, "Via configurations that replace a stretch.", minimum=1, maximum=8)
     population: int = setting(48, "Individuals, all islands together.", minimum=4, maximum=1000)
     islands: int = setting(
-        4, "Parts of the population that breed apart: ways round that may differ.", minimum=1, maximum=64
+        4,
+        "Parts of the population that breed apart, perhaps in other homotopy classes.",
+        minimum=1,
+        maximum=64,
     )
     generations: int = setting(20, "Generations before a stretch is given up.", minimum=1, maximum=10_000)
-    settle: int = setting(4, "Generations that follow the first free way.", minimum=0, maximum=10_000)
+    settle: int = setting(4, "Generations that follow the first free path.", minimum=0, maximum=10_000)
     first: int = setting(
         2, "Random individuals that are drawn for one in the first generation.", minimum=1, maximum=8
     )
     samples: int = setting(
         24,
-        "Configurations of an individual's way that are checked; more with every further attempt.",
+        "Configurations of an individual's path that are checked; more with every further attempt.",
         minimum=4,
         maximum=SAMPLES_MAX,
     )
@@ -72,11 +75,11 @@ class GeneticSettings:
         0.6, "Share of the stretch's length added at both ends.", minimum=0.0, maximum=10.0
     )
     attempts: int = setting(6, "Times a stretch is tried, each time wider.", minimum=1, maximum=50)
-    stretches: int = setting(6, "Stretches of one way that are corrected.", minimum=1, maximum=1000)
-    ways: int = setting(3, "Different ways round that are looked for.", minimum=1, maximum=64)
+    stretches: int = setting(6, "Stretches of one path that are corrected.", minimum=1, maximum=1000)
+    paths: int = setting(3, "Different homotopy classes that are looked for.", minimum=1, maximum=64)
 
     difference: float = setting(
-        0.3, "Ways that are nowhere farther apart are one.", unit="rad", minimum=0.0, maximum=10.0
+        0.3, "Paths that are nowhere farther apart are one.", unit="rad", minimum=0.0, maximum=10.0
     )
 
     def __post_init__(self) -> None:

@@ -1,10 +1,11 @@
-"""The genetic algorithm that leads round what is in the way: vias in place of a stretch that collides.
+"""The genetic algorithm that leads round what is in the path: vias in place of a stretch that collides.
 
 An individual is a few via configurations between the two free ends of the stretch. What runs through them is
 the cubic joint spline of eq. (10) (or straight steps), sampled: its fitness is the cost W of eq. (9) plus
 penalties for missing clearance and exceeded limits. Penetration counts with its depth, so the fitness has a
 slope in collision too. A whole generation is evaluated in one batch. The population breeds in islands, which
-keep different ways round apart. Sampling decides the race only: a way leaves as a path of certified steps.
+keep different homotopy classes apart. Sampling decides the selection only: what leaves is a path of certified
+steps.
 """
 
 from dataclasses import dataclass
@@ -27,12 +28,12 @@ _FINE = 400  # places on a spline between which its progress is interpolated
 
 @dataclass(frozen=True, eq=False)
 class Evolution:
-    """What a population found: certified ways (M_k, n) from a to b, cheapest by W first.
+    """What a population found: certified paths (M_k, n) from a to b, cheapest by W first.
 
     Where there is none: the individual that came nearest lacks `shortfall` m at `pair` in configuration `q`.
     """
 
-    ways: list[FloatArray]
+    paths: list[FloatArray]
     shortfall: float
     pair: int
     q: FloatArray
@@ -66,7 +67,7 @@ class _Individuals:
 def evolve(
     a: FloatArray, b: FloatArray, space: FreeSpace, settings: GeneticSettings, rng: np.random.Generator
 ) -> Evolution:
-    """Ways round between the free configurations a and b (n,) within the limits.
+    """Paths around between the free configurations a and b (n,) within the limits.
 
     Ends at the settings' generations or with the budget. Raises CancelledError when asked to stop.
     """
@@ -78,8 +79,8 @@ def batch_work(configurations: int) -> int:
     return -(-configurations // _SAMPLES_PER_EDGE)
 
 
-def way_matrix(shape: str, vias: int, samples: int) -> FloatArray:
-    """(samples, vias + 2): configurations of a way from its start, vias and end, even in progress.
+def path_matrix(shape: str, vias: int, samples: int) -> FloatArray:
+    """(samples, vias + 2): configurations of a path from its start, vias and end, even in progress.
 
     The first row is the start, the last one the end.
     """
@@ -106,7 +107,7 @@ class _Breeder:
         self.a, self.b, self.space, self.settings, self.rng = a, b, space, settings, rng
         self.weights = space.scene.weights
         self.straight = max(float(movement_cost(self.weights, a, b)), 1e-9)
-        matrix = way_matrix(settings.shape, settings.vias, settings.samples)
+        matrix = path_matrix(settings.shape, settings.vias, settings.samples)
         self.blend = np.ascontiguousarray(matrix[:, 1:-1])  # (S, V)
         self.fixed = matrix[:, :1] * a + matrix[:, -1:] * b  # (S, n)
         self.along = np.arange(1, settings.vias + 1)[:, None] / (settings.vias + 1)
@@ -115,7 +116,7 @@ class _Breeder:
         self.tried: set[bytes] = set()
 
     def run(self) -> Evolution:
-        """Breed until the free ways have settled."""
+        """Breed until the free paths have settled."""
         s = self.settings
         people = self._first()
         generations, since = 1, 0
@@ -128,16 +129,16 @@ class _Breeder:
             generations += 1
         lack = np.where(people.shortfall < 0.0, np.inf, people.shortfall)  # free, but no better than others
         best = int(np.argmin(lack))
-        ways = sorted(self.found, key=lambda way: path_cost(self.weights, way))
+        paths = sorted(self.found, key=lambda path: path_cost(self.weights, path))
         q = self.samples(people.vias[best : best + 1])[people.sample[best], 0]
-        return Evolution(ways, float(lack[best]), int(people.pair[best]), q, generations)
+        return Evolution(paths, float(lack[best]), int(people.pair[best]), q, generations)
 
     def samples(self, vias: FloatArray) -> FloatArray:
-        """(S, N, n): the ways of individuals."""
+        """(S, N, n): the paths of individuals."""
         count, v, n = vias.shape
         mixed = self.blend @ vias.transpose(1, 0, 2).reshape(v, count * n)
-        ways: FloatArray = mixed.reshape(-1, count, n) + self.fixed[:, None, :]
-        return ways
+        paths: FloatArray = mixed.reshape(-1, count, n) + self.fixed[:, None, :]
+        return paths
 
     def evaluated(self, vias: FloatArray, spread: FloatArray) -> _Individuals:
         """The individuals with their fitness, all in one batch."""
@@ -235,26 +236,26 @@ class _Breeder:
             if key in self.tried:
                 continue
             self.tried.add(key)
-            way = self._way(vias)
-            proof = self.space.certificates(way[:-1], way[1:])
+            path = self._path(vias)
+            proof = self.space.certificates(path[:-1], path[1:])
             if (proof.verdict == FREE).all():
-                self.found.append(way)
+                self.found.append(path)
             else:
-                self._correct(people, row, way, proof)
+                self._correct(people, row, path, proof)
 
-    def _correct(self, people: _Individuals, row: int, way: FloatArray, proof: Certificates) -> None:
+    def _correct(self, people: _Individuals, row: int, path: FloatArray, proof: Certificates) -> None:
         """An individual that collides between samples is one that collides."""
         step = int(np.argmax(proof.verdict != FREE))
         share, pair = float(proof.t1[step]), int(proof.pair[step])
-        q = way[step] + share * (way[step + 1] - way[step])
+        q = path[step] + share * (path[step + 1] - path[step])
         distance = self.space.scene.collision.witnesses(q[None], np.array([pair])).distance[0]
         lack = max(float(self.space.threshold[pair] - distance), 0.0)
         last = self.settings.samples - 1
-        people.sample[row] = np.clip(round((step + share) / (len(way) - 1) * last), 1, last - 1)
+        people.sample[row] = np.clip(round((step + share) / (len(path) - 1) * last), 1, last - 1)
         people.pair[row], people.shortfall[row] = pair, lack
         people.fitness[row] += 1.0 + self.settings.clearance_penalty * lack
 
-    def _way(self, vias: FloatArray) -> FloatArray:
+    def _path(self, vias: FloatArray) -> FloatArray:
         if self.settings.shape == "polyline":
             return np.concatenate([self.a[None], vias, self.b[None]])
         return np.ascontiguousarray(self.samples(vias[None])[:, 0])

@@ -1,20 +1,22 @@
-"""The last resort: two trees grow from start and goals towards each other (RRT-Connect), over certified
-edges.
+"""Two trees grow from start and goals towards each other (RRT-Connect), over certified edges.
 
 The search itself is compiled (`ir_kernels.search`); here it is grown in slices that are charged to the
 budget, so that a request can be stopped between them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from ir_kernels.search import BidirectionalTree
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.settings import check_settings, setting
 
 from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.search.port import Ends, Found
 
 _SLICE = 256  # edges between two looks at the clock, about 2 ms
-_LEAST_SCALE = 0.1
+_LEAST_SCALE = 0.1  # of the first joint: the wrist still counts where it carries nothing
 
 
 def joint_scale(space: FreeSpace) -> FloatArray:
@@ -31,6 +33,35 @@ class Meeting:
 
     path: FloatArray | None
     gap: float
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Bidirectional trees over certified edges: finds narrow passages, given work."""
+
+    edges: int = setting(
+        100_000_000, "Certified edges before the trees are given up.", minimum=1, maximum=100_000_000
+    )
+    quick_edges: int = setting(
+        4000,
+        "The same in the portfolio's first look, and for other homotopy classes.",
+        minimum=1,
+        maximum=100_000_000,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+    def quick(self) -> "Tree":
+        """Trees that are given up early."""
+        return replace(self, edges=min(self.edges, self.quick_edges))
+
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        """Grow until the trees meet."""
+        found = connect(ends.start, ends.goals, space, seed, self.edges)
+        if found.path is not None:
+            return Found([found.path])
+        return Found([], f"the trees came within {np.degrees(found.gap):.1f} deg of each other")
 
 
 def connect(start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, most: int = 2**62) -> Meeting:

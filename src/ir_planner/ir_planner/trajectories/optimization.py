@@ -19,8 +19,8 @@ from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
 from ir_planner.curves import UniformSpline, evenly_spaced
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Descents, Measured, Task, path_of
-from ir_planner.regional import search_regional
-from ir_planner.request import DURATION_MAX, Journal, Work, bounded, within_limits
+from ir_planner.regional import Searches, search_regional
+from ir_planner.request import DURATION_MAX, Context, Journal, Work, bounded, within_limits
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.search import fewest_corners
 from ir_planner.timing import stretched
@@ -47,7 +47,7 @@ class OptimizationPlan:
 
 
 def optimize_trajectory(
-    original: JointTrajectory, scene: PlanningScene, options: PlanOptions, work: Work
+    original: JointTrajectory, scene: PlanningScene, options: PlanOptions, work: Work, searches: Searches
 ) -> OptimizationPlan:
     """Improve a trajectory from rest to rest for the objective.
 
@@ -55,7 +55,7 @@ def optimize_trajectory(
     CancelledError when asked to stop.
     """
     _check(original, scene)
-    return _Optimization(original, scene, options, work).run()
+    return _Optimization(original, scene, options, work, searches).run()
 
 
 def _check(original: JointTrajectory, scene: PlanningScene) -> None:
@@ -84,9 +84,14 @@ class _Optimization:
     """One request: the original, and what came of it."""
 
     def __init__(
-        self, original: JointTrajectory, scene: PlanningScene, options: PlanOptions, work: Work
+        self,
+        original: JointTrajectory,
+        scene: PlanningScene,
+        options: PlanOptions,
+        work: Work,
+        searches: Searches,
     ) -> None:
-        self.scene, self.options = scene, options
+        self.scene, self.options, self.searches = scene, options, searches
         self.path = path_of(original, scene)
         self.journal = Journal(work, options.seed, planner_id="descent")
         self.task = Task(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
@@ -168,7 +173,8 @@ class _Optimization:
         self.journal.note("repair", "no descent from the original was certified: ways round are searched")
         self.journal.planner_id = ""
         start, goal = self.path[0], self.path[-1]
-        status, found = search_regional(start, goal, self.scene, self.options, self.journal)
+        context = Context(self.scene, self.options, self.journal)
+        status, found = search_regional(start, goal, context, self.searches)
         if found is None:
             why = f"the original can't be repaired ({self.wrong})" if self.wrong else "nothing was certified"
             return Status(status.code, f"{why}; {status.message}"), None

@@ -1,0 +1,95 @@
+"""Which searches look for the first free path, and which for paths of other homotopy classes.
+
+A request that names a planner gets that search alone. The default portfolio asks the cheap ones first: each
+with little work, and then those that can do more.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from ir_msgs_py.arrays import FloatArray
+
+from ir_planner.checks import FreeSpace
+from ir_planner.optimize import Portfolio
+from ir_planner.request import Context
+from ir_planner.search import Ends, Search, quick
+
+Searches = Mapping[str, Search]
+Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)
+# in the order of what they cost where the straight movement collides: measured by benchmarks/regional.py
+FIRST = ("direct", "tree", "detours", "retract")
+# that find other homotopy classes with another seed
+EXPLORERS = ("detours", "tree", "genetic")
+_FINISHED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
+
+
+def first_paths(ends: Ends, space: FreeSpace, context: Context, searches: Searches) -> list[Path]:
+    """The first free paths, by the first search that finds any; none where all failed."""
+    journal = context.journal
+    for name, search in _attempts(context.options.planner_id, searches):
+        with journal.stage(name) as notes:
+            found = search.find(ends, space, context.options.seed, space.work)
+            if found.paths:
+                notes.append(f"first feasible: {len(found.paths)} free, {len(found.paths[0])} points")
+            else:
+                notes.append("nothing free" + (f", {found.note}" if found.note else ""))
+        if found.paths:
+            return [(name, path) for path in found.paths]
+        if journal.work.exhausted:
+            break
+    return []
+
+
+def _attempts(planner_id: str, searches: Searches) -> Iterator[tuple[str, Search]]:
+    if planner_id:
+        yield planner_id, searches[planner_id]
+        return
+    for name in FIRST:
+        yield name, quick(searches[name])
+    for name in FIRST:
+        if quick(searches[name]) != searches[name]:
+            yield name, searches[name]
+
+
+def improve(
+    ends: Ends, paths: list[Path], portfolio: Portfolio, context: Context, searches: Searches
+) -> None:
+    """Optimise the first paths, then look for other homotopy classes and optimise the best of all, turn by
+    turn, until the work is spent.
+    """
+    work, journal = context.work, context.journal
+    until = work.iterations + work.improvement
+
+    def more() -> bool:
+        return work.iterations < until and not work.exhausted
+
+    with journal.stage("refine") as notes:
+        portfolio.add(paths[0][0], [path for _, path in paths])
+        notes.append(f"{portfolio.finish_best(1)} certified")
+    explorers = [name for name in EXPLORERS if context.options.planner_id in ("", name)]
+    turn = 0
+    with journal.stage("improve") as notes:
+        new, certified = Counter[str](), 0
+        while more():
+            before = work.iterations
+            for name in explorers:
+                # the genetic search costs more than both others: not before their first turn
+                if more() and not (name == "genetic" and turn == 0 and len(explorers) > 1):
+                    seed = _seed(context.options.seed, turn, name)
+                    found = quick(searches[name]).find(ends, portfolio.space, seed, work)
+                    new[name] += portfolio.add(name, found.paths)
+            certified += portfolio.finish_best(_FINISHED) if more() else 0
+            if more():
+                certified += portfolio.deepen()
+            turn += 1
+            if work.iterations == before:
+                break  # nothing left to do
+        others = ", ".join(f"{count} by {name}" for name, count in new.items() if count)
+        notes.append(f"{turn} turns, new paths: {others or 'none'}; {certified} certified")
+
+
+def _seed(seed: int, turn: int, name: str) -> int:
+    """Another seed for every search of a request."""
+    words = [seed % 2**63, turn, *name.encode()]
+    return int(np.random.SeedSequence(words).generate_state(1, np.uint64)[0] >> 1)

@@ -1,0 +1,56 @@
+"""The port of a search for free paths: what it is asked, what it answers, and what it may cost.
+
+A search is a frozen dataclass whose fields are its settings (`ir_msgs_py.settings.setting`). Registered under
+a name (registry.py) it is accepted as `planner_id`, its settings are ROS parameters under that name, and the
+documentation lists it.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from ir_msgs_py.arrays import FloatArray
+
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """start (n,), goals (G, n): configurations of one pose, cheapest by W from the start first."""
+
+    start: FloatArray
+    goals: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Free paths (M_k, n) of straight joint steps from the start to any of the goals, cheapest by W first;
+    `note`: how near a search came that found none.
+    """
+
+    paths: list[FloatArray]
+    note: str = ""
+
+
+class Search(Protocol):
+    """Looks for free paths."""
+
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        """Paths whose every step `space` certifies (which charges the step to its work, the same as `work`).
+
+        The same ends, space and seed give the same paths. Ends early when `work.exhausted`; what a search
+        does beside certifying steps it charges itself. Raises CancelledError when asked to stop.
+        """
+
+
+@runtime_checkable
+class HasQuickVariant(Protocol):
+    """A search that can be asked for a first look."""
+
+    def quick(self) -> Search:
+        """The same search with little work."""
+
+
+def quick(search: Search) -> Search:
+    """The search with little work, where it has such a variant; else itself."""
+    return search.quick() if isinstance(search, HasQuickVariant) else search

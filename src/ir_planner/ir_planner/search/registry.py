@@ -1,0 +1,24 @@
+"""All searches by name: what `planner_id` may be. A new search is one file, and one line here."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from ir_planner.search.detours import Detours
+from ir_planner.search.direct import Direct
+from ir_planner.search.genetic import Genetic
+from ir_planner.search.port import Search
+from ir_planner.search.retract import Retract
+from ir_planner.search.tree import Tree
+
+SEARCHES: dict[str, Search] = {
+    "direct": Direct(),
+    "tree": Tree(),
+    "detours": Detours(),
+    "retract": Retract(),
+    "genetic": Genetic(),
+}
+
+
+def registered() -> Mapping[str, Search]:
+    """The searches as they are registered now, with their default settings; a copy that stays as it is."""
+    return MappingProxyType(dict(SEARCHES))

@@ -1,0 +1,23 @@
+"""How tests ask for a regional movement: with the registered searches, or with others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.options import PlanOptions
+from ir_planner.regional import MovementPlan, plan_regional
+from ir_planner.request import Context, Journal, Work
+from ir_planner.scene import PlanningScene
+from ir_planner.search import SEARCHES, Search
+
+
+def planned(
+    start: FloatArray,
+    goals: FloatArray,
+    scene: PlanningScene,
+    options: PlanOptions,
+    work: Work,
+    searches: Mapping[str, Search] = SEARCHES,
+) -> MovementPlan:
+    return plan_regional(start, goals, Context(scene, options, Journal(work, options.seed)), searches)
