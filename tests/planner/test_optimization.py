@@ -21,6 +21,7 @@ from ir_planner.optimize.descents import Descents
 from ir_planner.planner import Planner
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.search import SEARCHES
 from ir_planner.trajectories.optimization import POINTS_MAX, OptimizationPlan, optimize_trajectory
 from ir_planner.trajectories.pareto import non_dominated
 from ir_planner.trajectories.through_points import Reference
@@ -42,7 +43,7 @@ def budget(options: PlanOptions, cancelled: Callable[[], bool] = lambda: False) 
 def optimized(
     trajectory: JointTrajectory, scene: PlanningScene, options: PlanOptions = OPTIONS
 ) -> OptimizationPlan:
-    return optimize_trajectory(trajectory, scene, options, budget(options))
+    return optimize_trajectory(trajectory, scene, options, budget(options), SEARCHES)
 
 
 def ends_of(scene: PlanningScene, task: str) -> FloatArray:
@@ -339,7 +340,7 @@ def test_little_work_is_a_smaller_answer_and_no_time_a_truncated_one(
     assert not little.info.truncated
     assert little.after.certified
     late = Work(400_000, time.monotonic() - 1.0, time.monotonic)
-    cut = optimize_trajectory(detour, scene, OPTIONS, late)
+    cut = optimize_trajectory(detour, scene, OPTIONS, late, SEARCHES)
     assert cut.info.truncated
     assert cut.after.certified
 
@@ -349,7 +350,7 @@ def test_a_cancel_is_heard(after: int, detour: JointTrajectory, scene: PlanningS
     asked = iter(range(10_000))
     options = PlanOptions(planning_time=600.0)
     with pytest.raises(CancelledError):
-        optimize_trajectory(detour, scene, options, budget(options, lambda: next(asked) >= after))
+        optimize_trajectory(detour, scene, options, budget(options, lambda: next(asked) >= after), SEARCHES)
 
 
 def test_the_answer_and_its_front_are_kept_by_id(detour: JointTrajectory, power: PowerData) -> None:
