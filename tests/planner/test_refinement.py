@@ -15,10 +15,12 @@ from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.curves.uniform_spline import UniformSpline, along_path
 from ir_planner.errors import RequestError
 from ir_planner.optimize.refinement import Refinement, movement_over
+from ir_planner.request.context import Context
+from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.service.service_movement import ServiceRequest, plan_service
-from ir_planner.service.settings import WithdrawalSettings
+from ir_planner.service.service_movement import plan_service
+from ir_planner.service.work_configurations import ServiceRequest
 from ir_planner.timing.movement import timed_movement
 from ir_planner.timing.objective import objective_value, trajectory_value
 from numpy.typing import NDArray
@@ -160,7 +162,8 @@ def test_a_station_s_contacts_hold_in_its_zone_only(scene_of: SceneOf) -> None:
     assert stations
     for station in stations[:2]:
         request = ServiceRequest(station, "exit", None, np.array(scene.cell.park), 1)
-        plan = plan_service(request, scene, PlanOptions(), WithdrawalSettings(), unhurried())
+        context = Context(scene, PlanOptions(), Journal(unhurried(), 0))
+        plan = plan_service(request, context)
         assert plan.status.ok, plan.status.message
         trajectory = plan.candidates[0].trajectory
         assert trajectory is not None
