@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell, load_power_data
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, ROW
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.controller.driver import Driver
-from ir_sim_driver.controller.simulation import Simulation
-from ir_sim_driver.motion.goal import TrajectoryGoal
+
+from ir_description import Cell, load_power_data
+from ir_sim_driver import Driver, Simulation, TrajectoryGoal, make_simulation
 
 HOUR = 3600.0
 TICK = 0.01
@@ -57,10 +56,10 @@ def transition_rows(cell: Cell) -> list[dict[str, Any]]:
     simulation = make_simulation(cell, backend="ideal")
     rows = []
     for mode, enter, leave in RESTS:
-        rest = simulation.modes.rests[mode]
-        for act, transition, there, asked in (
-            (enter, rest.entering, mode, rest.enter),
-            (leave, rest.leaving, Mode.STAND_ON_MOTORS, rest.leave),
+        rest, times = ROW[mode], simulation.modes.times[mode]
+        for act, on_the_way, there, asked in (
+            (enter, rest.entering, mode, times.enter),
+            (leave, rest.leaving, Mode.STAND_ON_MOTORS, times.leave),
         ):
             act(simulation)
             until(simulation, transition)
@@ -101,8 +100,8 @@ def table_2_rows(cell: Cell) -> list[dict[str, Any]]:
 
 def _watts(simulation: Simulation, mode: Mode, payload: float) -> dict[str, Any]:
     def energy() -> float:
-        simulation.settle_meter()
-        return simulation.meter.reading().energy
+        simulation.mains.settle()
+        return simulation.mains.meter.reading().energy
 
     before = energy()
     simulation.run(0.5)

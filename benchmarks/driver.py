@@ -22,10 +22,10 @@ from _results import Claim, at_least, at_most, command_line, finish, line_of
 from ir_description import Cell, load_cell
 from ir_kernels.power import DcBusParameters, dc_bus
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.controller.simulation import Simulation
-from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion.goal import TrajectoryGoal
+from kernels import commit, machine
+
+from ir_description import Cell, load_cell
+from ir_sim_driver import Simulation, TrajectoryGoal, TrajectoryRefusedError, make_simulation
 
 CELL = "demo"
 DT = 0.001
@@ -72,7 +72,7 @@ def model_energy(simulation: Simulation, trajectory: JointTrajectory) -> float:
     s = trajectory.sample(t)
     power = simulation.dynamics.drive_power(s.q, s.qd, s.qdd)
     bus = dc_bus(power, DT, DcBusParameters(106.0))
-    base = simulation.base.of(simulation.modes.level)
+    base = simulation.mains.base.of(simulation.modes.level)
     return float(DT * bus.mains.sum() + base * trajectory.duration)
 
 

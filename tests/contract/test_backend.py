@@ -9,9 +9,9 @@ import pytest
 
 from ir_description import Cell, Load, load_cell
 from ir_kernels.dynamics import DynamicsModel
-from ir_sim_driver.controller.assembly import BACKENDS, make_backend
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import SettingsError
+from ir_sim_driver.plant import BACKENDS, make_backend
 from ir_sim_driver.plant.backend import Backend, Work
 
 SETTINGS = SimulationSettings()
@@ -31,7 +31,7 @@ def cell() -> Cell:
 @pytest.fixture(params=BACKENDS)
 def backend(request: pytest.FixtureRequest, cell: Cell) -> Backend:
     """A fresh backend that carries the cell's tool and stands at machine home."""
-    made = make_backend(request.param, cell, SETTINGS)
+    made = make_backend(request.param, cell, DT, SETTINGS.control)
     made.set_load(tool(cell))
     made.reset(home(cell))
     made.work()
@@ -191,7 +191,7 @@ def test_a_disturbance_is_taken_and_ends(backend: Backend, cell: Cell) -> None:
 def test_the_same_steps_give_the_same_bits(name: str, cell: Cell) -> None:
     works = []
     for _ in range(2):
-        backend = make_backend(name, cell, SETTINGS)
+        backend = make_backend(name, cell, DT, SETTINGS.control)
         backend.set_load(tool(cell))
         backend.reset(home(cell))
         drive(backend, motion(home(cell), 0.3))
@@ -204,7 +204,7 @@ def test_the_same_steps_give_the_same_bits(name: str, cell: Cell) -> None:
 def test_gravity_is_that_of_the_cell(name: str, cell: Cell) -> None:
     hanging = np.diag([1.0, -1.0, -1.0, 1.0])  # the base upside down
     turned = replace(cell, base_pose=hanging)
-    backend = make_backend(name, turned, SETTINGS)
+    backend = make_backend(name, turned, DT, SETTINGS.control)
     backend.reset(home(cell))
     drive(backend, np.tile(home(cell), (round(0.5 / DT), 1)))
     assert np.abs(backend.torque - holding(turned, ())).max() < TORQUE
@@ -212,5 +212,5 @@ def test_gravity_is_that_of_the_cell(name: str, cell: Cell) -> None:
 
 def test_an_unknown_backend_is_refused_with_the_known_ones(cell: Cell) -> None:
     with pytest.raises(SettingsError) as refused:
-        make_backend("clay", cell, SETTINGS)
+        make_backend("clay", cell, DT, SETTINGS.control)
     assert all(name in str(refused.value) for name in BACKENDS)

@@ -104,9 +104,9 @@ def test_table_2_at_machine_home(make, backend_name, load, payload, mode):
     simulation = make(backend_name, load, controller=ControllerSettings(start_mode=mode))
     simulation.plc.rest = Mode[mode] if mode in ("BUS_POWER_OFF", "HIBERNATION") else None
     simulation.run(0.1)
-    before = simulation.meter.reading()
+    before = simulation.mains.meter.reading()
     simulation.run(0.5)
-    after = simulation.meter.reading()
+    after = simulation.mains.meter.reading()
     watts = (after.energy - before.energy) / (after.time - before.time)
     assert watts == pytest.approx(load_power_data().measured(payload, mode), rel=0.001)
     assert simulation.standing_power(Mode[mode]) == pytest.approx(watts, rel=1e-9)

@@ -1,18 +1,20 @@
 """The running simulation without ROS: frames, goals checked beside it, outcomes to their senders."""
 
 from __future__ import annotations
+from ir_msgs_py.modes import Mode
 
+import functools
 import threading
+import time
 
 import numpy as np
 import pytest
-
-from ir_msgs_py.modes import Mode
-from ir_sim_driver.controller.driver import NO_GOAL, QUEUE_MAX, Driver
+from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.controller.goals import NO_GOAL, QUEUE_MAX
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
-from ir_sim_driver.power.power_modes import TransitionSettings
+from ir_sim_driver.power import TransitionSettings
 
 PERIOD = 2_000_000
 
@@ -22,6 +24,13 @@ def driver(make):
     driver = Driver(make())
     yield driver
     driver.close()
+
+
+def wait_for_start(driver, ticket):
+    deadline = time.monotonic() + 10.0
+    while driver.following(ticket) is None:
+        assert time.monotonic() < deadline, "the goal has not started within 10 s"
+        time.sleep(0.001)
 
 
 def frames(driver, count, first=1):
@@ -38,10 +47,8 @@ def test_frames_carry_what_is_due(driver):
 
 def test_power_is_the_mean_since_the_last_frame(driver, plan, cell):
     home = np.array(cell.machine_home)
-    started = threading.Event()
     goal = TrajectoryGoal(plan(1.5, home, home + 0.1))
-    driver.submit(lambda: goal, lambda goal_id: started.set(), lambda outcome: None)
-    assert started.wait(10.0)
+    wait_for_start(driver, driver.submit(lambda: goal, lambda outcome: None))
     powers = [frame.power for frame in frames(driver, 500) if frame.power is not None]
     energy = np.array([power.energy for power in powers])
     mean = np.array([power.power for power in powers])
@@ -62,16 +69,17 @@ def test_a_sleeping_controller_leaves_only_the_meter(make):
 
 def test_outcomes_reach_the_sender_of_their_goal(driver, plan, cell):
     home = np.array(cell.machine_home)
-    ids, outcomes = [], []
+    outcomes = []
     for target in (home + 0.05, home - 0.05):
         goal = TrajectoryGoal(plan([1.5], target))
-        started = threading.Event()
-        driver.submit(lambda goal=goal: goal, lambda i, s=started: (ids.append(i), s.set()), outcomes.append)
-        assert started.wait(10.0)
+        ended = functools.partial(lambda target, outcome: outcomes.append((target[0], outcome.code)), target)
+        wait_for_start(driver, driver.submit(lambda goal=goal: goal, ended))
         frames(driver, 100)
     frames(driver, 800)
-    assert [outcome.goal_id for outcome in outcomes] == ids
-    assert [outcome.code for outcome in outcomes] == [ErrorCode.INVALID_GOAL, ErrorCode.SUCCESSFUL]
+    assert outcomes == [
+        (home[0] + 0.05, ErrorCode.INVALID_GOAL),  # preempted
+        (home[0] - 0.05, ErrorCode.SUCCESSFUL),
+    ]
 
 
 def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
@@ -85,7 +93,7 @@ def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
         heard.append(outcome)
         done.set()
 
-    driver.submit(refuse, lambda goal_id: None, ended)
+    driver.submit(refuse, ended)
     assert done.wait(10.0)
     assert (heard[0].goal_id, heard[0].code, heard[0].sentence) == (
         NO_GOAL,
@@ -102,7 +110,7 @@ def test_a_flood_of_goals_is_bounded(driver):
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
     for _ in range(QUEUE_MAX + 20):
-        driver.submit(slow, lambda goal_id: None, answers.append)
+        driver.submit(slow, answers.append)
     assert len(answers) == 20
     assert all("send fewer" in answer.sentence for answer in answers)
     release.set()
@@ -116,7 +124,7 @@ def test_a_check_does_not_hold_up_the_plant(driver):
         release.wait(10.0)
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
-    driver.submit(slow, lambda goal_id: None, lambda outcome: None)
+    driver.submit(slow, lambda outcome: None)
     assert blocking.wait(10.0)
     assert len(frames(driver, 100)) == 100
     release.set()

@@ -28,9 +28,8 @@ def test_an_hour_of_shift(make, plan, start, cell):
     for k in range(1, HOUR):
         within = k % BLOCK
         if within % (MINUTE // 2) == 100 and within < 4 * MINUTE:
-            with driver.locked():
-                at_work = not at_work
-                start(simulation, plan([2.5], work if at_work else home))
+            at_work = not at_work
+            start(simulation, plan([2.5], work if at_work else home))
         if within == 4 * MINUTE:
             simulation.plc.set_bit("ab", True)
         if within == 4 * MINUTE + 2_500:

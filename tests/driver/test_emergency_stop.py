@@ -49,9 +49,9 @@ def test_the_distance_from_the_path_is_published(stopped):
 def test_brakes_take_no_motor_power_and_hold_against_gravity(stopped):
     stopped.run(0.5)
     q = stopped.backend.q.copy()
-    before = stopped.meter.reading()
+    before = stopped.mains.meter.reading()
     stopped.run(1.0)
-    after = stopped.meter.reading()
+    after = stopped.mains.meter.reading()
     assert np.array_equal(stopped.backend.q, q)
     assert after.energy - before.energy == pytest.approx(325.0, rel=1e-3)  # Table II, on brakes with 155 kg
 

@@ -15,7 +15,7 @@ from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plant.loads import carried
 from ir_sim_driver.plc.inputs import BITS
-from ir_sim_driver.power.power_modes import TransitionSettings
+from ir_sim_driver.power import TransitionSettings
 
 QUICK = TransitionSettings(
     stand_on_brakes_enter=0.02,
@@ -123,8 +123,8 @@ def keep_the_laws(make, plan, start, sequence):
             if pressed and before in DRIVES_ON:
                 assert now is M.EMERGENCY_STOP
             before = now
-        simulation.settle_meter()
-        reading = simulation.meter.reading()
+        simulation.mains.settle()
+        reading = simulation.mains.meter.reading()
         assert reading.energy >= energy
         energy = reading.energy
         parts = (

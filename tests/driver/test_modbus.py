@@ -25,8 +25,8 @@ from ir_sim_driver.plc.modbus_map import (
     OPERATING_MODE,
     PAUSE,
 )
-from ir_sim_driver.plc.plc_link import PlcLink
-from ir_sim_driver.power.power_modes import TransitionSettings
+from ir_sim_driver.power import TransitionSettings
+from pymodbus.client import ModbusTcpClient
 
 PERIOD = 2_000_000
 WATCHDOG = 0.5
@@ -39,7 +39,7 @@ def serve():
 
     def serve_one(simulation):
         driver = Driver(simulation)
-        server = ModbusServer("127.0.0.1", 0, PlcLink(driver, WATCHDOG))
+        server = ModbusServer("127.0.0.1", 0, driver, WATCHDOG)
         client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=10)
         assert client.connect()
         opened.append((client, server, driver))
@@ -97,8 +97,7 @@ def test_pause_and_operating_mode_are_registers(make, serve):
 
 def test_coils_read_back_what_topic_or_service_have_set(make, serve):
     driver, client, _ = serve(make())
-    with driver.locked() as simulation:
-        simulation.plc.set_bit("drives_off", True)
+    driver.press("service", "drives_off", True)
     levels = client.read_coils(0, count=len(COILS)).bits[: len(COILS)]
     assert [name for name, level in zip(COILS, levels, strict=True) if level] == ["drives_off", "move_enable"]
 
@@ -158,7 +157,7 @@ def test_while_hibernating_the_controller_does_not_answer_for_itself(make, serve
 def test_a_taken_port_is_an_error_with_its_number(make, serve):
     driver, _, port = serve(make())
     with pytest.raises(OSError, match=str(port)):
-        ModbusServer("127.0.0.1", port, PlcLink(driver, WATCHDOG))
+        ModbusServer("127.0.0.1", port, driver, WATCHDOG)
 
 
 def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, plan, start, cell):
@@ -166,8 +165,7 @@ def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, p
     driver, client, _ = serve(simulation)
     home = np.array(cell.machine_home)
     client.write_coil(HEARTBEAT, True)
-    with driver.locked():
-        start(simulation, plan(4.0, home, home + 0.3))
+    start(simulation, plan(4.0, home, home + 0.3))
     run(driver, 0.4)
     client.write_coil(HEARTBEAT, False)
     run(driver, 0.4)
@@ -202,7 +200,7 @@ def test_a_plc_without_a_heartbeat_is_not_watched(make, serve):
 @pytest.fixture(scope="module")
 def endangered(make):
     driver = Driver(make(load="none"))
-    server = ModbusServer("127.0.0.1", 0, PlcLink(driver, WATCHDOG))
+    server = ModbusServer("127.0.0.1", 0, driver, WATCHDOG)
     yield driver, server.port
     server.close()
     driver.close()
@@ -233,9 +231,8 @@ def test_five_thousand_connections_don_t_bring_the_server_down(endangered, frame
 
 def survive(endangered, frames, framed):
     driver, port = endangered
-    with driver.locked() as simulation:  # a request may have put the controller to sleep
-        simulation.plc.set_bit("hib", False)
-        simulation.wake()
+    driver.write_inputs("service", {"hib": False})  # a request may have put the controller to sleep
+    driver.wake()
     with socket.create_connection(("127.0.0.1", port), timeout=2.0) as link:
         for body in frames:
             link.sendall(struct.pack(">HHHB", 1, 0, len(body) + 1, 1) + body if framed else body)

@@ -6,10 +6,9 @@ import pytest
 
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode
-from ir_sim_driver.controller.pause import best_mode, energy_of
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.power.power_modes import TransitionSettings
+from ir_sim_driver.power import TransitionSettings, best_mode, energy_of
 
 
 def by_mode(simulation):
@@ -52,13 +51,13 @@ def test_a_pause_costs_what_query_modes_said(make):
     simulation = make()
     simulation.run(0.01)
     bus = by_mode(simulation)[Mode.BUS_POWER_OFF]
-    before = simulation.meter.reading()
+    before = simulation.mains.meter.reading()
     simulation.pauses.start(100.0, executing=False)
     simulation.run(80.0)
     assert simulation.modes.mode is Mode.BUS_POWER_OFF
     assert simulation.pauses.end() == pytest.approx(20.0)
     simulation.run(20.01)
-    after = simulation.meter.reading()
+    after = simulation.mains.meter.reading()
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
     assert after.energy - before.energy == pytest.approx(energy_of(bus, after.time - before.time), rel=1e-3)
 

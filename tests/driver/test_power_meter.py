@@ -25,8 +25,8 @@ def test_the_parts_add_up_to_the_mains(make, plan, start, run_out, cell):
     for target in (home + np.array([1.0, 0.4, -0.4, 0.5, 0.3, 0.2]), home):
         start(simulation, plan(2.5, simulation.executor.command, target))
         run_out(simulation)
-    simulation.settle_meter()
-    r = simulation.meter.reading()
+    simulation.mains.settle()
+    r = simulation.mains.meter.reading()
     total = r.base_energy + r.axis_energy.sum() + r.burnt_energy + r.capacitor_energy
     assert r.energy == pytest.approx(total, rel=1e-12)
     assert r.time == pytest.approx(simulation.time)
@@ -63,8 +63,8 @@ def test_braking_lifts_the_bus_voltage_up_to_the_chopper(meter):
 
 def test_watts_of_the_tool_don_t_grow_with_a_part(make):
     simulation = make()
-    assert simulation.base.of(Mode.HIBERNATION) == pytest.approx(105.0)
-    assert simulation.base.of(Mode.STAND_ON_BRAKES) == pytest.approx(325.0)
+    assert simulation.mains.base.of(Mode.HIBERNATION) == pytest.approx(105.0)
+    assert simulation.mains.base.of(Mode.STAND_ON_BRAKES) == pytest.approx(325.0)
 
 
 def test_base_power_follows_the_level():
@@ -81,11 +81,11 @@ def test_ways_in_cost_the_mode_that_is_left_and_ways_out_stand_on_motors(make):
     simulation.run(0.01)
 
     def mean_power(seconds):
-        simulation.settle_meter()
-        before = simulation.meter.reading()
+        simulation.mains.settle()
+        before = simulation.mains.meter.reading()
         simulation.run(seconds)
-        simulation.settle_meter()
-        after = simulation.meter.reading()
+        simulation.mains.settle()
+        after = simulation.mains.meter.reading()
         return (after.energy - before.energy) / (after.time - before.time)
 
     simulation.plc.set_bit("ab", True)

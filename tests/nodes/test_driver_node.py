@@ -152,7 +152,7 @@ def test_levels_in_force_are_published_whoever_sets_them(make_driver, cell_clien
     assert in_force[0].operating_mode == PlcInputs.EXT
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
     wait_for(lambda: in_force[-1].ab)
-    with ModbusTcpClient("127.0.0.1", port=driver.modbus_port) as plc:
+    with ModbusTcpClient("127.0.0.1", port=driver.port_of("modbus")) as plc:
         plc.write_coil(COILS.index("emergency_stop"), True)
         wait_for(lambda: in_force[-1].emergency_stop)
     assert in_force[-1].ab
@@ -202,8 +202,8 @@ def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wai
     wait_for(lambda: len(power) > asleep_from + 20, timeout=20.0)
     assert len(states) <= silent + 1  # one may have been on its way
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(magic_packet("02:00:00:c4:02:11"), ("127.0.0.1", driver.wake_port))
-        sender.sendto(magic_packet(MAC), ("127.0.0.1", driver.wake_port))
+        sender.sendto(magic_packet("02:00:00:c4:02:11"), ("127.0.0.1", driver.port_of("wake_on_lan")))
+        sender.sendto(magic_packet(MAC), ("127.0.0.1", driver.port_of("wake_on_lan")))
     wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
     wait_for(lambda: len(states) > silent + 10)
 
@@ -262,7 +262,7 @@ def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_cli
 def test_a_plc_reaches_the_node_by_modbus(make_driver, listen, wait_for):
     driver = make_driver(modbus=True, modbus_port=0)
     power = listen(names.POWER_STATE, PowerState)
-    with ModbusTcpClient("127.0.0.1", port=driver.modbus_port) as plc:
+    with ModbusTcpClient("127.0.0.1", port=driver.port_of("modbus")) as plc:
         plc.write_coil(COILS.index("ab"), True)
         wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF, timeout=20.0)
         assert plc.read_input_registers(0, count=1).registers == [PowerMode.BUS_POWER_OFF]

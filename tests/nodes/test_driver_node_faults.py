@@ -266,8 +266,12 @@ def test_a_port_that_is_taken_leaves_the_node_running(driver, ros_context, ros_e
         namespace="other",
         parameter_overrides=[
             Parameter(name, value=value)
-            for name, value in {"cell": "open", "backend": "ideal", "wake_port": driver.wake_port}.items()
+            for name, value in {
+                "cell": "open",
+                "backend": "ideal",
+                "wake_port": driver.port_of("wake_on_lan"),
+            }.items()
         ],
     )
     ros_executor.add_node(second)
-    assert second.wake_port == 0
+    assert second.port_of("wake_on_lan") == 0

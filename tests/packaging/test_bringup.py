@@ -18,6 +18,7 @@ from ir_recorder.settings import RecorderSettings
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.node.parameters import NodeSettings
+from ir_sim_driver.plc import LINKS
 
 ROOT = Path(__file__).resolve().parents[2]
 BRINGUP = ROOT / "ros_ws" / "src" / "ir_bringup"
@@ -47,7 +48,7 @@ def leaves(block: dict[str, object], prefix: str = "") -> Iterator[tuple[str, ob
 
 SETTINGS = {
     "ir_planner": {"": (PlannerSettings,)},
-    "ir_sim_driver": {"": (NodeSettings, ControllerSettings), "execution.": (ExecutionSettings,)},
+    "ir_sim_driver": {"": (NodeSettings, ControllerSettings, *LINKS), "execution.": (ExecutionSettings,)},
     "ir_program_runner": {"": (ProgramSettings, LinkSettings)},
     "ir_recorder": {"": (RecorderSettings,)},
 }

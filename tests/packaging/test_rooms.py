@@ -16,6 +16,7 @@ ROOMS = {
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
         "regional", "trajectories", "service", "settings", "program", "store", "planner", "node",
     ),
+    "ir_sim_driver": ("errors", "notices", "plant", "power", "motion", "plc", "controller", "node"),
 }  # fmt: skip
 
 

@@ -7,7 +7,8 @@ from rclpy.node import Node
 from ir_msgs_py.settings import Setting, describe
 from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_program_runner.parameters import declare_parameters
-from ir_sim_driver.power.power_modes import TransitionSettings
+from ir_sim_driver.power import TransitionSettings
+from rclpy.node import Node
 
 
 def meaning(each: Setting) -> tuple[object, ...]:

@@ -1,1 +1,59 @@
-"""Simulated KUKA KR210 on a KR C4: what a PLC and a ROS user see, and what the mains meter reads."""
+"""A simulated KUKA KR210 on a KR C4: trajectories, power modes, PLC, mains meter. The core runs without ROS.
+
+simulation = make_simulation("demo")
+simulation.run(1.0)
+"""
+from ir_msgs_py.modes import MODES
+
+from ir_sim_driver.controller import (
+    ControllerSettings,
+    Driver,
+    Simulation,
+    SimulationSettings,
+    VettedGoal,
+    make_simulation,
+)
+from ir_sim_driver.errors import (
+    BackendError,
+    DriverError,
+    LinkError,
+    RequestRefusedError,
+    SettingsError,
+    TrajectoryRefusedError,
+)
+from ir_sim_driver.motion import ErrorCode, ExecutionSettings, JointTolerance, Outcome, TrajectoryGoal
+from ir_sim_driver.plant import BACKENDS, Backend, Carried, ControlSettings, Work, carried, custom_load
+from ir_sim_driver.plc import LINKS, Link, PlcSettings
+from ir_sim_driver.power import TransitionSettings
+
+__all__ = [
+    "BACKENDS",
+    "LINKS",
+    "MODES",
+    "Backend",
+    "BackendError",
+    "Carried",
+    "ControlSettings",
+    "ControllerSettings",
+    "Driver",
+    "DriverError",
+    "ErrorCode",
+    "ExecutionSettings",
+    "JointTolerance",
+    "Link",
+    "LinkError",
+    "Outcome",
+    "PlcSettings",
+    "RequestRefusedError",
+    "SettingsError",
+    "Simulation",
+    "SimulationSettings",
+    "TrajectoryGoal",
+    "TrajectoryRefusedError",
+    "TransitionSettings",
+    "VettedGoal",
+    "Work",
+    "carried",
+    "custom_load",
+    "make_simulation",
+]

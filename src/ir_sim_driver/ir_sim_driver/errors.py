@@ -2,10 +2,10 @@
 
 DriverError
 ├── SettingsError (ValueError)        a setting out of its range
-├── TrajectoryRefusedError            a trajectory that is not executed; code of
-control_msgs/FollowJointTrajectory ├── RequestRefusedError               a service request that cannot be
-met; code of moveit_msgs/MoveItErrorCodes └── BackendError                      the physics gave up: not
-installed, disconnected or diverged
+├── TrajectoryRefusedError            not executed; code of control_msgs/FollowJointTrajectory
+├── RequestRefusedError               a request that cannot be met; code of moveit_msgs/MoveItErrorCodes
+├── LinkError                         a link to the PLC that cannot be opened
+└── BackendError                      the physics gave up: not installed, disconnected or diverged
 """
 
 from __future__ import annotations
@@ -35,6 +35,10 @@ class RequestRefusedError(DriverError):
     def __init__(self, code: StatusCode, sentence: str) -> None:
         super().__init__(sentence)
         self.code = code
+
+
+class LinkError(DriverError):
+    """A link to the PLC that cannot be opened here."""
 
 
 class BackendError(DriverError):

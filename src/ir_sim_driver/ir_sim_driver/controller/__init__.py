@@ -1,1 +1,24 @@
-"""."""
+"""The controller around the plant: the stepped simulation, its settings, and the driver that runs it."""
+
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.diagnostics import Entry, report
+from ir_sim_driver.controller.driver import Bodies, Driver, Snapshot
+from ir_sim_driver.controller.frames import Frame
+from ir_sim_driver.controller.goals import NO_GOAL
+from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
+from ir_sim_driver.controller.simulation import Simulation, VettedGoal
+
+__all__ = [
+    "NO_GOAL",
+    "Bodies",
+    "ControllerSettings",
+    "Driver",
+    "Entry",
+    "Frame",
+    "Simulation",
+    "SimulationSettings",
+    "Snapshot",
+    "VettedGoal",
+    "make_simulation",
+    "report",
+]

@@ -23,7 +23,7 @@ def report(simulation: Simulation, worst_lag: float) -> list[Entry]:
 
     worst_lag [s]: longest delay of the plant's thread so far.
     """
-    reading = simulation.meter.reading()
+    reading = simulation.mains.meter.reading()
     plant = Entry(
         "ir_sim_driver: plant",
         Level.ERROR if simulation.fault else Level.OK,

@@ -1,91 +1,75 @@
-"""The simulation as a running thing: stepped by one thread, asked by others, read frame by frame. No ROS.
+"""The driver: a simulation that one thread steps and others ask. Nobody else touches the simulation. No ROS.
 
 Everything that touches the simulation holds one lock for a short time; trajectories are checked beside it in
 a thread of their own, so that a long one does not keep anybody waiting.
 """
 
 from __future__ import annotations
+from ir_msgs_py.modes import Mode
 
 import threading
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.plc import PlcInputs, PlcOutputs
-from ir_msgs_py.power import PowerState
-from ir_sim_driver.controller.simulation import Simulation
-from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion.executor import Following
-from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.plc import OperatingMode, PlcInputs
+from ir_msgs_py.power import PowerMode
+from ir_msgs_py.status import StatusCode
 
-POWER_PERIOD = 10  # steps: 100 Hz
-CONTROLLER_PERIOD = 20  # steps: 50 Hz
-QUEUE_MAX = 32
-NO_GOAL = 0
+from ir_description import Capsule, Cell, robot_urdf
+from ir_sim_driver.controller.diagnostics import Entry, report
+from ir_sim_driver.controller.frames import Frame, Frames
+from ir_sim_driver.controller.goals import Goals
+from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
+from ir_sim_driver.notices import Level, Notice
+from ir_sim_driver.plant import Carried
+from ir_sim_driver.plc import Readout
+
+_POWER_WINDOW = 0.01  # s; the mean power that a PLC reads is over at least one period of power_state
+_ALIVE_STEPS = 100  # a PLC that polls at 10 Hz or slower sees every change of the alive counter
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What a person is shown: notices since the last snapshot, and the parts of the driver."""
+
+    notices: list[Notice]
+    entries: list[Entry]
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
-    """What is published at a stamp [ns]; None: nothing of it now.
+class Bodies:
+    """Poses (n+1, 4, 4) of the links in the world, and capsules of the robot and of its load on them."""
 
-    q, qd, torque (n,) are None while the controller is off the network. inputs: the levels that count, when
-    they have changed, whoever set them.
-    """
-
-    stamp_ns: int
-    q: FloatArray | None
-    qd: FloatArray | None
-    torque: FloatArray | None
-    power: PowerState | None
-    following: Following | None
-    outputs: PlcOutputs | None
-    inputs: PlcInputs | None = None
+    link_poses: FloatArray
+    robot: tuple[Capsule, ...]
+    load: tuple[Capsule, ...]
 
 
 class Driver:
-    """Runs `simulation`, `steps` of its steps per tick."""
+    """Runs `simulation`, `steps` of its steps per tick. It is also the controller that links talk to.
 
-    def __init__(self, simulation: Simulation, steps: int = 2) -> None:
-        self._simulation, self._steps = simulation, steps
+    wake_hint: what wakes the controller, for sentences.
+    """
+
+    def __init__(
+        self, simulation: Simulation, steps: int = 2, wake_hint: str = "a Wake-on-LAN packet"
+    ) -> None:
+        self._simulation, self._steps, self._wake_hint = simulation, steps, wake_hint
         self._lock = threading.Lock()
-        self._checker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="trajectory_checks")
-        self._waiting: dict[int, Callable[[Outcome], None]] = {}
-        self._queued = 0
         self._stamp = 0
-        self._energy = 0.0
-        self._burnt = 0.0
-        self._metered = 0.0
-        self._outputs: PlcOutputs | None = None
-        self._inputs: PlcInputs | None = None
+        self._goals = Goals(simulation, self._lock, lambda: self._stamp)
+        self._frames = Frames(simulation, steps)
+        self._power = (0.0, 0.0, 0.0)  # mean W, and energy [J] and time [s] of its last reading
+        self.joint_names = tuple(simulation.robot.joint_names)
 
     def close(self) -> None:
         """Stop checking trajectories."""
-        self._checker.shutdown(wait=True, cancel_futures=True)
-
-    def locked(self) -> AbstractContextManager[Simulation]:
-        """The simulation, for a short while: `with driver.locked() as simulation`."""
-        return _Locked(self._lock, self._simulation)
-
-    def submit(
-        self,
-        read: Callable[[], TrajectoryGoal],
-        started: Callable[[int], None],
-        ended: Callable[[Outcome], None],
-    ) -> None:
-        """Check a goal beside everything else and start it.
-
-        read: makes the goal, may raise TrajectoryRefusedError. started: told the goal's id. ended: told the
-        outcome, whether it was refused (id NO_GOAL) or executed. Both are called from other threads.
-        """
-        with self._lock:
-            full = self._queued >= QUEUE_MAX
-            self._queued += not full
-        if full:
-            ended(_refused(f"{QUEUE_MAX} trajectories are waiting to be checked: send fewer"))
-            return
-        self._checker.submit(self._check_and_start, read, started, ended)
+        self._goals.close()
 
     def tick(self, stamp_ns: int) -> Frame:
         """Let the steps of a tick pass, which ends at the stamp [ns]."""
@@ -93,90 +77,211 @@ class Driver:
             self._stamp = stamp_ns
             for _ in range(self._steps):
                 self._simulation.step()
-            outcomes = self._simulation.take_outcomes()
-            calls = [
-                (self._waiting.pop(outcome.goal_id), outcome)
-                for outcome in outcomes
-                if outcome.goal_id in self._waiting
-            ]
-            frame = self._frame(stamp_ns)
-        for call, outcome in calls:
-            call(outcome)
+            calls = self._goals.take_calls(self._simulation.take_outcomes())
+            frame = self._frames.take(stamp_ns)
+        for ended, outcome in calls:
+            ended(outcome)
         return frame
 
-    def _check_and_start(
-        self,
-        read: Callable[[], TrajectoryGoal],
-        started: Callable[[int], None],
-        ended: Callable[[Outcome], None],
-    ) -> None:
-        try:
-            vetted = self._simulation.vet(read(), self._stamp)
-            with self._lock:
-                goal_id = self._simulation.execute(vetted, self._stamp)
-                self._waiting[goal_id] = ended
-                started(goal_id)
-        except TrajectoryRefusedError as error:
-            ended(_refused(str(error), error.code))
-        except Exception as error:  # a bug must not leave the sender waiting, nor end the checking
-            ended(_refused(f"the check of the trajectory failed: {error!r}"))
-        finally:
-            with self._lock:
-                self._queued -= 1
+    # -- movements ------------------------------------------------------------------------------------------
 
-    def _frame(self, stamp_ns: int) -> Frame:
-        simulation = self._simulation
-        online = simulation.on_the_network
-        backend = simulation.backend
-        outputs = following = power = None
-        if simulation.steps % POWER_PERIOD < self._steps:
-            power = self._power(stamp_ns)
-            present = simulation.outputs()
-            if present != self._outputs:
-                self._outputs = outputs = present
-        if online and simulation.steps % CONTROLLER_PERIOD < self._steps:
-            following = simulation.executor.following(backend.q, backend.qd)
-        levels = simulation.plc.levels
-        inputs = None if levels is self._inputs or not online or levels == self._inputs else levels
-        self._inputs = inputs or self._inputs
-        if not online:
-            return Frame(stamp_ns, None, None, None, power, None, outputs)
-        return Frame(stamp_ns, backend.q, backend.qd, backend.torque, power, following, outputs, inputs)
+    def submit(self, read: Callable[[], TrajectoryGoal], ended: Callable[[Outcome], None]) -> int:
+        """Check a goal beside everything else and start it; returns its ticket. See `Goals.submit`."""
+        return self._goals.submit(read, ended)
 
-    def _power(self, stamp_ns: int) -> PowerState:
-        simulation = self._simulation
-        simulation.settle_meter()
-        reading, modes = simulation.meter.reading(), simulation.modes
-        elapsed = reading.time - self._metered
-        mean = (reading.energy - self._energy) / elapsed if elapsed > 0.0 else 0.0
-        burnt = (reading.burnt_energy - self._burnt) / elapsed if elapsed > 0.0 else 0.0
-        self._energy, self._burnt, self._metered = reading.energy, reading.burnt_energy, reading.time
-        return PowerState(
-            stamp_ns=stamp_ns,
-            mode=modes.mode,
-            target_mode=modes.target,
-            time_to_target=modes.time_to_target,
-            power=mean,
-            energy=reading.energy,
-            base_power=reading.base_power,
-            bus_voltage=reading.bus_voltage,
-            burnt_power=burnt,
-            joint_power=reading.joint_power,
-            joint_torque=reading.joint_torque,
-        )
+    def cancel(self, ticket: int) -> None:
+        """Stop a goal along its path, also one that is still being checked."""
+        with self._lock:
+            self._goals.cancel(ticket)
 
+    def abort(self, sentence: str) -> None:
+        """Stop whatever runs along its path, with this warning."""
+        with self._lock:
+            self._simulation.notices.add(Level.WARN, sentence)
+            self._simulation.abort(f"{sentence}; stopped on the path")
 
-class _Locked(AbstractContextManager[Simulation]):
-    def __init__(self, lock: threading.Lock, simulation: Simulation) -> None:
-        self._lock, self._simulation = lock, simulation
+    def following(self, ticket: int) -> Following | None:
+        """How the robot follows this goal; None when it is not executed now."""
+        with self._lock:
+            if not self._goals.runs(ticket):
+                return None
+            backend = self._simulation.backend
+            return self._simulation.executor.following(backend.q, backend.qd)
 
-    def __enter__(self) -> Simulation:
-        self._lock.acquire()
-        return self._simulation
+    def set_speed_scaling(self, factor: float) -> None:
+        """Scale the speed of every movement by a factor in [0, 1]."""
+        with self._lock:
+            self._simulation.set_speed_scaling(factor)
 
-    def __exit__(self, *exception: object) -> None:
-        self._lock.release()
+    def set_execution(self, settings: ExecutionSettings) -> None:
+        """Use other bounds of trajectories from the next goal on."""
+        with self._lock:
+            self._simulation.set_execution(settings)
 
+    @property
+    def max_points(self) -> int:
+        """Longest trajectory, in points."""
+        return self._simulation.settings.execution.max_points
 
-def _refused(sentence: str, code: int = ErrorCode.INVALID_GOAL) -> Outcome:
-    return Outcome(NO_GOAL, ErrorCode(code), sentence)
+    @property
+    def moving(self) -> bool:
+        """Whether a movement waits or runs."""
+        with self._lock:
+            return self._simulation.executor.active
+
+    # -- requests; each raises RequestRefusedError, also while the controller is off the network -------------
+
+    def press(self, writer: str, name: str, level: bool) -> tuple[PlcInputs, str]:
+        """Set one bit, or the mode switch by the name of its position.
+
+        Returns the levels and a remark: why the bit will not count.
+        """
+        with self._online() as simulation:
+            plc = simulation.plc
+            try:
+                plc.raw.with_bit(name, level)
+            except MsgsError as error:
+                raise RequestRefusedError(StatusCode.INVALID_OBJECT_NAME, str(error)) from error
+            if name in OperatingMode.__members__:
+                plc.turn_switch(writer, OperatingMode[name])
+            else:
+                plc.write(writer, {name: level})
+            return plc.raw, plc.remark(name, simulation.pauses.rest is not None)
+
+    def start_pause(self, seconds: float) -> PowerMode:
+        """Start a PROFIenergy pause; the mode that was chosen."""
+        with self._online() as simulation:
+            return simulation.pauses.start(seconds, simulation.executor.active)
+
+    def end_pause(self) -> float:
+        """End the pause; seconds until motors are on."""
+        with self._online() as simulation:
+            return simulation.pauses.end()
+
+    def query_modes(self) -> tuple[tuple[PowerMode, ...], Mode]:
+        """All modes with the present load and posture, and the present mode."""
+        with self._online() as simulation:
+            return simulation.pauses.query_modes(), simulation.modes.mode
+
+    def recover(self) -> str:
+        """Leave the emergency stop; a remark."""
+        with self._online() as simulation:
+            return simulation.recover()
+
+    def set_load(self, load: Callable[[Cell], Carried]) -> Carried:
+        """Carry what `load` makes of the cell, from now on."""
+        with self._online() as simulation:
+            carried = load(simulation.cell)
+            simulation.set_load(carried)
+            return carried
+
+    # -- what the PLC may do: plc.Controller ----------------------------------------------------------------
+
+    def readout(self) -> Readout | None:
+        """Present outputs; None while the controller is off the network."""
+        with self._lock:
+            simulation = self._simulation
+            if not simulation.on_the_network:
+                return None
+            simulation.mains.settle()
+            reading, modes = simulation.mains.meter.reading(), simulation.modes
+            power, energy, time = self._power
+            if reading.time - time >= _POWER_WINDOW:
+                power = (reading.energy - energy) / (reading.time - time)
+                self._power = (power, reading.energy, reading.time)
+            return Readout(
+                simulation.outputs(),
+                modes.mode,
+                modes.target,
+                modes.time_to_target,
+                modes.time_to_ready(),
+                power,
+                reading.energy,
+                simulation.steps // _ALIVE_STEPS,
+            )
+
+    def inputs(self) -> PlcInputs:
+        """Levels of the PLC inputs as they were written last."""
+        with self._lock:
+            return self._simulation.plc.raw
+
+    def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
+        """Set these levels, the others stay. Raises RequestRefusedError."""
+        with self._noting() as simulation:
+            simulation.plc.write(writer, levels)
+
+    def write_all_inputs(self, writer: str, inputs: PlcInputs) -> None:
+        """Set all levels at once. Raises RequestRefusedError."""
+        with self._noting() as simulation:
+            simulation.plc.write_all(writer, inputs)
+
+    def write_operating_mode(self, writer: str, mode: OperatingMode) -> None:
+        """Turn the mode switch. Raises RequestRefusedError."""
+        with self._noting() as simulation:
+            simulation.plc.turn_switch(writer, mode)
+
+    def request_pause(self, seconds: float) -> None:
+        """Start a PROFIenergy pause, or end it with 0. Raises RequestRefusedError."""
+        with self._lock:
+            pauses, executor = self._simulation.pauses, self._simulation.executor
+            if seconds == 0.0:
+                pauses.end()
+            else:
+                pauses.start(seconds, executor.active)
+
+    def heartbeat(self, timeout: float) -> None:
+        """The PLC is alive; from the first one on it is watched, `timeout` [s] in plant time."""
+        with self._lock:
+            self._simulation.watch.beat(self._simulation.time, timeout)
+
+    def wake(self) -> None:
+        """Wake the controller from hibernation; does nothing otherwise."""
+        with self._lock:
+            self._simulation.wake()
+
+    # -- what people see ------------------------------------------------------------------------------------
+
+    def warn(self, sentence: str) -> None:
+        """Add a warning to the notices."""
+        with self._lock:
+            self._simulation.notices.add(Level.WARN, sentence)
+
+    def snapshot(self, worst_lag: float) -> Snapshot:
+        """Notices since the last snapshot, and the state; worst_lag [s] of whoever ticks."""
+        with self._lock:
+            return Snapshot(self._simulation.notices.take(), report(self._simulation, worst_lag))
+
+    def description(self) -> str:
+        """URDF of the robot with what it carries."""
+        with self._lock:
+            cell, load = self._simulation.cell, self._simulation.load
+        return robot_urdf(cell.robot, load.loads, cell.tcp)
+
+    def bodies(self, q: FloatArray) -> Bodies:
+        """Robot and load at q (n,) [rad]."""
+        with self._lock:
+            load = self._simulation.load
+        poses = self._simulation.tool.chain.link_poses(q[None])[0]
+        of_load = tuple(capsule for item in load.loads for capsule in item.capsules)
+        return Bodies(poses, tuple(self._simulation.robot.capsules), of_load)
+
+    @contextmanager
+    def _online(self) -> Iterator[Simulation]:
+        with self._lock:
+            simulation = self._simulation
+            if not simulation.on_the_network:
+                raise RequestRefusedError(
+                    StatusCode.INVALID_ROBOT_STATE,
+                    f"the controller is off the network ({simulation.modes.mode.name}): "
+                    f"only {self._wake_hint} wakes it",
+                )
+            yield simulation
+
+    @contextmanager
+    def _noting(self) -> Iterator[Simulation]:
+        with self._lock:
+            try:
+                yield self._simulation
+            except RequestRefusedError as error:
+                self._simulation.notices.add(Level.WARN, str(error))
+                raise

@@ -9,10 +9,11 @@ from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.settings import check_settings, setting
-from ir_sim_driver.motion.execution_settings import ExecutionSettings
-from ir_sim_driver.plant.control import ControlSettings
-from ir_sim_driver.plc.inputs import PlcSettings
-from ir_sim_driver.power.power_modes import TransitionSettings
+
+from ir_sim_driver.motion import ExecutionSettings
+from ir_sim_driver.plant import ControlSettings
+from ir_sim_driver.plc import PlcSettings
+from ir_sim_driver.power import TransitionSettings
 
 DT = 0.001
 """Step of plant and controller [s]."""
@@ -20,7 +21,7 @@ DT = 0.001
 
 @dataclass(frozen=True)
 class ControllerSettings:
-    """How the controller starts and what it is told about its surroundings."""
+    """How the controller starts and what it knows of its surroundings."""
 
     start_mode: str = setting(
         "STAND_ON_MOTORS", "Power mode at the start.", choices=REST_MODES, read_only=True

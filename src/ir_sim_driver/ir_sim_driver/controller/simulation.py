@@ -1,43 +1,43 @@
-"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains meter. No
-ROS.
+"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains meter.
 
 One `step` is dt of plant time. Whoever steps it decides how fast time passes; nothing here sleeps or asks a
-clock.
+clock. No ROS.
 """
 
 from __future__ import annotations
+from ir_msgs_py.modes import Mode, OFF_THE_NETWORK
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
+
+from ir_description import Cell, PowerData
 from ir_sim_driver.controller.emergency import EmergencyStop
-from ir_sim_driver.controller.pause import Pauses
+from ir_sim_driver.controller.mains import Mains
+from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
-from ir_sim_driver.motion.execution_settings import ExecutionSettings
-from ir_sim_driver.motion.executor import Executor
-from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
-from ir_sim_driver.motion.manual_speed import manual_scaling
-from ir_sim_driver.motion.tool_point import ToolPoint
-from ir_sim_driver.motion.trajectory_checks import check_goal, check_trajectory, checked_route
+from ir_sim_driver.motion import (
+    ErrorCode,
+    ExecutionSettings,
+    Executor,
+    Outcome,
+    ToolPoint,
+    TrajectoryGoal,
+    check_goal,
+    check_trajectory,
+    checked_route,
+    manual_scaling,
+)
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.plant.backend import Backend
-from ir_sim_driver.plant.loads import Carried
-from ir_sim_driver.plant.power_meter import BasePower, PowerMeter
-from ir_sim_driver.plc.inputs import Plc
-from ir_sim_driver.plc.watchdog import Watchdog
-from ir_sim_driver.power.power_modes import OFF_THE_NETWORK, PowerModes, Wish
+from ir_sim_driver.plant import Backend, Carried
+from ir_sim_driver.plc import Plc, Watchdog
 
-METER_STEPS = 250  # at the latest: arrays of many steps cost what arrays of few do
-_HOME = 0.01  # rad
-_MANUAL = (OperatingMode.T1, OperatingMode.T2)
+_HOME = 0.01  # rad off machine home that still count as there
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,52 +45,46 @@ class VettedGoal:
     """A goal whose trajectory was found executable with the dynamics of one load."""
 
     goal: TrajectoryGoal
-    dynamics: Any
+    dynamics: DynamicsModel
 
 
 class Simulation:
-    """cell: ir_description Cell; data: PowerData; backend: a robot of the same kind with the same dt.
+    """A cell's robot and controller; backend: a robot of the same kind with the same dt.
 
-    Raises nothing in `step`: a backend that fails is stopped, told in `notices`, and restarted by `recover`.
+    Raises nothing in `step`: a backend that fails is stopped, named in `notices`, and restarted by `recover`.
     """
 
     def __init__(
         self,
-        cell: Any,
-        data: Any,
+        cell: Cell,
+        data: PowerData,
         backend: Backend,
         load: Carried,
         settings: SimulationSettings | None = None,
     ) -> None:
         self.settings = settings = settings or SimulationSettings()
         self.cell, self.robot, self.backend = cell, cell.robot, backend
-        self.notices = Notices()
-        self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
-        self.modes = PowerModes(settings.transitions, settings.controller.rest_at_start)
-        self.base = BasePower(data)
-        self.meter = PowerMeter(cell.robot, data, settings.dt, settings.controller.regeneration_mode)
-        self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
-        pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
-        self.pauses = Pauses(self.modes, self.plc, self.standing_power, pe_ids)
-        backend.reset(np.array(cell.machine_home))
+        self.notices, self.watch = Notices(), Watchdog()
+        home = np.array(cell.machine_home)
+        backend.reset(home)
         self.dynamics = DynamicsModel(self.robot, (), cell.base_pose)
-        self.executor = Executor(
-            self.robot, self.dynamics, self.tool, settings.execution, settings.dt, np.array(cell.machine_home)
+        self.mains = Mains(cell.robot, data, backend, settings.dt, settings.controller.regeneration_mode)
+        self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
+        pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
+        self.control = ModeControl(
+            settings.controller, settings.transitions, self.plc, self.standing_power, pe_ids
         )
+        self.modes, self.pauses = self.control.modes, self.control.pauses
+        self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
+        self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)
         self.emergency = EmergencyStop(backend, self.executor, self.tool, self.notices)
-        self.load = load
         self._carry(load)
         self.steps = 0
         self.speed_scaling = 1.0
         self.fault = ""
-        self.watch = Watchdog()
         self._goals = 0
         self._outcomes: list[Outcome] = []
         self._goal_energy = 0.0
-        self._drives_off = False
-        self._wake = self._recover = self._confirmed = self._restart = False
-        self._last_mode = self.modes.mode
-        self._last_operating_mode = self.plc.operating_mode
 
     @property
     def time(self) -> float:
@@ -120,12 +114,10 @@ class Simulation:
         TrajectoryRefusedError.
         """
         refusal = self._refusal()
+        if not refusal and vetted.dynamics is not self.dynamics:
+            refusal = "the load changed while the trajectory was checked"
         if refusal:
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
-        if vetted.dynamics is not self.dynamics:
-            raise TrajectoryRefusedError(
-                ErrorCode.INVALID_GOAL, "the load changed while the trajectory was checked"
-            )
         goal, s = vetted.goal, self.settings
         route = checked_route(
             goal.trajectory, self.executor.motion(), self.robot, self.dynamics, s.execution, s.dt
@@ -134,8 +126,7 @@ class Simulation:
         delay = 0.0 if goal.stamp_ns == 0 else max(0.0, (goal.stamp_ns - now_ns) * 1e-9)
         self.executor.start(self._goals, goal, route, delay)
         self._collect_outcomes()
-        self.settle_meter()
-        self._goal_energy = self.meter.reading().energy
+        self._goal_energy = self.mains.energy()
         return self._goals
 
     def cancel(self, goal_id: int) -> bool:
@@ -164,12 +155,7 @@ class Simulation:
 
     def standing_power(self, level: Mode) -> float:
         """Watts at the mains when standing in a mode at the present posture."""
-        watts = self.base.of(level)
-        if level is Mode.STAND_ON_MOTORS:
-            q = self.backend.q[None]
-            hold = self.dynamics.gravity(q) - self.dynamics.counterbalance(q)
-            watts += float(self.dynamics.axis_power(np.zeros_like(q), hold).sum())
-        return watts
+        return self.mains.standing_power(level, self.dynamics)
 
     def set_load(self, load: Carried) -> None:
         """Carry this from now on. Raises RequestRefusedError while the robot moves."""
@@ -177,7 +163,7 @@ class Simulation:
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE, "the robot moves: a load changes only while it stands"
             )
-        self.settle_meter()
+        self.mains.settle()
         self._carry(load)
 
     def set_execution(self, settings: ExecutionSettings) -> None:
@@ -186,9 +172,9 @@ class Simulation:
         self.executor.set_settings(settings)
 
     def wake(self) -> None:
-        """A Wake-on-LAN packet for this controller came in. Does nothing unless it hibernates."""
+        """Wake the controller; does nothing unless it hibernates."""
         if self.modes.mode is Mode.HIBERNATION:
-            self._wake = True
+            self.control.latches.wake = True
 
     def recover(self) -> str:
         """Leave the emergency stop: release the brakes where the robot stands. Never moves or resumes
@@ -206,7 +192,7 @@ class Simulation:
             self.backend.reset(self.backend.q)
             self.executor.hold(self.backend.q)
             self.fault = ""
-        self._recover = self.modes.mode is Mode.EMERGENCY_STOP
+        self.control.latches.recover = self.modes.mode is Mode.EMERGENCY_STOP
         return "the brakes open where the robot stands; nothing resumes"
 
     def disturb(self, torque: FloatArray | None) -> None:
@@ -217,51 +203,53 @@ class Simulation:
 
     def outputs(self) -> PlcOutputs:
         """Levels to the PLC; all off while the controller is off the network."""
-        if not self.on_the_network:
-            return PlcOutputs(operating_mode=self.plc.operating_mode)
-        mode = self.modes.mode
-        return PlcOutputs(
-            ab=mode in (Mode.BUS_POWER_OFF, Mode.TO_HIBERNATION),
-            bbs=mode in (Mode.STAND_ON_MOTORS, Mode.MOVING, Mode.STAND_ON_BRAKES) and not self._drives_off,
-            drives_ready=self.modes.motors_on,
-            alarm_stop=not self.plc.levels.emergency_stop and mode is not Mode.EMERGENCY_STOP,
-            in_home=bool(np.abs(self.backend.q - self.cell.machine_home).max() < _HOME),
-            moving=mode is Mode.MOVING,
-            operating_mode=self.plc.operating_mode,
-        )
-
-    def settle_meter(self) -> None:
-        """Bring the meter's reading up to the last step."""
-        self.meter.settle(self.backend.work())
+        off_home = float(np.abs(self.backend.q - self.cell.machine_home).max())
+        return self.control.outputs(in_home=off_home < _HOME)
 
     # -- time -----------------------------------------------------------------------------------------------
 
     def step(self) -> None:
         """Let dt pass."""
-        dt = self.settings.dt
-        if self.plc.step(dt, self.pauses.rest is not None):
-            self._react_to_plc()
-        if self.watch.step(self.time):
-            self.notices.add(Level.WARN, f"{self.watch.lost}; stopped on the path until it is back")
-            self.abort(f"{self.watch.lost}; stopped on the path")
-        self.modes.step(dt, self._wish())
-        if self.modes.mode is not self._last_mode:
-            self._mode_changed(self._last_mode, self.modes.mode)
-            self._last_mode = self.modes.mode
+        self._listen()
+        self._change_mode()
         try:
             self._move()
         except BackendError as error:
             self._fail(error)
-        self.meter.add(self.base.of(self.modes.level))
+        self.mains.step(self.modes.level)
         self._collect_outcomes()
-        if self.meter.pending() >= METER_STEPS:
-            self.settle_meter()
         self.steps += 1
 
     def run(self, seconds: float) -> None:
         """Step until `seconds` have passed."""
         for _ in range(round(seconds / self.settings.dt)):
             self.step()
+
+    def _listen(self) -> None:
+        """Take what the PLC has said, and whether it is still there."""
+        if self.plc.step(self.settings.dt, self.pauses.rest is not None):
+            sentence = self.control.react_to_plc()
+            if sentence:
+                self.abort(sentence)
+        if self.watch.step(self.time):
+            self.notices.add(Level.WARN, f"{self.watch.lost}; stopped on the path until it is back")
+            self.abort(f"{self.watch.lost}; stopped on the path")
+
+    def _change_mode(self) -> None:
+        executor, control = self.executor, self.control
+        active = executor.active
+        if active:
+            sentence = control.interruption()
+            if sentence:
+                self.abort(sentence)
+        changed = control.step(
+            self.settings.dt,
+            motion=active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
+            standing=self._standing(),
+            emergency=self.plc.levels.emergency_stop or bool(self.fault),
+        )
+        if changed is not None:
+            self._mode_changed(*changed)
 
     def _move(self) -> None:
         backend, executor = self.backend, self.executor
@@ -283,65 +271,16 @@ class Simulation:
             scaling = min(scaling, manual_scaling(self.tool, path, s, stop_time))
         return scaling
 
-    def _wish(self) -> Wish:
-        plc, executor, pauses = self.plc, self.executor, self.pauses
-        if self.modes.motors_on:
-            pauses.wants_motors = False
-        active = executor.active
-        rest = plc.rest or pauses.rest
-        if rest is None:
-            if self._drives_off:
-                rest = Mode.STAND_ON_BRAKES
-            elif pauses.wants_motors:
-                rest = Mode.STAND_ON_MOTORS
-        if active and (self._restart or (rest is not None and rest is not Mode.STAND_ON_MOTORS)):
-            what = "Cold start" if self._restart else _name(rest)
-            self.abort(f"{what} was requested during the movement; stopped on the path")
-        wish = Wish(
-            rest,
-            active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
-            self._standing(),
-            self._wake,
-            plc.levels.emergency_stop or bool(self.fault),
-            self._recover,
-            self._restart,
-            plc.operating_mode in _MANUAL,
-        )
-        self._wake = False
-        return wish
-
     def _standing(self) -> bool:
         return self.executor.path_speed == 0.0 and self.backend.standing
 
-    def _react_to_plc(self) -> None:
-        plc = self.plc
-        if plc.levels.drives_off and not self._drives_off:
-            self._drives_off = True
-        if plc.drives_on and not plc.levels.drives_off:
-            self._drives_off = False
-            self.pauses.wants_motors = True
-            self._recover = self._recover or (self._confirmed and not plc.levels.emergency_stop)
-        if plc.confirm and not plc.levels.emergency_stop:
-            self._confirmed = True
-        self._restart = self._restart or plc.restart
-        if plc.operating_mode is not self._last_operating_mode:
-            self._last_operating_mode = plc.operating_mode
-            self.abort(f"the operating mode changed to {plc.operating_mode.name}; stopped on the path")
-
     def _mode_changed(self, before: Mode, now: Mode) -> None:
         if now is Mode.EMERGENCY_STOP:
-            self._recover = self._confirmed = self.pauses.wants_motors = False
             self.emergency.start(self.fault or "emergency stop", self._standing())
         elif before is Mode.EMERGENCY_STOP:
-            self._recover = self._confirmed = False
             self.executor.hold(self.backend.q)
-        elif before is Mode.FROM_HIBERNATION:
-            self.plc.wake()
-            self._restart = False
         if now in OFF_THE_NETWORK:
             self.watch.forget()
-            self.pauses.rest = None
-            self._restart = self._drives_off = False
         if now is not Mode.MOVING and before is not Mode.MOVING:
             self.notices.add(Level.OK, f"{before.name} -> {now.name}")
 
@@ -352,45 +291,20 @@ class Simulation:
         self.backend.rest()
 
     def _refusal(self) -> str:
-        """Why no movement may start now; "" when it may."""
-        mode, plc = self.modes.mode, self.plc
+        """Why no movement may start now, "" when it may."""
         if self.fault:
             return f"the simulation has failed: {self.fault}"
-        if self.watch.lost:
-            return self.watch.lost
-        if mode is Mode.EMERGENCY_STOP or plc.levels.emergency_stop:
-            return "emergency stop: release it and recover first"
-        if mode not in (*_READY, Mode.STAND_ON_BRAKES, Mode.TO_BRAKES, Mode.FROM_BRAKES):
-            return f"drives not powered ({mode.name})"
-        rest = plc.rest or self.pauses.rest
-        if rest is not None:
-            return f"drives not powered: {_name(rest)} is requested"
-        if self._drives_off:
-            return "drives not powered: drives_off was given, drives_on is needed"
-        if plc.operating_mode in _MANUAL and not self.settings.controller.enabling_switch:
-            return (
-                f"operating mode is {plc.operating_mode.name}: programs need EXT or AUT, or the "
-                "enabling switch"
-            )
-        return ""
+        return self.watch.lost or self.control.refusal()
 
     def _carry(self, load: Carried) -> None:
         self.backend.set_load(load.loads)
         self.load = load
-        self.base.set_tool(load.watts_always, load.watts_drive_bus)
+        self.mains.set_load(load)
         self.dynamics = DynamicsModel(self.robot, load.loads, self.cell.base_pose)
         self.executor.set_dynamics(self.dynamics)
 
     def _collect_outcomes(self) -> None:
         outcomes = self.executor.take_outcomes()
         if outcomes:
-            self.settle_meter()
-            energy = self.meter.reading().energy - self._goal_energy
+            energy = self.mains.energy() - self._goal_energy
             self._outcomes += [replace(outcome, energy=energy) for outcome in outcomes]
-
-
-_READY = (Mode.STAND_ON_MOTORS, Mode.MOVING)
-
-
-def _name(rest: Mode | None) -> str:
-    return "" if rest is None else rest.name.replace("_", " ").capitalize()

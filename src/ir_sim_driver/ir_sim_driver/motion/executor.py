@@ -8,11 +8,12 @@ docs/driver.md.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-
+from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import RobotModel
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.motion.lead_in import Route
@@ -20,7 +21,7 @@ from ir_sim_driver.motion.path import Motion, Path
 from ir_sim_driver.motion.path_speed import PathSpeed
 from ir_sim_driver.motion.tolerances import Tolerances
 from ir_sim_driver.motion.tool_point import EXACT_FROM, ToolPoint
-from ir_sim_driver.plant.backend import Backend
+from ir_sim_driver.plant import Backend
 
 
 @dataclass(eq=False)
@@ -62,8 +63,8 @@ class Executor:
 
     def __init__(
         self,
-        robot: Any,
-        dynamics: Any,
+        robot: RobotModel,
+        dynamics: DynamicsModel,
         tool: ToolPoint,
         settings: ExecutionSettings,
         dt: float,
@@ -119,7 +120,7 @@ class Executor:
         """Whether the goal is being stopped."""
         return self._run is not None and self._run.stopping
 
-    def set_dynamics(self, dynamics: Any) -> None:
+    def set_dynamics(self, dynamics: DynamicsModel) -> None:
         """Use the dynamics of another load."""
         self._speed.dynamics = dynamics
 

@@ -5,11 +5,12 @@ executed.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-
+from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import RobotModel
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode
@@ -22,8 +23,8 @@ def check_limits(
     coefficients: FloatArray,
     durations: FloatArray,
     start: float,
-    robot: Any,
-    dynamics: Any,
+    robot: RobotModel,
+    dynamics: DynamicsModel,
     settings: ExecutionSettings,
     dt: float,
 ) -> None:
@@ -78,7 +79,7 @@ def _samples(
 
 
 def _refuse_first(
-    robot: Any,
+    robot: RobotModel,
     t: FloatArray,
     value: FloatArray,
     bound: FloatArray,
@@ -101,7 +102,11 @@ def _refuse_first(
 
 
 def check_jumps(
-    coefficients: FloatArray, durations: FloatArray, start: float, robot: Any, settings: ExecutionSettings
+    coefficients: FloatArray,
+    durations: FloatArray,
+    start: float,
+    robot: RobotModel,
+    settings: ExecutionSettings,
 ) -> None:
     """Velocity may jump at a point, and at the end, only by what the drives can follow at once."""
     c, T = coefficients, durations[:, None]

@@ -6,11 +6,11 @@ With s the path time, qdd = q'' sd^2 + q' sdd: the limits of acceleration and to
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-
+from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
+
 from ir_sim_driver.motion.path import Motion
 
 _TINY = 1e-12
@@ -23,7 +23,9 @@ class PathSpeed:
     full speed.
     """
 
-    def __init__(self, dynamics: Any, acceleration_max: FloatArray, stop_time: float, dt: float) -> None:
+    def __init__(
+        self, dynamics: DynamicsModel, acceleration_max: FloatArray, stop_time: float, dt: float
+    ) -> None:
         self.dynamics = dynamics
         self._limit = acceleration_max
         self._rate = 1.0 / stop_time

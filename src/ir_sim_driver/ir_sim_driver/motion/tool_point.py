@@ -4,12 +4,11 @@ matters.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-
 from ir_kernels.chain import Chain
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import RobotModel
 
 EXACT_FROM = 1e-4
 """Bound [m] below which the exact deviation is not worth its time."""
@@ -18,12 +17,13 @@ EXACT_FROM = 1e-4
 class ToolPoint:
     """The tcp (4, 4 in the last link's frame) of `robot` standing at `base_pose` (4, 4)."""
 
-    def __init__(self, robot: Any, base_pose: FloatArray, tcp: FloatArray) -> None:
+    def __init__(self, robot: RobotModel, base_pose: FloatArray, tcp: FloatArray) -> None:
         self.chain = Chain(robot, base_pose, tcp)
         arms = np.linalg.norm(np.array(robot.joint_origin)[1:, :3, 3], axis=1)
         lengths = np.concatenate((arms, [np.linalg.norm(tcp[:3, 3])]))
-        # (n,) farthest the tcp gets from axis i
-        self._reach: FloatArray = np.cumsum(lengths[::-1])[::-1].copy()
+        self._reach: FloatArray = np.cumsum(lengths[::-1])[
+            ::-1
+        ].copy()  # (n,) farthest the tcp gets from axis i
 
     def position(self, q: FloatArray) -> FloatArray:
         """Position (3,) [m] in the world at q (n,)."""

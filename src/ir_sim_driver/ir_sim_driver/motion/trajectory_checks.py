@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-
+from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_description import RobotModel
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal
@@ -51,7 +52,11 @@ def check_goal(
 
 
 def check_trajectory(
-    trajectory: JointTrajectory, robot: Any, dynamics: Any, settings: ExecutionSettings, dt: float
+    trajectory: JointTrajectory,
+    robot: RobotModel,
+    dynamics: DynamicsModel,
+    settings: ExecutionSettings,
+    dt: float,
 ) -> None:
     """Check every instant of a trajectory against the limits, whatever state the robot is in.
 
@@ -70,8 +75,8 @@ def check_trajectory(
 def checked_route(
     trajectory: JointTrajectory,
     now: Motion,
-    robot: Any,
-    dynamics: Any,
+    robot: RobotModel,
+    dynamics: DynamicsModel,
     settings: ExecutionSettings,
     dt: float,
 ) -> Route:
@@ -86,7 +91,7 @@ def checked_route(
     return route
 
 
-def _check_points(trajectory: JointTrajectory, robot: Any, settings: ExecutionSettings) -> None:
+def _check_points(trajectory: JointTrajectory, robot: RobotModel, settings: ExecutionSettings) -> None:
     """Name the point that is outside: more use to its sender than the instant between points."""
     q = trajectory.positions
     over = np.maximum(q - robot.position_max, robot.position_min - q) > settings.position_slack

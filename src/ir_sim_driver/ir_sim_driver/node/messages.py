@@ -14,9 +14,9 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
     trajectory_from_msg,
 )
+
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion.executor import Following
-from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal
+from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import Capsule
 
 _SHORTEST = 1e-6  # m; a cylinder of no length is no marker
 
@@ -24,7 +25,7 @@ class Shape(NamedTuple):
     quaternion: FloatArray
 
 
-def shapes_of(capsules: Sequence[Any], link_poses: FloatArray) -> list[Shape]:
+def shapes_of(capsules: Sequence[Capsule], link_poses: FloatArray) -> list[Shape]:
     """Shapes of capsules on links that stand at link_poses (n+1, 4, 4)."""
     shapes = []
     for capsule in capsules:

@@ -7,9 +7,11 @@ Three kinds of steps of length dt: the motors follow a command (`track`), the me
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import Load
 
 STANDING = 1e-3
 """Speed [rad/s] below which a joint stands."""
@@ -49,7 +51,7 @@ class Backend(Protocol):
     def reset(self, q: FloatArray) -> None:
         """Stand still at q (n,), commanded to stay there."""
 
-    def set_load(self, loads: Sequence[Any]) -> None:
+    def set_load(self, loads: Sequence[Load]) -> None:
         """Carry these loads (ir_description Load, in the last link's frame) from now on."""
 
     def track(self, q_next: FloatArray) -> None:

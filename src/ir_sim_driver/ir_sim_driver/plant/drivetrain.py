@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from typing import Any
 
 import numpy as np
-
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import RobotModel
 
 FRICTION_SMOOTHING = 1e-3
 """Speed [rad/s] over which Coulomb friction changes its sign: 1/1000 of working speed, and zero at rest, so
@@ -25,7 +25,7 @@ class Drivetrain:
     rotor_inertia (n,) [kg m^2], seen at the joint.
     """
 
-    def __init__(self, robot: Any, smoothing: float = FRICTION_SMOOTHING) -> None:
+    def __init__(self, robot: RobotModel, smoothing: float = FRICTION_SMOOTHING) -> None:
         self.rotor_inertia: FloatArray = np.array(robot.reflected_inertia)
         self._viscous: FloatArray = np.array(robot.friction_viscous)
         self._coulomb: FloatArray = np.array(robot.friction_coulomb)

@@ -6,12 +6,12 @@ For tests of everything around the physics, and for long simulated shifts. A dis
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import Load, RobotModel
 from ir_sim_driver.plant.backend import STANDING, Work
 
 BRAKE_FACTOR = 2.0
@@ -21,7 +21,7 @@ BRAKE_FACTOR = 2.0
 class IdealBackend:
     """Implements Backend without physics, for `robot` standing at `base_pose` (4, 4)."""
 
-    def __init__(self, robot: Any, dt: float, base_pose: FloatArray | None = None) -> None:
+    def __init__(self, robot: RobotModel, dt: float, base_pose: FloatArray | None = None) -> None:
         self._robot, self._dt = robot, dt
         self._base_pose = np.eye(4) if base_pose is None else base_pose
         self._brake_step: FloatArray = BRAKE_FACTOR * dt * np.array(robot.acceleration_max)
@@ -42,7 +42,7 @@ class IdealBackend:
         self._earlier: FloatArray = self.q
         self._path = [self.q, self.q]
 
-    def set_load(self, loads: Sequence[Any]) -> None:
+    def set_load(self, loads: Sequence[Load]) -> None:
         """Carry these loads."""
         self._settle()
         self._dynamics = DynamicsModel(self._robot, tuple(loads), self._base_pose)

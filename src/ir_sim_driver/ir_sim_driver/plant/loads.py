@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,8 @@ from ir_description.load import Load
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
+
+from ir_description import Cell, RobotModel
 from ir_sim_driver.errors import RequestRefusedError
 
 CUSTOM = "custom"
@@ -41,7 +42,7 @@ class Carried:
         return float(sum(load.watts_drive_bus for load in self.loads))
 
 
-def carried(cell: Any, text: str) -> Carried:
+def carried(cell: Cell, text: str) -> Carried:
     """Loads that `text` names: "gripper+part", or "none". Raises RequestRefusedError."""
     if text in ("", NO_LOAD):
         return Carried(NO_LOAD, ())
@@ -63,7 +64,7 @@ def carried(cell: Any, text: str) -> Carried:
 
 
 def custom_load(
-    cell: Any, mass: float, com: FloatArray, inertia: FloatArray, always: float, drive_bus: float
+    cell: Cell, mass: float, com: FloatArray, inertia: FloatArray, always: float, drive_bus: float
 ) -> Carried:
     """A load from numbers [kg, m, kg m^2 (ixx ixy ixz iyy iyz izz or none), W]. Raises
     RequestRefusedError.
@@ -90,7 +91,7 @@ def custom_load(
     return Carried(CUSTOM, (load,))
 
 
-def _within_payload(what: Carried, robot: Any) -> Carried:
+def _within_payload(what: Carried, robot: RobotModel) -> Carried:
     if what.mass > robot.rated_payload:
         raise RequestRefusedError(
             _PAYLOAD_CODE,

@@ -6,23 +6,23 @@ plus the copper loss (design of the drives: ir_kernels.power).
 """
 
 from __future__ import annotations
+from ir_msgs_py.modes import Mode
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-
 from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import Mode
+
+from ir_description import PowerData, RobotModel
 from ir_sim_driver.plant.backend import Work
 
 
 class BasePower:
     """Watts of controller, drives and tool in a mode; `data` is ir_description's PowerData."""
 
-    def __init__(self, data: Any) -> None:
+    def __init__(self, data: PowerData) -> None:
         self._controller: dict[Mode, float] = {Mode[mode.name]: mode.controller_watts for mode in data.modes}
         self._drives = float(data.drives_and_brake_release)
         self.set_tool(0.0, 0.0)
@@ -62,7 +62,9 @@ class MeterReading:
 class PowerMeter:
     """Counts steps of dt [s] for `robot`; `data` is PowerData."""
 
-    def __init__(self, robot: Any, data: Any, dt: float, regeneration: Regeneration = "shared") -> None:
+    def __init__(
+        self, robot: RobotModel, data: PowerData, dt: float, regeneration: Regeneration = "shared"
+    ) -> None:
         self._dt = dt
         self._copper: FloatArray = np.array(robot.copper_loss) / np.array(robot.gear_ratio) ** 2
         self._bus = DcBusParameters(data.dc_link_capacity_energy, regeneration)

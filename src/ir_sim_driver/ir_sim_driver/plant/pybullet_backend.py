@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from ir_msgs_py.arrays import FloatArray
+
+from ir_description import Load, RobotModel
 from ir_sim_driver.errors import BackendError
 from ir_sim_driver.plant.backend import STANDING, Work
 from ir_sim_driver.plant.control import CommandFollower, ControlSettings
@@ -37,9 +38,9 @@ class PyBulletBackend:
 
     def __init__(
         self,
-        robot: Any,
+        robot: RobotModel,
         dt: float,
-        urdf: Callable[[Any, Any], str],
+        urdf: Callable[[RobotModel, tuple[Load, ...]], str],
         base_pose: FloatArray | None = None,
         control: ControlSettings | None = None,
     ) -> None:
@@ -61,7 +62,7 @@ class PyBulletBackend:
         self._speed: FloatArray = self._still
         self._speeds: list[FloatArray] = []
         self._torques: list[FloatArray] = []
-        self._loads: tuple[Any, ...] = ()
+        self._loads: tuple[Load, ...] = ()
         self._stale = False  # whether Bullet's state is older than ours
         self.set_load(())
         self.reset(self.q)
@@ -83,7 +84,7 @@ class PyBulletBackend:
         self._follower.reset(self.q)
         self._write_state()
 
-    def set_load(self, loads: Sequence[Any]) -> None:
+    def set_load(self, loads: Sequence[Load]) -> None:
         """Rebuild the robot with these loads, in the same motion."""
         self._loads = tuple(loads)
         text = self._urdf(self._robot, self._loads)

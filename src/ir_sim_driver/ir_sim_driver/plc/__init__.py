@@ -1,1 +1,24 @@
-"""."""
+"""The PLC's side: its inputs with their rules, the watchdog, and the links that it can connect by."""
+
+from ir_sim_driver.plc.inputs import BITS, POWER_BITS, Plc, PlcSettings
+from ir_sim_driver.plc.links import LINKS, SERVICE, TOPIC, WRITERS
+from ir_sim_driver.plc.port import Controller, Link, OpenLink, Readout
+from ir_sim_driver.plc.wake_on_lan import WakeOnLan
+from ir_sim_driver.plc.watchdog import Watchdog
+
+__all__ = [
+    "BITS",
+    "LINKS",
+    "POWER_BITS",
+    "SERVICE",
+    "TOPIC",
+    "WRITERS",
+    "Controller",
+    "Link",
+    "OpenLink",
+    "Plc",
+    "PlcSettings",
+    "Readout",
+    "WakeOnLan",
+    "Watchdog",
+]

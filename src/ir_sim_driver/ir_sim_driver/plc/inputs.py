@@ -7,18 +7,22 @@ when the controller starts or wakes is ignored until it has been 0 once.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, REST_OF_BIT, ROW
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
 from ir_msgs_py.settings import check_settings, setting
-from ir_sim_driver.notices import Level, Notices
+from ir_msgs_py.status import StatusCode
 
-TOPIC, MODBUS, SERVICE = "topic", "modbus", "service"
-OWNERS = ("any", TOPIC, MODBUS, SERVICE)
-POWER_BITS = ("ab", "hib", "ks")
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.notices import Level, Notices
+from ir_sim_driver.plc.links import WRITERS
+
+OWNERS = ("any", *WRITERS)
+RESTART_BIT, STOP_BIT = "ks", "emergency_stop"
+POWER_BITS = (*REST_OF_BIT, RESTART_BIT)
 BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
-_BIT_OF_REST = {Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib"}
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class PlcSettings:
 
 
 class Plc:
-    """Levels in, wishes out; `step` lets time pass.
+    """Levels in, requests out; `step` lets time pass.
 
     levels: what counts now (debounced, without stuck bits). rest: BUS_POWER_OFF, HIBERNATION or None.
     drives_on, confirm, restart: rising edges seen in this step.
@@ -75,15 +79,37 @@ class Plc:
         self._greeted = False
         self._judged: tuple[object, bool] = (None, False)
 
-    def refusal(self, writer: str, presses_stop: bool = False) -> str:
-        """Why `writer` (TOPIC, MODBUS or SERVICE) may not set inputs, "" when it may.
+    def write(self, writer: str, levels: Mapping[str, bool]) -> None:
+        """Set these levels in the name of a writer (one of WRITERS), the others stay.
 
-        presses_stop: all it wants is emergency_stop = 1, which anybody may.
+        Raises RequestRefusedError; a pressed emergency stop counts even then.
         """
+        pressed = levels.get(STOP_BIT, False)
+        self._guard(writer, pressed, alone=pressed and len(levels) == 1)
+        for bit, level in levels.items():
+            self.set_bit(bit, level)
+
+    def write_all(self, writer: str, inputs: PlcInputs) -> None:
+        """Set all levels in the name of a writer. Raises as `write`."""
+        self._guard(writer, inputs.emergency_stop)
+        self.set_all(inputs)
+
+    def turn_switch(self, writer: str, mode: OperatingMode) -> None:
+        """Turn the mode switch in the name of a writer. Raises RequestRefusedError."""
+        self._guard(writer)
+        self.set_operating_mode(mode)
+
+    def _guard(self, writer: str, pressed: bool = False, *, alone: bool = False) -> None:
+        """Raise what a writer may not do; pressing the emergency stop anybody may."""
         owner = self._settings.owner
-        if presses_stop or owner in ("any", writer):
-            return ""
-        return f"PLC inputs belong to {owner!r} (parameter plc.owner): {writer} may only press emergency_stop"
+        if alone or owner in ("any", writer):
+            return
+        if pressed:
+            self.set_bit(STOP_BIT, True)
+        raise RequestRefusedError(
+            StatusCode.INVALID_ROBOT_STATE,
+            f"PLC inputs belong to {owner!r} (parameter plc.owner): {writer} may only press {STOP_BIT}",
+        )
 
     def set_all(self, inputs: PlcInputs) -> None:
         """Take all levels at once, as the topic and the field bus do."""
@@ -102,7 +128,7 @@ class Plc:
         self._set(bit, level)
 
     def remark(self, bit: str, pause_active: bool = False) -> str:
-        """Why the level that `bit` has now will not count as a wish to rest, "" where it will.
+        """Why the level that `bit` has now will not count as a request to rest, "" where it will.
 
         What `step` says with a warning once the level has been there for the debounce.
         """
@@ -165,14 +191,14 @@ class Plc:
                 del self._ages[bit]
                 continue
             self._ages[bit] += dt
-            urgent = bit == "emergency_stop" and level
+            urgent = bit == STOP_BIT and level
             if urgent or self._ages[bit] >= self._settings.debounce - 1e-9:
                 del self._ages[bit]
                 self.levels = self.levels.with_bit(bit, level)
                 if level:
                     self.drives_on |= bit == "drives_on"
                     self.confirm |= bit == "conf_mess"
-                    self.restart |= bit == "ks"
+                    self.restart |= bit == RESTART_BIT
 
     def _judge(self, pause_active: bool) -> None:
         """Decide what AB, HIB and KS mean together; what is refused leaves `rest` as it was."""
@@ -180,7 +206,7 @@ class Plc:
         names = " and ".join(bit.upper() for bit in on)
         refusal = self._refusal(on, pause_active)
         if not refusal:
-            self.rest = Mode.BUS_POWER_OFF if on == ["ab"] else Mode.HIBERNATION if on == ["hib"] else None
+            self.rest = REST_OF_BIT.get(on[0]) if on else None
             return
         self.restart = False
         if on:
@@ -188,7 +214,7 @@ class Plc:
         if (
             self.operating_mode is OperatingMode.EXT
             and self.rest is not None
-            and _BIT_OF_REST[self.rest] not in on
+            and ROW[self.rest].bit not in on
         ):
             self.rest = None
 

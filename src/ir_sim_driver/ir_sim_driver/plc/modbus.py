@@ -1,15 +1,17 @@
 """Modbus TCP server of the controller: a PLC sets its bits and reads the outputs.
 
-The server has a thread and an event loop of its own. What a request wants is asked of `Link`, which the plant
-implements; Modbus exceptions 01 to 03 come from the protocol, 04 says that the controller is off the network.
+The server has a thread and an event loop of its own. Modbus exceptions 01 to 03 come from the protocol, 03
+also for what the controller refuses; 04 says that the controller is off the network.
 """
 
 from __future__ import annotations
 
 import asyncio
 import threading
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Any
 
+from ir_msgs_py.plc import OperatingMode
 from pymodbus import ModbusDeviceIdentification
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusTcpServer
@@ -22,49 +24,29 @@ from ir_sim_driver.plc.modbus_map import (
     HEARTBEAT,
     HOLDING_REGISTERS,
     INPUT_REGISTERS,
+    MODBUS,
     OPERATING_MODE,
     PAUSE,
-    Readout,
+    discrete_inputs,
+    input_registers,
 )
+from ir_sim_driver.plc.port import Controller
 
 _READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT = 1, 2, 3, 4
 _WRITE_COILS, _WRITE_HOLDING = (5, 15), (6, 16)
 _FUNCTIONS = (_READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT, *_WRITE_COILS, *_WRITE_HOLDING)
 _FUNCTION, _REFUSAL = 7, 0x80  # place of the function in a frame, mark of a refusal
-_FOR_ALL = ("heartbeat", "emergency_stop")  # written first: what is refused comes after them
 _BITS = 16  # coils live in registers of 16
 
 
-class Link(Protocol):
-    """What the PLC may do; each raises DriverError for what is refused."""
-
-    def readout(self) -> Readout | None:
-        """Present outputs; None while the controller is off the network."""
-
-    def coils(self) -> list[bool]:
-        """Levels of the coils as they are now, without the heartbeat."""
-
-    def write_coil(self, name: str, level: bool) -> None:
-        """Set the level of one coil."""
-
-    def operating_mode(self) -> int:
-        """Position of the mode switch."""
-
-    def write_operating_mode(self, mode: int) -> None:
-        """Turn the mode switch."""
-
-    def write_pause(self, seconds: int) -> None:
-        """Start a pause, or end it with 0."""
-
-    def heartbeat(self) -> None:
-        """The PLC is alive."""
-
-
 class ModbusServer:
-    """Serves `link` on host:port until it is closed. Raises OSError when the port can't be had."""
+    """Serves `controller` on host:port until it is closed; watchdog [s]: longest time between heartbeats.
 
-    def __init__(self, host: str, port: int, link: Link) -> None:
-        self._link = link
+    Raises OSError when the port can't be had.
+    """
+
+    def __init__(self, host: str, port: int, controller: Controller, watchdog: float) -> None:
+        self._controller, self._watchdog = controller, watchdog
         self._address = (host, port)
         self._ready = threading.Event()
         self._failure: OSError | None = None
@@ -134,7 +116,7 @@ class ModbusServer:
         values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
         """Bring the registers up to date before they are read, or act on what is written."""
-        readout = self._link.readout()
+        readout = self._controller.readout()
         if readout is None:
             return ExcCodes.DEVICE_FAILURE
         try:
@@ -145,38 +127,42 @@ class ModbusServer:
         except DriverError:
             return ExcCodes.ILLEGAL_VALUE
         if function == _READ_COILS:
-            registers[0] = _packed([*self._link.coils(), False])
+            registers[0] = _packed([*self._levels(), False])
         elif function == _READ_DISCRETE:
-            registers[0] = _packed(readout.discrete_inputs())
+            registers[0] = _packed(discrete_inputs(readout))
             if address >= len(DISCRETE_INPUTS):
                 return ExcCodes.ILLEGAL_ADDRESS
         elif function == _READ_HOLDING:
-            registers[OPERATING_MODE] = self._link.operating_mode()
+            registers[OPERATING_MODE] = int(self._controller.inputs().operating_mode)
             registers[PAUSE] = self._pause
         elif function == _READ_INPUT:
-            registers[:] = readout.input_registers()
+            registers[:] = input_registers(readout)
         else:
             return ExcCodes.ILLEGAL_FUNCTION
         return None
 
-    def _write_coils(self, address: int, values: list[Any]) -> ExcCodes | None:
+    def _levels(self) -> list[bool]:
+        inputs = self._controller.inputs()
+        return [bool(getattr(inputs, name)) for name in COILS[:HEARTBEAT]]
+
+    def _write_coils(self, address: int, values: Sequence[int | bool]) -> ExcCodes | None:
         if address + len(values) > len(COILS):
             return ExcCodes.ILLEGAL_ADDRESS
-        levels = dict(enumerate(values, start=address))
-        for k in sorted(levels, key=lambda k: COILS[k] not in _FOR_ALL):
-            level = levels[k]
-            if k == HEARTBEAT:
-                self._link.heartbeat()
-            else:
-                self._link.write_coil(COILS[k], bool(level))
+        levels = {COILS[k]: bool(level) for k, level in enumerate(values, start=address)}
+        if levels.pop(COILS[HEARTBEAT], None) is not None:
+            self._controller.heartbeat(self._watchdog)
+        if levels:
+            self._controller.write_inputs(MODBUS, levels)
         return None
 
-    def _write_holding(self, address: int, values: list[Any]) -> ExcCodes | None:
+    def _write_holding(self, address: int, values: Sequence[int | bool]) -> ExcCodes | None:
         for k, value in enumerate(values, start=address):
             if k == OPERATING_MODE:
-                self._link.write_operating_mode(int(value))
+                if not OperatingMode.T1 <= value <= OperatingMode.EXT:
+                    return ExcCodes.ILLEGAL_VALUE
+                self._controller.write_operating_mode(MODBUS, OperatingMode(value))
             else:
-                self._link.write_pause(int(value))
+                self._controller.request_pause(float(value))
                 self._pause = int(value)
         return None
 

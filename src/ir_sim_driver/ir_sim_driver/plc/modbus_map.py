@@ -6,11 +6,10 @@ Addresses are zero-based (PDU addresses). 32-bit values take two registers, the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from ir_sim_driver.plc.port import Readout
 
-from ir_msgs_py.modes import Mode
-from ir_msgs_py.plc import PlcOutputs
-
+MODBUS = "modbus"
+"""How sentences and the parameter `plc.owner` call the link."""
 COILS = (
     "ab",
     "hib",
@@ -35,34 +34,22 @@ INPUT_REGISTERS = 9
 _WORD = 0xFFFF
 
 
-@dataclass(frozen=True)
-class Readout:
-    """What the PLC may read. power [W], energy [J], times [s]; alive counts on while the plant runs."""
+def discrete_inputs(readout: Readout) -> list[bool]:
+    """Values in the order of DISCRETE_INPUTS."""
+    return [bool(getattr(readout.outputs, name)) for name in DISCRETE_INPUTS]
 
-    outputs: PlcOutputs
-    mode: Mode
-    target: Mode
-    time_to_target: float
-    time_to_operate: float
-    power: float
-    energy: float
-    alive: int
 
-    def discrete_inputs(self) -> list[bool]:
-        """Values in the order of DISCRETE_INPUTS."""
-        return [bool(getattr(self.outputs, name)) for name in DISCRETE_INPUTS]
-
-    def input_registers(self) -> list[int]:
-        """Values of the INPUT_REGISTERS."""
-        return [
-            int(self.mode),
-            int(self.target),
-            _clamped(self.time_to_target * 10.0),
-            *_words(self.power),
-            *_words(self.energy / 100.0),
-            _clamped(self.time_to_operate),
-            self.alive & _WORD,
-        ]
+def input_registers(readout: Readout) -> list[int]:
+    """Values of the INPUT_REGISTERS."""
+    return [
+        int(readout.mode),
+        int(readout.target),
+        _clamped(readout.time_to_target * 10.0),
+        *_words(readout.power),
+        *_words(readout.energy / 100.0),
+        _clamped(readout.time_to_operate),
+        readout.alive & _WORD,
+    ]
 
 
 def _clamped(value: float) -> int:

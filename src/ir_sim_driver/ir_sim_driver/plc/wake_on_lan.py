@@ -1,4 +1,4 @@
-"""Wake-on-LAN: the magic packet, and a thread that listens for it."""
+"""Wake-on-LAN as a link: the magic packet, and a thread that listens for it."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ import re
 import socket
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
 
-from ir_sim_driver.errors import SettingsError
+from ir_msgs_py.settings import check_settings, setting
+
+from ir_sim_driver.errors import LinkError, SettingsError
+from ir_sim_driver.plc.port import Controller, OpenLink
 
 _SYNC = b"\xff" * 6
 _REPEATS = 16
 _PASSWORD_LENGTHS = (0, 4, 6)  # SecureOn
+_PACKET_MAX = 2048  # bytes; longer datagrams are cut, and then wake nobody
+_POLL = 0.2  # s between two looks at whether the listener was closed
 _MAC = re.compile(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}")
 
 
@@ -33,6 +40,43 @@ def wakes(packet: bytes, mac: str) -> bool:
     return packet.startswith(magic) and len(packet) - len(magic) in _PASSWORD_LENGTHS
 
 
+@dataclass(frozen=True)
+class WakeOnLan:
+    """A packet for the controller's MAC address wakes it."""
+
+    name: ClassVar[str] = "wake_on_lan"
+    sets_inputs: ClassVar[bool] = False
+
+    mac: str = setting(
+        "02:00:00:c4:02:10", "MAC address that a Wake-on-LAN packet has to carry.", read_only=True
+    )
+    wake_host: str = setting("127.0.0.1", "Address the Wake-on-LAN listener is bound to.", read_only=True)
+    wake_port: int = setting(
+        9009,
+        "UDP port of the Wake-on-LAN listener; 0 takes a free one. The real one is 9.",
+        minimum=0,
+        maximum=65535,
+        read_only=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+        mac_bytes(self.mac)
+
+    @property
+    def wanted(self) -> bool:
+        """Always: nothing else ends hibernation."""
+        return True
+
+    def open(self, controller: Controller) -> OpenLink:
+        """Listen. Raises LinkError when the port is taken."""
+        try:
+            return WakeListener(self.wake_host, self.wake_port, self.mac, controller.wake)
+        except OSError as error:
+            where = f"UDP {self.wake_host}:{self.wake_port}"
+            raise LinkError(f"no Wake-on-LAN: {where} can't be opened ({error})") from error
+
+
 class WakeListener:
     """Listens on a UDP port and calls `wake` for every packet that is for us; `close` ends it.
 
@@ -48,7 +92,7 @@ class WakeListener:
         except OSError:
             self._socket.close()
             raise
-        self._socket.settimeout(0.2)
+        self._socket.settimeout(_POLL)
         self.port = int(self._socket.getsockname()[1])
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._listen, name="wake_on_lan", daemon=True)
@@ -63,7 +107,7 @@ class WakeListener:
     def _listen(self) -> None:
         while not self._closing.is_set():
             try:
-                packet = self._socket.recv(2048)
+                packet = self._socket.recv(_PACKET_MAX)
             except TimeoutError:
                 continue
             except OSError:  # for example an ICMP error of an earlier answer: the socket stays usable

@@ -1,0 +1,85 @@
+"""What is published at a stamp: joints every tick; power, controller state and PLC levels when due."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.plc import PlcInputs, PlcOutputs
+from ir_msgs_py.power import PowerState
+
+from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.motion import Following
+
+POWER_PERIOD = 10  # steps: 100 Hz
+CONTROLLER_PERIOD = 20  # steps: 50 Hz
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What is published at a stamp [ns]; None: nothing of it now.
+
+    q, qd, torque (n,) [rad, rad/s, Nm] are None while the controller is off the network. inputs: the levels
+    that count, when they have changed, whoever set them.
+    """
+
+    stamp_ns: int
+    q: FloatArray | None
+    qd: FloatArray | None
+    torque: FloatArray | None
+    power: PowerState | None
+    following: Following | None
+    outputs: PlcOutputs | None
+    inputs: PlcInputs | None = None
+
+
+class Frames:
+    """Makes frames of `simulation`, which is stepped `steps` times between two of them."""
+
+    def __init__(self, simulation: Simulation, steps: int) -> None:
+        self._simulation, self._steps = simulation, steps
+        self._outputs: PlcOutputs | None = None
+        self._inputs: PlcInputs | None = None
+        self._energy = self._dissipated = self._metered = 0.0
+
+    def take(self, stamp_ns: int) -> Frame:
+        """The frame of now."""
+        simulation = self._simulation
+        online = simulation.on_the_network
+        backend = simulation.backend
+        outputs = following = power = None
+        if simulation.steps % POWER_PERIOD < self._steps:
+            power = self._power(stamp_ns)
+            present = simulation.outputs()
+            if present != self._outputs:
+                self._outputs = outputs = present
+        if not online:
+            return Frame(stamp_ns, None, None, None, power, None, outputs)
+        if simulation.steps % CONTROLLER_PERIOD < self._steps:
+            following = simulation.executor.following(backend.q, backend.qd)
+        levels = simulation.plc.levels
+        inputs = None if levels is self._inputs or levels == self._inputs else levels
+        self._inputs = inputs or self._inputs
+        return Frame(stamp_ns, backend.q, backend.qd, backend.torque, power, following, outputs, inputs)
+
+    def _power(self, stamp_ns: int) -> PowerState:
+        simulation = self._simulation
+        simulation.mains.settle()
+        reading, modes = simulation.mains.meter.reading(), simulation.modes
+        elapsed = reading.time - self._metered
+        mean = (reading.energy - self._energy) / elapsed if elapsed > 0.0 else 0.0
+        dissipated = (reading.burnt_energy - self._dissipated) / elapsed if elapsed > 0.0 else 0.0
+        self._energy, self._dissipated, self._metered = reading.energy, reading.burnt_energy, reading.time
+        return PowerState(
+            stamp_ns=stamp_ns,
+            mode=modes.mode,
+            target_mode=modes.target,
+            time_to_target=modes.time_to_target,
+            power=mean,
+            energy=reading.energy,
+            base_power=reading.base_power,
+            bus_voltage=reading.bus_voltage,
+            burnt_power=dissipated,
+            joint_power=reading.joint_power,
+            joint_torque=reading.joint_torque,
+        )

@@ -1,0 +1,102 @@
+"""Goals from their sender to their outcome: checked in a thread of their own, started, stopped, reported."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
+
+QUEUE_MAX = 32  # a flood is refused before it fills the memory; a sender waits for its goal anyway
+NO_GOAL = 0
+
+Read = Callable[[], TrajectoryGoal]
+Ended = Callable[[Outcome], None]
+
+
+class Goals:
+    """Goals of `simulation`, which is only touched under `lock`; now: present time of the clock [ns]."""
+
+    def __init__(self, simulation: Simulation, lock: threading.Lock, now: Callable[[], int]) -> None:
+        self._simulation, self._lock, self._now = simulation, lock, now
+        self._checker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="trajectory_checks")
+        self._tickets = 0
+        self._pending: set[int] = set()  # tickets of goals that are not started yet
+        self._canceled: set[int] = set()  # those of them that are to be stopped at once
+        self._running: dict[int, int] = {}  # ids of started goals by ticket
+        self._waiting: dict[int, tuple[int, Ended]] = {}  # tickets and senders by id
+
+    def close(self) -> None:
+        """Stop checking."""
+        self._checker.shutdown(wait=True, cancel_futures=True)
+
+    def submit(self, read: Read, ended: Ended) -> int:
+        """Check a goal beside everything else and start it; returns its ticket.
+
+        read: makes the goal, may raise TrajectoryRefusedError. ended: gets the outcome, whether the goal was
+        refused (id NO_GOAL) or executed; it is called from other threads.
+        """
+        with self._lock:
+            self._tickets += 1
+            ticket = self._tickets
+            full = len(self._pending) >= QUEUE_MAX
+            if not full:
+                self._pending.add(ticket)
+        if full:
+            ended(_refused(f"{QUEUE_MAX} trajectories are waiting to be checked: send fewer"))
+        else:
+            self._checker.submit(self._check_and_start, ticket, read, ended)
+        return ticket
+
+    def cancel(self, ticket: int) -> None:
+        """Stop a goal along its path, as soon as it has started. The lock is held."""
+        if ticket in self._pending:
+            self._canceled.add(ticket)
+        elif ticket in self._running:
+            self._simulation.cancel(self._running[ticket])
+
+    def runs(self, ticket: int) -> bool:
+        """Whether this goal is executed now. The lock is held."""
+        return ticket in self._running and self._running[ticket] == self._simulation.executor.goal_id
+
+    def take_calls(self, outcomes: Sequence[Outcome]) -> list[tuple[Ended, Outcome]]:
+        """Senders of these outcomes, to be called when the lock is free again. The lock is held."""
+        calls = []
+        for outcome in outcomes:
+            ticket, ended = self._waiting.pop(outcome.goal_id, (NO_GOAL, None))
+            self._running.pop(ticket, None)
+            if ended is not None:
+                calls.append((ended, outcome))
+        return calls
+
+    def _check_and_start(self, ticket: int, read: Read, ended: Ended) -> None:
+        refusal = None
+        try:
+            vetted = self._simulation.vet(read(), self._now())
+        except TrajectoryRefusedError as error:
+            refusal = _refused(str(error), error.code)
+        except Exception as error:  # a bug must not leave the sender waiting, nor end the checking
+            refusal = _refused(f"the check of the trajectory failed: {error!r}")
+        with self._lock:
+            self._pending.discard(ticket)
+            canceled = ticket in self._canceled
+            self._canceled.discard(ticket)
+            if refusal is None:
+                try:
+                    goal_id = self._simulation.execute(vetted, self._now())
+                except TrajectoryRefusedError as error:
+                    refusal = _refused(str(error), error.code)
+                else:
+                    self._running[ticket] = goal_id
+                    self._waiting[goal_id] = ticket, ended
+                    if canceled:
+                        self._simulation.cancel(goal_id)
+        if refusal is not None:
+            ended(refusal)
+
+
+def _refused(sentence: str, code: int = ErrorCode.INVALID_GOAL) -> Outcome:
+    return Outcome(NO_GOAL, ErrorCode(code), sentence)

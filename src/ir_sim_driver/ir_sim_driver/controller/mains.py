@@ -1,0 +1,52 @@
+"""The mains supply of the controller: base load by mode, the drives, and what the meter counts."""
+
+from __future__ import annotations
+from ir_msgs_py.modes import Mode
+
+import numpy as np
+from ir_kernels.dynamics import DynamicsModel
+from ir_kernels.power import Regeneration
+
+from ir_description import PowerData, RobotModel
+from ir_sim_driver.plant import Backend, BasePower, Carried, PowerMeter
+
+_SETTLE_STEPS = 250  # at the latest: arrays of many steps cost what arrays of few do
+
+
+class Mains:
+    """Counts what `backend` and the controller take, step by step of dt [s]."""
+
+    def __init__(
+        self, robot: RobotModel, data: PowerData, backend: Backend, dt: float, regeneration: Regeneration
+    ) -> None:
+        self._backend = backend
+        self.base = BasePower(data)
+        self.meter = PowerMeter(robot, data, dt, regeneration)
+
+    def set_load(self, load: Carried) -> None:
+        """Count a load's own consumption from now on."""
+        self.base.set_tool(load.watts_always, load.watts_drive_bus)
+
+    def step(self, level: Mode) -> None:
+        """Count one step at this level: STAND_ON_MOTORS or a rest."""
+        self.meter.add(self.base.of(level))
+        if self.meter.pending() >= _SETTLE_STEPS:
+            self.settle()
+
+    def settle(self) -> None:
+        """Bring the meter's reading up to the last step."""
+        self.meter.settle(self._backend.work())
+
+    def energy(self) -> float:
+        """Energy [J] up to the last step."""
+        self.settle()
+        return self.meter.reading().energy
+
+    def standing_power(self, level: Mode, dynamics: DynamicsModel) -> float:
+        """Watts at the mains when standing in a mode at the present posture."""
+        watts = self.base.of(level)
+        if level is Mode.STAND_ON_MOTORS:
+            q = self._backend.q[None]
+            hold = dynamics.gravity(q) - dynamics.counterbalance(q)
+            watts += float(dynamics.axis_power(np.zeros_like(q), hold).sum())
+        return watts

@@ -1,0 +1,70 @@
+"""PROFIenergy's commands on the running controller: start a pause, end it, ask for the modes."""
+
+from __future__ import annotations
+from ir_msgs_py.modes import Mode, READY
+
+from collections.abc import Callable, Mapping
+
+from ir_msgs_py.plc import OperatingMode
+from ir_msgs_py.power import PowerMode
+from ir_msgs_py.status import StatusCode
+
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.plc import Plc
+from ir_sim_driver.power import PAUSE_MAX, PowerModes, best_mode, mode_table
+
+_MAY_PAUSE = READY | {Mode.STAND_ON_BRAKES, Mode.TO_BRAKES}
+
+
+class Pauses:
+    """PROFIenergy's commands on the power modes.
+
+    rest: the mode of the pause that is on, or None. wants_motors: a pause was ended, motors are asked for.
+    power: watts at the mains in a mode with the present load and posture; pe_ids: PROFIenergy's numbers.
+    """
+
+    def __init__(
+        self, modes: PowerModes, plc: Plc, power: Callable[[Mode], float], pe_ids: Mapping[Mode, int]
+    ) -> None:
+        self._modes, self._plc, self._power, self._pe_ids = modes, plc, power, pe_ids
+        self.rest: Mode | None = None
+        self.wants_motors = False
+
+    def query_modes(self) -> tuple[PowerMode, ...]:
+        """All modes with the present load and posture, entered from where the robot is now."""
+        source = self._modes.level
+        if source not in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
+            source = Mode.STAND_ON_MOTORS
+        return mode_table(self._modes.times, self._power, self._pe_ids, source)
+
+    def start(self, pause: float, executing: bool) -> PowerMode:
+        """Start_Pause of `pause` [s]: go to the mode that takes least energy. Raises RequestRefusedError."""
+        if not 0.0 < pause <= PAUSE_MAX:
+            raise RequestRefusedError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"pause is {pause:g} s: it must be in (0, {PAUSE_MAX:g}] s",
+            )
+        reason = self._refusal(executing)
+        if reason:
+            raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, f"no pause: {reason}")
+        chosen = best_mode(self.query_modes(), pause)
+        self.rest = None if chosen.mode is Mode.STAND_ON_MOTORS else chosen.mode
+        return chosen
+
+    def end(self) -> float:
+        """End_Pause: back to motors; returns the seconds it takes, the rest of the minimum stay included."""
+        self.rest = None
+        self.wants_motors = True
+        return self._modes.time_to_ready()
+
+    def _refusal(self, executing: bool) -> str:
+        plc, mode = self._plc, self._modes.mode
+        if plc.operating_mode is not OperatingMode.EXT:
+            return f"operating mode is {plc.operating_mode.name}, must be EXT"
+        if plc.levels.ab or plc.levels.hib or plc.levels.ks:
+            return "a power bit of the PLC is 1: PROFIenergy and AB, HIB, KS exclude each other"
+        if executing:
+            return "the robot is executing a trajectory"
+        if mode not in _MAY_PAUSE:
+            return f"the mode is {mode.name}, must be STAND_ON_MOTORS or STAND_ON_BRAKES"
+        return ""

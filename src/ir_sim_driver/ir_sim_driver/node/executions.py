@@ -1,0 +1,93 @@
+"""The actions: each goal is given to the driver, followed with feedback, canceled, and answered."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any, Protocol
+
+from ir_sim_driver.controller import Driver
+from ir_sim_driver.motion import ErrorCode, Outcome
+from ir_sim_driver.node.messages import fill_points, goal_from_action
+
+
+class Executing(Protocol):
+    """What the node lends to an action: futures, timers and its clock."""
+
+    def future(self) -> Any:
+        """A future of the node's executor."""
+
+    def wake(self) -> None:
+        """Let the executor look at its futures."""
+
+    def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
+        """Call back again and again until the returned function is called."""
+
+    def now_msg(self) -> Any:
+        """Present time of the node's clock, as a message."""
+
+
+FEEDBACK_PERIOD = 0.05  # s: 20 Hz, enough for a person or a progress bar
+
+
+class Executions:
+    """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, on `driver`."""
+
+    def __init__(self, driver: Driver, node: Executing, action_type: Any) -> None:
+        self._driver, self._node, self._type = driver, node, action_type
+        self._tickets: dict[bytes, int] = {}
+        self._canceled: set[bytes] = set()
+
+    async def execute(self, handle: Any) -> Any:
+        """Carry a goal out; the action's result."""
+        key, request, limit = bytes(handle.goal_id.uuid), handle.request, self._driver.max_points
+        done = self._node.future()
+
+        def ended(outcome: Outcome) -> None:
+            done.set_result(outcome)
+            self._node.wake()
+
+        ticket = self._driver.submit(lambda: goal_from_action(request, limit), ended)
+        self._tickets[key] = ticket
+        if key in self._canceled:  # before it was submitted
+            self._driver.cancel(ticket)
+        end_feedback = self._node.every(FEEDBACK_PERIOD, lambda: self._publish_feedback(handle, ticket))
+        outcome: Outcome = await _awaitable(done)
+        end_feedback()
+        self._tickets.pop(key, None)
+        self._canceled.discard(key)
+        return self._result(handle, outcome)
+
+    def cancel(self, handle: Any) -> None:
+        """Stop a goal along its path."""
+        key = bytes(handle.goal_id.uuid)
+        self._canceled.add(key)
+        ticket = self._tickets.get(key)
+        if ticket is not None:
+            self._driver.cancel(ticket)
+
+    def _result(self, handle: Any, outcome: Outcome) -> Any:
+        result = self._type.Result()
+        result.error_code, result.error_string = int(outcome.code), outcome.sentence
+        if hasattr(result, "max_tool_deviation"):  # ours; FollowJointTrajectory knows neither
+            result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
+        if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):
+            handle.canceled()
+        elif outcome.code is ErrorCode.SUCCESSFUL:
+            handle.succeed()
+        else:
+            handle.abort()
+        return result
+
+    def _publish_feedback(self, handle: Any, ticket: int) -> None:
+        following = self._driver.following(ticket)
+        if following is None:
+            return
+        feedback = self._type.Feedback(joint_names=list(self._driver.joint_names))
+        feedback.header.stamp = self._node.now_msg()
+        fill_points(feedback.desired, feedback.actual, feedback.error, following)
+        handle.publish_feedback(feedback)
+
+
+def _awaitable(future: Any) -> Awaitable[Outcome]:
+    awaitable: Awaitable[Outcome] = future
+    return awaitable

@@ -1,0 +1,69 @@
+"""PROFIenergy: the modes with their powers, times and energies, and the one that suits a pause.
+
+Rule: enter mode m for a pause T when T >= enter + leave + minimum stay, and
+E_enter + E_leave + P_m (T - enter - leave) is below the energy of every other choice.
+"""
+
+from __future__ import annotations
+from ir_msgs_py.modes import Mode
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import pairwise
+
+from ir_msgs_py.power import PowerMode
+
+from ir_sim_driver.power.transitions import Times
+
+PAUSE_MAX = 604_800.0  # s: a week
+
+
+def mode_table(
+    times: Mapping[Mode, Times], power: Callable[[Mode], float], pe_ids: Mapping[Mode, int], source: Mode
+) -> tuple[PowerMode, ...]:
+    """Modes from shallow to deep as they are when entered from `source` (motors or a rest).
+
+    power: watts at the mains in a mode with the present load and posture.
+    """
+    motors = power(Mode.STAND_ON_MOTORS)
+    table = [PowerMode(mode=Mode.STAND_ON_MOTORS, pe_mode_id=pe_ids[Mode.STAND_ON_MOTORS], power=motors)]
+    table += [
+        PowerMode(
+            mode=mode,
+            pe_mode_id=pe_ids[mode],
+            power=power(mode),
+            time_min_pause=rest.enter + rest.leave + rest.minimum_stay,
+            time_to_pause=rest.enter,
+            regular_time_to_operate=rest.leave,
+            time_min_length_of_stay=rest.minimum_stay,
+            energy_to_pause=0.0 if source is mode else rest.enter * power(source),
+            energy_to_operate=rest.leave * motors,
+        )
+        for mode, rest in times.items()
+    ]
+    return tuple(_with_break_even(table))
+
+
+def energy_of(mode: PowerMode, pause: float) -> float:
+    """Energy [J] over a pause [s] that is spent in the mode, transitions included."""
+    enter = mode.time_to_pause if mode.energy_to_pause > 0.0 else 0.0
+    stay = pause - enter - mode.regular_time_to_operate
+    return mode.energy_to_pause + mode.energy_to_operate + mode.power * stay
+
+
+def best_mode(table: tuple[PowerMode, ...], pause: float) -> PowerMode:
+    """The mode with the least energy among those that the pause [s] is long enough for."""
+    fitting = [mode for mode in table if pause >= mode.time_min_pause]
+    return min(fitting, key=lambda mode: energy_of(mode, pause))
+
+
+def _with_break_even(table: list[PowerMode]) -> list[PowerMode]:
+    """Pause from which each mode saves against the next shallower one; never shorter than its least pause."""
+    result = table[:1]
+    for shallower, mode in pairwise(table):
+        slope = shallower.power - mode.power
+        start = energy_of(mode, 0.0) - energy_of(shallower, 0.0)
+        pays = start / slope if slope > 0.0 else math.inf
+        result.append(replace(mode, break_even=max(pays, mode.time_min_pause)))
+    return result
