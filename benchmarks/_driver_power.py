@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell, load_power_data
-from ir_msgs_py.modes import Mode, ROW
+from ir_msgs_py.modes import ROW, Mode
 from ir_msgs_py.trajectory import JointTrajectory
-
-from ir_description import Cell, load_power_data
 from ir_sim_driver import Driver, Simulation, TrajectoryGoal, make_simulation
 
 HOUR = 3600.0
@@ -57,7 +55,7 @@ def transition_rows(cell: Cell) -> list[dict[str, Any]]:
     rows = []
     for mode, enter, leave in RESTS:
         rest, times = ROW[mode], simulation.modes.times[mode]
-        for act, on_the_way, there, asked in (
+        for act, transition, there, asked in (
             (enter, rest.entering, mode, times.enter),
             (leave, rest.leaving, Mode.STAND_ON_MOTORS, times.leave),
         ):

@@ -22,9 +22,6 @@ from _results import Claim, at_least, at_most, command_line, finish, line_of
 from ir_description import Cell, load_cell
 from ir_kernels.power import DcBusParameters, dc_bus
 from ir_msgs_py.trajectory import JointTrajectory
-from kernels import commit, machine
-
-from ir_description import Cell, load_cell
 from ir_sim_driver import Simulation, TrajectoryGoal, TrajectoryRefusedError, make_simulation
 
 CELL = "demo"

@@ -17,8 +17,8 @@ import time
 
 from pymodbus.client import ModbusTcpClient
 
+from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.plc.modbus_map import COILS, HEARTBEAT, INPUT_REGISTERS, PAUSE
-from ir_sim_driver.plc.wake_on_lan import magic_packet
 
 MODES = {0: "stand on motors", 1: "moving", 2: "stand on brakes", 3: "bus power off", 4: "hibernation"}
 POLL = 0.2  # s

@@ -1,7 +1,6 @@
 """What every link between PLC and controller must do: the contract of `Link`, for each registered one."""
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode
 
 import dataclasses
 import socket
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs, PlcOutputs
 from ir_msgs_py.settings import describe
 from ir_sim_driver.errors import LinkError

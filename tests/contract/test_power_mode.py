@@ -76,9 +76,9 @@ def test_the_plant_rests_in_it_as_the_row_says(row: ModeRow) -> None:
     simulation.run(0.1)
     assert simulation.modes.mode is row.mode
     assert simulation.on_the_network == row.on_the_network
-    before = simulation.meter.reading()
+    before = simulation.mains.meter.reading()
     simulation.run(0.2)
-    after = simulation.meter.reading()
+    after = simulation.mains.meter.reading()
     watts = (after.energy - before.energy) / (after.time - before.time)
     assert watts == pytest.approx(simulation.standing_power(row.mode), rel=1e-6)
 

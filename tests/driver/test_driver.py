@@ -1,7 +1,6 @@
 """The running simulation without ROS: frames, goals checked beside it, outcomes to their senders."""
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode
 
 import functools
 import threading
@@ -9,12 +8,14 @@ import time
 
 import numpy as np
 import pytest
+
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.goals import NO_GOAL, QUEUE_MAX
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
-from ir_sim_driver.power import TransitionSettings
+from ir_sim_driver.power import IdleTimes
 
 PERIOD = 2_000_000
 
@@ -131,7 +132,7 @@ def test_a_check_does_not_hold_up_the_plant(driver):
 
 
 def test_energy_is_the_integral_of_the_published_power(make):
-    driver = Driver(make(transitions=TransitionSettings(motors_to_brakes_in_program=5.0)), steps=20)
+    driver = Driver(make(idle=IdleTimes(motors_to_brakes_in_program=5.0)), steps=20)
     total = 0.0
     for k in range(1, 1500):
         frame = driver.tick(k * 10 * PERIOD)

@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
+from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plant.loads import carried
 from ir_sim_driver.plc.inputs import BITS
-from ir_sim_driver.power import TransitionSettings
+from ir_sim_driver.power import IdleTimes
 
-QUICK = TransitionSettings(
+QUICK = TransitionTimes(
     stand_on_brakes_enter=0.02,
     stand_on_brakes_leave=0.03,
     stand_on_brakes_minimum_stay=0.02,
@@ -27,9 +28,8 @@ QUICK = TransitionSettings(
     hibernation_enter=0.05,
     hibernation_leave=0.05,
     hibernation_minimum_stay=0.05,
-    motors_to_brakes_in_program=0.4,
-    motors_to_brakes_in_command=0.2,
 )
+IDLE = IdleTimes(motors_to_brakes_in_program=0.4, motors_to_brakes_in_command=0.2)
 M = Mode
 AWAKE = {M.STAND_ON_MOTORS, M.MOVING}
 LEGAL = {
@@ -103,7 +103,11 @@ def test_a_thousand_sequences_don_t_break_the_controller(make, plan, start, sequ
 
 def keep_the_laws(make, plan, start, sequence):
     simulation = make(
-        transitions=QUICK, controller=ControllerSettings(enabling_switch=True), load="none", backend="ideal"
+        transitions=QUICK,
+        idle=IDLE,
+        controller=ControllerSettings(enabling_switch=True),
+        load="none",
+        backend="ideal",
     )
     before, energy = simulation.modes.mode, 0.0
     for (what, value), steps in sequence:
@@ -136,7 +140,7 @@ def keep_the_laws(make, plan, start, sequence):
 @pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(8, 12))])
 def test_a_hundred_thousand_steps_of_random_bits(make, seed):
     """Bits that a broken PLC might send, 1000 a second."""
-    simulation = make(transitions=QUICK, load="none")
+    simulation = make(transitions=QUICK, idle=IDLE, load="none")
     generator = np.random.default_rng(seed)
     seen = set()
     before = simulation.modes.mode

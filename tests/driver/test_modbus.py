@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
 from ir_msgs_py.modes import Mode
+from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
@@ -25,8 +26,6 @@ from ir_sim_driver.plc.modbus_map import (
     OPERATING_MODE,
     PAUSE,
 )
-from ir_sim_driver.power import TransitionSettings
-from pymodbus.client import ModbusTcpClient
 
 PERIOD = 2_000_000
 WATCHDOG = 0.5
@@ -180,7 +179,7 @@ def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, p
 
 
 def test_a_sleeping_controller_hears_no_heartbeat_and_misses_none(make, serve):
-    simulation = make(transitions=TransitionSettings(hibernation_enter=0.1))
+    simulation = make(transitions=TransitionTimes(hibernation_enter=0.1))
     driver, client, _ = serve(simulation)
     client.write_coil(HEARTBEAT, True)
     client.write_coil(coil("hib"), True)

@@ -8,7 +8,7 @@ from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.power import TransitionSettings, best_mode, energy_of
+from ir_sim_driver.power import IdleTimes, best_mode, energy_of
 
 
 def by_mode(simulation):
@@ -93,7 +93,7 @@ def test_a_pause_is_refused_outside_ext_beside_power_bits_and_in_motion(make):
 
 
 def test_the_brake_timer_runs_again_after_a_pause_that_was_ended_on_motors(make):
-    simulation = make(transitions=TransitionSettings(motors_to_brakes_in_program=0.5))
+    simulation = make(idle=IdleTimes(motors_to_brakes_in_program=0.5))
     simulation.pauses.end()
     simulation.run(0.9)
     assert simulation.modes.mode is Mode.STAND_ON_BRAKES

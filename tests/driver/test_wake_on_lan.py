@@ -7,8 +7,9 @@ import threading
 
 import pytest
 
-from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.plc.wake_on_lan import WakeListener, magic_packet, wakes
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.wake_on_lan import magic_packet, wakes
+from ir_sim_driver.plc.wake_on_lan import WakeListener
 
 MAC = "02:00:00:c4:02:10"
 PACKET = magic_packet(MAC)
@@ -45,7 +46,7 @@ def test_wrong_truncated_and_oversized_packets_are_ignored(packet):
     "mac", ["", "02:00:00:c4:02", "02:00:00:c4:02:zz", "020000c40210", "02:00:00:c4:02:10:11"]
 )
 def test_what_is_no_mac_is_refused(mac):
-    with pytest.raises(SettingsError, match="mac is"):
+    with pytest.raises(InvalidValueError, match="mac is"):
         magic_packet(mac)
 
 

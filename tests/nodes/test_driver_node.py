@@ -21,9 +21,9 @@ from ir_msgs_py import names
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.plc.modbus_map import COILS
-from ir_sim_driver.plc.wake_on_lan import magic_packet
 
 MAC = "02:00:00:c4:02:10"
 QUICK = {

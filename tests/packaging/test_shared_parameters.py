@@ -4,20 +4,9 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
-from ir_msgs_py.settings import Setting, describe
+from ir_msgs_py.settings import describe
 from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_program_runner.parameters import declare_parameters
-from ir_sim_driver.power import TransitionSettings
-from rclpy.node import Node
-
-
-def meaning(each: Setting) -> tuple[object, ...]:
-    return each.name, each.default, each.unit, each.minimum, each.maximum
-
-
-def test_the_driver_has_the_times_of_the_power_modes_under_the_names_of_all() -> None:
-    shared = [meaning(each) for each in describe(TransitionTimes)]
-    assert [meaning(each) for each in describe(TransitionSettings)][: len(shared)] == shared
 
 
 def test_the_runner_has_them_as_parameters_under_these_names(ros_node: Node) -> None:

@@ -3,8 +3,8 @@
 simulation = make_simulation("demo")
 simulation.run(1.0)
 """
-from ir_msgs_py.modes import MODES
 
+from ir_msgs_py.modes import MODES
 from ir_sim_driver.controller import (
     ControllerSettings,
     Driver,
@@ -24,7 +24,7 @@ from ir_sim_driver.errors import (
 from ir_sim_driver.motion import ErrorCode, ExecutionSettings, JointTolerance, Outcome, TrajectoryGoal
 from ir_sim_driver.plant import BACKENDS, Backend, Carried, ControlSettings, Work, carried, custom_load
 from ir_sim_driver.plc import LINKS, Link, PlcSettings
-from ir_sim_driver.power import TransitionSettings
+from ir_sim_driver.power import IdleTimes
 
 __all__ = [
     "BACKENDS",
@@ -39,6 +39,7 @@ __all__ = [
     "DriverError",
     "ErrorCode",
     "ExecutionSettings",
+    "IdleTimes",
     "JointTolerance",
     "Link",
     "LinkError",
@@ -50,7 +51,6 @@ __all__ = [
     "SimulationSettings",
     "TrajectoryGoal",
     "TrajectoryRefusedError",
-    "TransitionSettings",
     "VettedGoal",
     "Work",
     "carried",

@@ -5,20 +5,19 @@ a thread of their own, so that a long one does not keep anybody waiting.
 """
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from ir_description import Capsule, Cell, robot_urdf
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
-
-from ir_description import Capsule, Cell, robot_urdf
 from ir_sim_driver.controller.diagnostics import Entry, report
 from ir_sim_driver.controller.frames import Frame, Frames
 from ir_sim_driver.controller.goals import Goals

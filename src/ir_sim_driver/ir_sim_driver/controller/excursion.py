@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion import Path, ToolPoint
 
 _AHEAD = 2.0  # s of path that a stop can cover at most

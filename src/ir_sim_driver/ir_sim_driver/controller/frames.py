@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_msgs_py.power import PowerState
-
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.motion import Following
 

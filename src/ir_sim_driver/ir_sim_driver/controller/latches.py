@@ -1,9 +1,8 @@
 """What was asked for once and stays so until it is done: drives off, recovery, cold start, waking."""
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode, OFF_THE_NETWORK
 
-
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
 from ir_sim_driver.plc import Plc
 
 

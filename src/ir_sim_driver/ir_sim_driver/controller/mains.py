@@ -1,13 +1,13 @@
 """The mains supply of the controller: base load by mode, the drives, and what the meter counts."""
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode
 
 import numpy as np
-from ir_kernels.dynamics import DynamicsModel
-from ir_kernels.power import Regeneration
 
 from ir_description import PowerData, RobotModel
+from ir_kernels.dynamics import DynamicsModel
+from ir_kernels.power import Regeneration
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant import Backend, BasePower, Carried, PowerMeter
 
 _SETTLE_STEPS = 250  # at the latest: arrays of many steps cost what arrays of few do

@@ -1,17 +1,16 @@
 """Which power mode is asked for: PLC bits, pauses and latches put together, and why no movement may start."""
 
 from __future__ import annotations
-from ir_msgs_py.modes import DRIVES_ON, Mode, OFF_THE_NETWORK, READY, ROW
 
 from collections.abc import Callable, Mapping
 
+from ir_msgs_py.modes import DRIVES_ON, OFF_THE_NETWORK, READY, ROW, Mode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
-
 from ir_sim_driver.controller.latches import Latches
 from ir_sim_driver.controller.pauses import Pauses
-from ir_sim_driver.controller.settings import ControllerSettings
+from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.plc import Plc
-from ir_sim_driver.power import Demand, PowerModes, TransitionSettings
+from ir_sim_driver.power import Demand, PowerModes
 
 MANUAL = (OperatingMode.T1, OperatingMode.T2)
 _STOPS = "was requested during the movement; stopped on the path"
@@ -25,14 +24,13 @@ class ModeControl:
 
     def __init__(
         self,
-        settings: ControllerSettings,
-        transitions: TransitionSettings,
+        settings: SimulationSettings,
         plc: Plc,
         power: Callable[[Mode], float],
         pe_ids: Mapping[Mode, int],
     ) -> None:
-        self._enabling_switch, self._plc = settings.enabling_switch, plc
-        self.modes = PowerModes(transitions, settings.rest_at_start)
+        self._enabling_switch, self._plc = settings.controller.enabling_switch, plc
+        self.modes = PowerModes(settings.transitions, settings.idle, settings.controller.rest_at_start)
         self.pauses = Pauses(self.modes, plc, power, pe_ids)
         self.latches = Latches()
         self._operating_mode = plc.operating_mode

@@ -1,14 +1,13 @@
 """PROFIenergy's commands on the running controller: start a pause, end it, ask for the modes."""
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode, READY
 
 from collections.abc import Callable, Mapping
 
+from ir_msgs_py.modes import READY, Mode
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
-
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import Plc
 from ir_sim_driver.power import PAUSE_MAX, PowerModes, best_mode, mode_table

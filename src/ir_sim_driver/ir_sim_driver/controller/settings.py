@@ -9,11 +9,11 @@ from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.settings import check_settings, setting
-
+from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import ControlSettings
 from ir_sim_driver.plc import PlcSettings
-from ir_sim_driver.power import TransitionSettings
+from ir_sim_driver.power import IdleTimes
 
 DT = 0.001
 """Step of plant and controller [s]."""
@@ -65,5 +65,6 @@ class SimulationSettings:
     controller: ControllerSettings = field(default_factory=ControllerSettings)
     control: ControlSettings = field(default_factory=ControlSettings)
     execution: ExecutionSettings = field(default_factory=ExecutionSettings)
-    transitions: TransitionSettings = field(default_factory=TransitionSettings)
+    transitions: TransitionTimes = field(default_factory=TransitionTimes)
+    idle: IdleTimes = field(default_factory=IdleTimes)
     plc: PlcSettings = field(default_factory=PlcSettings)

@@ -5,17 +5,17 @@ clock. No ROS.
 """
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode, OFF_THE_NETWORK
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.plc import OperatingMode, PlcOutputs
-from ir_msgs_py.status import StatusCode
 
 from ir_description import Cell, PowerData
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
+from ir_msgs_py.plc import OperatingMode, PlcOutputs
+from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.emergency import EmergencyStop
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.controller.mode_control import ModeControl
@@ -71,9 +71,7 @@ class Simulation:
         self.mains = Mains(cell.robot, data, backend, settings.dt, settings.controller.regeneration_mode)
         self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
         pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
-        self.control = ModeControl(
-            settings.controller, settings.transitions, self.plc, self.standing_power, pe_ids
-        )
+        self.control = ModeControl(settings, self.plc, self.standing_power, pe_ids)
         self.modes, self.pauses = self.control.modes, self.control.pauses
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
         self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)

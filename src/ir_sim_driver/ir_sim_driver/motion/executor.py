@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import RobotModel
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.motion.lead_in import Route

@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import RobotModel
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode

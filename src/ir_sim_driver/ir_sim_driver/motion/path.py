@@ -6,6 +6,7 @@ from bisect import bisect_right
 from typing import NamedTuple
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 
 _DERIVATIVE = np.arange(6.0)

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
-
 from ir_sim_driver.motion.path import Motion
 
 _TINY = 1e-12

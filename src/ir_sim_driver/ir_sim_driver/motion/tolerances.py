@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.goal import JointTolerance
 
 

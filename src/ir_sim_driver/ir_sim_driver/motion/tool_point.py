@@ -5,10 +5,10 @@ matters.
 from __future__ import annotations
 
 import numpy as np
-from ir_kernels.chain import Chain
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import RobotModel
+from ir_kernels.chain import Chain
+from ir_msgs_py.arrays import FloatArray
 
 EXACT_FROM = 1e-4
 """Bound [m] below which the exact deviation is not worth its time."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+
+from ir_description import RobotModel
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.trajectory import JointTrajectory
-
-from ir_description import RobotModel
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal

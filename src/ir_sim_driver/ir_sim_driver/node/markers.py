@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ir_msgs_py.ros.conversions import point_to_msg, time_to_msg
-
 from ir_description import Capsule
 from ir_msgs_py import names
+from ir_msgs_py.ros.conversions import point_to_msg, time_to_msg
 from ir_sim_driver.controller import Bodies
 from ir_sim_driver.node.shapes import Shape, shapes_of
 

@@ -14,7 +14,6 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
     trajectory_from_msg,
 )
-
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
 

@@ -7,20 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from ir_msgs.action import ExecuteTrajectory
-from ir_msgs.msg import ControllerState, PowerState
-from ir_msgs.msg import PlcInputs as PlcInputsMsg
-from ir_msgs.msg import PlcOutputs as PlcOutputsMsg
-from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import (
-    plc_inputs_from_msg,
-    plc_inputs_to_msg,
-    plc_outputs_to_msg,
-    power_state_to_msg,
-    time_to_msg,
-)
-from ir_msgs_py.ros.running import run_node
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -32,7 +18,21 @@ from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_description import DescriptionError
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import ControllerState, PowerState
+from ir_msgs.msg import PlcInputs as PlcInputsMsg
+from ir_msgs.msg import PlcOutputs as PlcOutputsMsg
+from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.ros.conversions import (
+    plc_inputs_from_msg,
+    plc_inputs_to_msg,
+    plc_outputs_to_msg,
+    power_state_to_msg,
+    time_to_msg,
+)
+from ir_msgs_py.ros.running import run_node
 from ir_sim_driver.controller import Driver, Entry, Frame, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError
 from ir_sim_driver.motion import ErrorCode, Outcome

@@ -9,15 +9,13 @@ from rclpy.node import Node
 
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.settings import check_settings, setting
-from ir_msgs_py.transitions import PREFIX
-from rclpy.node import Node
-
+from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_sim_driver.controller import ControllerSettings, SimulationSettings
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import BACKENDS, ControlSettings
 from ir_sim_driver.plc import LINKS, Link, PlcSettings, WakeOnLan
-from ir_sim_driver.power import TransitionSettings
+from ir_sim_driver.power import IdleTimes
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,8 @@ class DriverParameters:
             controller=Parameters(node, ControllerSettings).value,
             control=Parameters(node, ControlSettings, prefix="control.").value,
             execution=execution.value,
-            transitions=Parameters(node, TransitionSettings, prefix=PREFIX).value,
+            transitions=Parameters(node, TransitionTimes, prefix=PREFIX, read_only=True).value,
+            idle=Parameters(node, IdleTimes, prefix=PREFIX).value,
             plc=Parameters(node, PlcSettings, prefix="plc.").value,
         )
         self._execution = execution

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from ir_description import Cell
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.conversions import plc_inputs_to_msg, power_mode_to_msg, status_to_msg
 from ir_msgs_py.status import Status, StatusCode
-
-from ir_description import Cell
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.errors import DriverError, RequestRefusedError
 from ir_sim_driver.plant import CUSTOM, Carried, carried, custom_load

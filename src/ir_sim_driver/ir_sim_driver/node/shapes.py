@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import Capsule
+from ir_msgs_py.arrays import FloatArray
 
 _SHORTEST = 1e-6  # m; a cylinder of no length is no marker
 

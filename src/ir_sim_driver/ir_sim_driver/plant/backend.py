@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from ir_msgs_py.arrays import FloatArray
-
 from ir_description import Load
+from ir_msgs_py.arrays import FloatArray
 
 STANDING = 1e-3
 """Speed [rad/s] below which a joint stands."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.settings import check_settings, setting
 

@@ -10,9 +10,9 @@ import math
 from bisect import bisect_right
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import RobotModel
+from ir_msgs_py.arrays import FloatArray
 
 FRICTION_SMOOTHING = 1e-3
 """Speed [rad/s] over which Coulomb friction changes its sign: 1/1000 of working speed, and zero at rest, so

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import Load, RobotModel
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.plant.backend import STANDING, Work
 
 BRAKE_FACTOR = 2.0

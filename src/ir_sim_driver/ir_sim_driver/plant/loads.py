@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_description import Cell, RobotModel
 from ir_description.load import Load
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
-
-from ir_description import Cell, RobotModel
 from ir_sim_driver.errors import RequestRefusedError
 
 CUSTOM = "custom"

@@ -6,16 +6,16 @@ plus the copper loss (design of the drives: ir_kernels.power).
 """
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import PowerData, RobotModel
+from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant.backend import Work
 
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import Load, RobotModel
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import BackendError
 from ir_sim_driver.plant.backend import STANDING, Work
 from ir_sim_driver.plant.control import CommandFollower, ControlSettings

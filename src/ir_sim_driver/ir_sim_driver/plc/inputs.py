@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ir_msgs_py.modes import Mode, REST_OF_BIT, ROW
+from ir_msgs_py.modes import REST_OF_BIT, ROW, Mode
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
 from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.status import StatusCode
-
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plc.links import WRITERS

@@ -11,12 +11,12 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-from ir_msgs_py.plc import OperatingMode
 from pymodbus import ModbusDeviceIdentification
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
+from ir_msgs_py.plc import OperatingMode
 from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plc.modbus_map import (
     COILS,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc.modbus_map import MODBUS
 from ir_sim_driver.plc.port import Controller, OpenLink

@@ -4,12 +4,12 @@ A link knows its own wire (registers, packets) and nothing of the simulation; th
 """
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs, PlcOutputs
 
 

@@ -1,8 +1,7 @@
-"""Wake-on-LAN as a link: the magic packet, and a thread that listens for it."""
+"""Wake-on-LAN as a link: a thread that listens for the magic packet."""
 
 from __future__ import annotations
 
-import re
 import socket
 import threading
 from collections.abc import Callable
@@ -10,34 +9,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ir_msgs_py.settings import check_settings, setting
-
-from ir_sim_driver.errors import LinkError, SettingsError
+from ir_msgs_py.wake_on_lan import mac_bytes, wakes
+from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc.port import Controller, OpenLink
 
-_SYNC = b"\xff" * 6
-_REPEATS = 16
-_PASSWORD_LENGTHS = (0, 4, 6)  # SecureOn
 _PACKET_MAX = 2048  # bytes; longer datagrams are cut, and then wake nobody
 _POLL = 0.2  # s between two looks at whether the listener was closed
-_MAC = re.compile(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}")
-
-
-def mac_bytes(mac: str) -> bytes:
-    """Return the six bytes of "02:00:00:c4:02:10". Raises SettingsError."""
-    if not _MAC.fullmatch(mac):
-        raise SettingsError(f"mac is {mac[:80]!r}: it must be six hex bytes like 02:00:00:c4:02:10")
-    return bytes.fromhex(mac.replace(":", "").replace("-", ""))
-
-
-def magic_packet(mac: str) -> bytes:
-    """Return the 102 bytes that wake the controller with this MAC."""
-    return _SYNC + mac_bytes(mac) * _REPEATS
-
-
-def wakes(packet: bytes, mac: str) -> bool:
-    """Whether the packet is a magic packet for this MAC: nothing before it, at most a password behind it."""
-    magic = magic_packet(mac)
-    return packet.startswith(magic) and len(packet) - len(magic) in _PASSWORD_LENGTHS
 
 
 @dataclass(frozen=True)

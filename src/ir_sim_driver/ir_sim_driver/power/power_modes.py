@@ -1,13 +1,13 @@
-"""The state machine of the power modes: rests, their transitions, emergency stop. `modes` lists them."""
+"""The state machine of the power modes: rests, their transitions, emergency stop."""
 
 from __future__ import annotations
-from ir_msgs_py.modes import DRIVES_ON, Mode, ModeRow, READY, RESTS, ROW
 
 from typing import NamedTuple
 
-
+from ir_msgs_py.modes import DRIVES_ON, READY, RESTS, ROW, Mode, ModeRow
+from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.power.transitions import Times, TransitionSettings, times_of
+from ir_sim_driver.power.transitions import IdleTimes, Times, times_of
 
 _INSTANT = 1e-6  # s; sums of steps are not exact
 _TRANSITIONS = {mode: row for row in RESTS for mode in (row.entering, row.leaving)}
@@ -44,13 +44,15 @@ class PowerModes:
     motors_on: whether the motors follow commands. times: of every rest.
     """
 
-    def __init__(self, settings: TransitionSettings, start: Mode = Mode.STAND_ON_MOTORS) -> None:
+    def __init__(
+        self, transitions: TransitionTimes, idle: IdleTimes, start: Mode = Mode.STAND_ON_MOTORS
+    ) -> None:
         if start not in ROW:
             raise SettingsError(
                 f"the controller cannot start in {start.name}: known are {', '.join(m.name for m in ROW)}"
             )
-        self._idle = {False: settings.motors_to_brakes_in_program, True: settings.motors_to_brakes_in_command}
-        self.times: dict[Mode, Times] = times_of(settings)
+        self._idle = {False: idle.motors_to_brakes_in_program, True: idle.motors_to_brakes_in_command}
+        self.times: dict[Mode, Times] = times_of(transitions)
         self.mode: Mode = start
         self.source: Mode = start
         self.elapsed = 0.0

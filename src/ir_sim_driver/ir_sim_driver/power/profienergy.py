@@ -5,15 +5,14 @@ E_enter + E_leave + P_m (T - enter - leave) is below the energy of every other c
 """
 
 from __future__ import annotations
-from ir_msgs_py.modes import Mode
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.power import PowerMode
-
 from ir_sim_driver.power.transitions import Times
 
 PAUSE_MAX = 604_800.0  # s: a week
