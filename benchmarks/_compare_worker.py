@@ -1,7 +1,7 @@
 """One checkout's side of a comparison: answers the requests of the list by number.
 
 Reads one number per line, writes one JSON line {group, name, answer, cpu_s, wall_s}. The first line that it
-writes tells how many requests there are and which checkout answers. Started by compare.py with the packages
+writes says how many requests there are and which checkout answers. Started by compare.py with the packages
 of that checkout on PYTHONPATH.
 """
 

@@ -58,20 +58,20 @@ def asked(task: Task, seed: int = 0) -> PlanOptions:
 
 
 def first_feasible(info: PlanningInfo) -> float:
-    """Seconds until the first free path was known, as the stages tell it.
+    """Seconds until the first free path was known, as the stages say it.
 
     Without a note of it: until the first stage had ended that didn't come back with nothing.
     """
-    for tells in (lambda note: note.startswith(FIRST), lambda note: not note.startswith(NOTHING)):
+    for says in (lambda note: note.startswith(FIRST), lambda note: not note.startswith(NOTHING)):
         passed = 0.0
         for stage in info.stages:
             passed += stage.seconds
-            if tells(stage.note):
+            if says(stage.note):
                 return passed
     return float("nan")
 
 
-def tells_first(info: PlanningInfo) -> bool:
+def notes_first(info: PlanningInfo) -> bool:
     """Whether a stage notes the first feasible path."""
     return any(stage.note.startswith(FIRST) for stage in info.stages)
 

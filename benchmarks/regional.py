@@ -25,12 +25,12 @@ from _regional_ours import (
     Run,
     asked,
     knows,
+    notes_first,
     patient_runs,
     planner_of,
     repeats,
     runs,
     solved_alone,
-    tells_first,
 )
 from _regional_plot import plot
 from _regional_tasks import CELLS, Task, tasks_of
@@ -201,7 +201,7 @@ def main() -> None:
             shown = ("task", "solved", "first_ms", "final_ms", "J", "ompl_J", "best_J")
             print(line_of({key: row.get(key, "-") for key in shown}), flush=True)
         plan = planner.plan_regional(tasks[0].start, Goal(configuration=tasks[0].goal), asked(tasks[0]))
-        noted &= tells_first(plan.info)
+        noted &= notes_first(plan.info)
     print()
     tables(figures)
     remarks(given, noted, bool(earlier))

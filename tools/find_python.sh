@@ -2,7 +2,7 @@
 # Prints the interpreter that set-up uses: that of .venv where there is one that runs, else the first that is complete,
 # 3.11 before 3.12 before 3.13 (PyBullet has a wheel for 3.11 only). $PYTHON, when set, is the only candidate.
 # A name on the path proves nothing: version managers leave shims that fail, and distributions ship Python
-# without venv or without headers. Every candidate is run, and what it lacks is told.
+# without venv or without headers. Every candidate is run, and what it lacks is printed.
 
 complete='
 import importlib.util, os, platform, sys, sysconfig

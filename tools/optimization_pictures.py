@@ -8,13 +8,11 @@ are printed.
 
 from __future__ import annotations
 
-import argparse
 import time
-from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from _pictures import folder_asked
 
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
@@ -26,6 +24,7 @@ from ir_planner.trajectories.optimization import OptimizationPlan
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 
 CELL, TASK = "deep_box", "bin->pal"
 BEFORE, AFTER, STEEL = "#c2272d", "#2a6fbb", "#8a8f98"
@@ -33,18 +32,8 @@ BEFORE, AFTER, STEEL = "#c2272d", "#2a6fbb", "#8a8f98"
 
 def main() -> None:
     """Draw it."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else "")
-    parser.add_argument("--folder", type=Path, default=Path("docs/images"))
-    folder = parser.parse_args().folder
-    folder.mkdir(parents=True, exist_ok=True)
-    planner = Planner(time.monotonic)
-    planner.set_cell("", CELL)
-    scene = planner.scene()
-    task = scene.cell.task(TASK)
-    ends = np.stack([task.start, task.goal])
-    rest = np.zeros_like(ends)
-    given = JointTrajectory.from_seconds(scene.cell.robot.joint_names, [0.0, 3.0], ends, rest, rest)
-    plan = planner.optimize_trajectory(given, PlanOptions(planning_time=60.0))
+    folder = folder_asked(__doc__)
+    scene, given, plan = optimized()
     assert plan.trajectory is not None, plan.status.message
     figure, panels = plt.subplots(1, 2, figsize=(12.0, 4.6), constrained_layout=True)
     distances(panels[0], given, plan.trajectory, scene)
@@ -56,7 +45,19 @@ def main() -> None:
     print(f"{plan.info.iterations} iterations, {plan.info.planning_time:.2f} s")
 
 
-def distances(panel: Any, before: JointTrajectory, after: JointTrajectory, scene: PlanningScene) -> None:
+def optimized() -> tuple[PlanningScene, JointTrajectory, OptimizationPlan]:
+    """The scene, the straight movement of 3 s, and what the planner makes of it."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", CELL)
+    scene = planner.scene()
+    task = scene.cell.task(TASK)
+    ends = np.stack([task.start, task.goal])
+    rest = np.zeros_like(ends)
+    given = JointTrajectory.from_seconds(scene.cell.robot.joint_names, [0.0, 3.0], ends, rest, rest)
+    return scene, given, planner.optimize_trajectory(given, PlanOptions(planning_time=60.0))
+
+
+def distances(panel: Axes, before: JointTrajectory, after: JointTrajectory, scene: PlanningScene) -> None:
     """Smallest distance of all pairs over the share of the duration."""
     share = np.linspace(0.0, 1.0, 400)
     for trajectory, colour, text in ((before, BEFORE, "before"), (after, AFTER, "after")):
@@ -71,7 +72,7 @@ def distances(panel: Any, before: JointTrajectory, after: JointTrajectory, scene
     panel.set_title("A straight movement through the box, pushed out of it")
 
 
-def front(panel: Any, plan: OptimizationPlan, scene: PlanningScene) -> None:
+def front(panel: Axes, plan: OptimizationPlan, scene: PlanningScene) -> None:
     """Energy over duration, beside the fastest movement slowed down."""
     durations = [point.report.duration for point in plan.front]
     energies = [point.report.energy for point in plan.front]

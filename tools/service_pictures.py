@@ -8,14 +8,13 @@ this again when it changes.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import time
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from _pictures import folder_asked
 from scipy.spatial import ConvexHull
 
 from ir_description import load_cell, load_power_data
@@ -34,6 +33,7 @@ from ir_planner.service.work_configurations import ServiceRequest
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 
 SIDE, PLAN = (0, 2), (0, 1)  # machine axes that a panel shows
 PICTURES = (("cnc_door", "press", "service_press.png"), ("deep_box", "tun", "service_tunnel.png"))
@@ -43,10 +43,7 @@ STEEL, ZONE, ARM = "#8a8f98", "#d08700", "#2a6fbb"
 
 def main() -> None:
     """Draw both."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else "")
-    parser.add_argument("--folder", type=Path, default=Path("docs/images"))
-    folder = parser.parse_args().folder
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder_asked(__doc__)
     for cell, station, name in PICTURES:
         draw(cell, station, folder / name)
 
@@ -79,7 +76,7 @@ def draw(cell_name: str, station_name: str, path: Path) -> None:
     plt.close(figure)
 
 
-def stage_one(panel: Any, q: FloatArray, scene: PlanningScene, station: str) -> None:
+def stage_one(panel: Axes, q: FloatArray, scene: PlanningScene, station: str) -> None:
     """The goal configurations, from the side."""
     surroundings(panel, scene, station, SIDE)
     for k, one in enumerate(q):
@@ -87,7 +84,7 @@ def stage_one(panel: Any, q: FloatArray, scene: PlanningScene, station: str) -> 
     panel.set_title(f"Stage one: {len(q)} goal configurations by CCD, from the side")
 
 
-def raw_walk(panel: Any, walk: Walk, scene: PlanningScene, station: str) -> None:
+def raw_walk(panel: Axes, walk: Walk, scene: PlanningScene, station: str) -> None:
     """Paths of the population, from above."""
     surroundings(panel, scene, station, PLAN)
     for path in walk.paths:
@@ -95,11 +92,11 @@ def raw_walk(panel: Any, walk: Walk, scene: PlanningScene, station: str) -> None
         panel.plot(*line.T, "o-", color=ARM, alpha=0.5, markersize=3, linewidth=1)
     panel.set_title(
         f"Stage two, eq. (7): {walk.generations} generations, {walk.candidates} copies,\n"
-        f"{len(walk.paths)} ways of the tcp out, from above"
+        f"{len(walk.paths)} paths of the tcp out, from above"
     )
 
 
-def candidates(panel: Any, plan: ServicePlan, scene: PlanningScene, station: str) -> None:
+def candidates(panel: Axes, plan: ServicePlan, scene: PlanningScene, station: str) -> None:
     """Certified candidates, from above; the arm at work and outside, and the closest pair of the best."""
     surroundings(panel, scene, station, PLAN)
     for candidate, colour in zip(plan.candidates, (ARM, "#3a9d5d", "#8e5bb5"), strict=False):
@@ -128,7 +125,7 @@ def seen(points: FloatArray, scene: PlanningScene, station: str) -> FloatArray:
     return np.asarray((points - frame[:3, 3]) @ frame[:3, :3])
 
 
-def surroundings(panel: Any, scene: PlanningScene, station: str, axes: tuple[int, int]) -> None:
+def surroundings(panel: Axes, scene: PlanningScene, station: str, axes: tuple[int, int]) -> None:
     """The machine's bodies and its zone."""
     machine = scene.cell.machine(scene.station(station).equipment)
     height = scene.station(station).pose[2, 3]
@@ -155,14 +152,14 @@ def corners(pose: FloatArray, size: FloatArray) -> FloatArray:
     return np.asarray(pose[:3, 3] + (signs * size) @ pose[:3, :3].T)
 
 
-def outline(panel: Any, points: FloatArray, colour: str, alpha: float) -> None:
+def outline(panel: Axes, points: FloatArray, colour: str, alpha: float) -> None:
     """The shadow of a convex solid."""
     hull = points[ConvexHull(points).vertices]
     panel.fill(*hull.T, facecolor=colour, alpha=alpha, edgecolor=colour, linewidth=0.8)
 
 
 def arm(
-    panel: Any, q: FloatArray, scene: PlanningScene, station: str, axes: tuple[int, int], colour: str
+    panel: Axes, q: FloatArray, scene: PlanningScene, station: str, axes: tuple[int, int], colour: str
 ) -> None:
     """Capsules from link 3 to the tool, as outlines of their true width."""
     links = scene.chain.link_poses(q[None])[0]

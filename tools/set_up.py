@@ -105,8 +105,8 @@ def run(command: tuple[str, ...]) -> None:
         ).returncode
     if code != 0:
         lines = LOG.read_bytes()[start:].decode(errors="replace").splitlines()
-        telling = [line for line in lines if "is ignored: it is" not in line]
-        raise SetupError("\n".join([*telling[-40:], f"{' '.join(command)} failed; all of it is in {LOG}"]))
+        useful = [line for line in lines if "is ignored: it is" not in line]
+        raise SetupError("\n".join([*useful[-40:], f"{' '.join(command)} failed; all of it is in {LOG}"]))
 
 
 def packages() -> list[Path]:
@@ -146,7 +146,7 @@ def pins() -> dict[str, str]:
 def wanted() -> set[str]:
     """Return what the requirements ask for, and what came with it when the wheels were last installed.
 
-    Not every pin is needed by every interpreter, so what came is told by that installation alone.
+    Not every pin is needed by every interpreter, so what came is known from that installation alone.
     """
     lines = [line for file in REQUIREMENTS for line in file.read_text().splitlines()]
     named = {canonical(re.split(r"[\[=<>~!; ]", line)[0]) for line in lines if line[:1] not in ("", "#", "-")}
@@ -169,26 +169,30 @@ def missing_editable(site: Path, folders: Iterable[Path]) -> list[str]:
     return [folder.name for folder in folders if not is_there(folder)]
 
 
+def interface_files() -> list[Path]:
+    """Return what the messages, services and actions are made from."""
+    return [p for p in INTERFACES.rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+
+
+def kernel_files() -> list[Path]:
+    """Return what the compiled core is made from."""
+    return [file for pattern in ("cpp/*", "*.py", "*.toml", "*.cfg") for file in KERNELS.glob(pattern)]
+
+
+def metadata_files() -> list[Path]:
+    """Return what describes the Python packages."""
+    return [f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")]
+
+
 def stages(python_version: str) -> list[Stage]:
     """Return the steps in their order; a later one may depend on an earlier one's fingerprint."""
     constraints = ROOT / "requirements" / "constraints.txt"
     wheels = fingerprint([constraints, *REQUIREMENTS], python_version)
-    slowly = (
-        ""
-        if python_version == "3.11"
-        else f"; on {python_version} PyBullet is built from source, 3 minutes more"
-    )
-    interface_files = [p for p in INTERFACES.rglob("*") if p.is_file() and "__pycache__" not in p.parts]
-    kernel_files = [
-        *KERNELS.glob("cpp/*"),
-        *KERNELS.glob("*.py"),
-        *KERNELS.glob("*.toml"),
-        *KERNELS.glob("*.cfg"),
-    ]
+    slow = f"; on {python_version} PyBullet is built from source, 3 minutes more"
+    slowly = "" if python_version == "3.11" else slow
     pip = (str(PYTHON), *PIP)
     local = (*pip, "install", "--no-deps", "--no-build-isolation", "--use-pep517")
     editable = tuple(word for package in packages() for word in ("--editable", str(package)))
-    metadata = [f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")]
     site = site_packages(python_version)
     built_with = [
         p for p in constraints.read_text().splitlines() if p.startswith(("ros-", "numpy", "scikit-build"))
@@ -204,14 +208,14 @@ def stages(python_version: str) -> list[Stage]:
         Stage(
             "interfaces",
             "messages, services and actions (about 80 s on two cores)",
-            fingerprint(interface_files, python_version, *built_with),
+            fingerprint(interface_files(), python_version, *built_with),
             lambda: [] if (site / "ir_msgs").is_dir() else ["ir_msgs"],
             ((*local, "--force-reinstall", str(INTERFACES)),),
         ),
         Stage(
             "kernels",
             "compiled core, for this processor and for any x86-64 (about 1 minute)",
-            fingerprint(kernel_files, python_version),
+            fingerprint(kernel_files(), python_version),
             lambda: (
                 missing_editable(site, [KERNELS])
                 or ([] if any((KERNELS / "ir_kernels").glob("_baseline*.so")) else ["_baseline*.so"])
@@ -221,7 +225,7 @@ def stages(python_version: str) -> list[Stage]:
         Stage(
             "packages",
             "the Python packages, editable",
-            fingerprint(metadata, python_version),
+            fingerprint(metadata_files(), python_version),
             lambda: missing_editable(site, packages()),
             ((*local, *editable),) if editable else (),
         ),
@@ -245,30 +249,33 @@ def set_up() -> None:
             f".venv is of Python {own}, asked for is {called}. To change it: rm -rf .venv, then again."
         )
     for stage in stages(own):
-        stamp = STAMPS / stage.name
-        unchanged = stamp.exists() and stamp.read_text() == stage.fingerprint
-        missing = stage.missing() if unchanged else []
-        if unchanged and not missing:
-            continue
-        print(f"{stage.says}{said(missing)}", end=" ... ", flush=True)
-        stamp.unlink(missing_ok=True)
-        start = time.monotonic()
-        try:
-            for command in stage.commands:
-                run(command)
-        except SetupError:
-            print("failed", flush=True)
-            raise
-        print(f"{time.monotonic() - start:.0f} s", flush=True)
-        stamp.write_text(stage.fingerprint)
-        if stage.name == "wheels":
-            CAME.write_text("\n".join(sorted(set(installed(site_packages(own))) & set(pins()))))
-        if missing := stage.missing():
-            print(
-                f"  {stage.name}: not all of it is there{said(missing)}; see {LOG.relative_to(ROOT)}",
-                file=sys.stderr,
-                flush=True,
-            )
+        complete(stage, own)
+
+
+def complete(stage: Stage, python_version: str) -> None:
+    """Do a stage where what it depends on has changed, or something of its result is missing."""
+    stamp = STAMPS / stage.name
+    unchanged = stamp.exists() and stamp.read_text() == stage.fingerprint
+    missing = stage.missing() if unchanged else []
+    if unchanged and not missing:
+        return
+    print(f"{stage.says}{said(missing)}", end=" ... ", flush=True)
+    stamp.unlink(missing_ok=True)
+    start = time.monotonic()
+    try:
+        for command in stage.commands:
+            run(command)
+    except SetupError:
+        print("failed", flush=True)
+        raise
+    print(f"{time.monotonic() - start:.0f} s", flush=True)
+    stamp.write_text(stage.fingerprint)
+    if stage.name == "wheels":
+        came = set(installed(site_packages(python_version))) & set(pins())
+        CAME.write_text("\n".join(sorted(came)))
+    if missing := stage.missing():
+        sentence = f"  {stage.name}: not all of it is there{said(missing)}; see {LOG.relative_to(ROOT)}"
+        print(sentence, file=sys.stderr, flush=True)
 
 
 def main() -> int:
