@@ -60,8 +60,9 @@ bench-long: setup ## every benchmark in full: what claims quote; JSON in out/ben
 compare: setup    ## the same answers, and as fast? This checkout against BEFORE=CHECKOUT
 	@$(BIN)/python benchmarks/compare.py --before "$(BEFORE)" --json out/bench/compare.json $(ARGS)
 
-docs: setup       ## the pages that are written from code: interfaces, rooms
+docs: setup       ## the pages that are written from code: interfaces, parameters, rooms
 	@$(BIN)/python tools/interface_reference.py
+	@$(BIN)/python tools/parameter_reference.py
 	@$(BIN)/python tools/architecture_page.py
 
 clean:            ## remove what was built; .venv stays (rm -rf .venv for all)

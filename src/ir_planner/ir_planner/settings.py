@@ -44,7 +44,7 @@ class PlannerSettings:
     )
     state_max_age: float = setting(
         1.0,
-        "Age of the last joint_states from which it no longer tells where the robot is.",
+        "Age from which the last joint_states no longer count as the robot's state.",
         unit="s",
         minimum=0.05,
         maximum=3600.0,
