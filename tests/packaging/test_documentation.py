@@ -104,8 +104,11 @@ def test_functions_that_are_named_exist(page: Path) -> None:
 
 @cache
 def tests_by_file() -> dict[str, str]:
-    """Text of every test file, by its name."""
-    return {path.name: path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
+    """Text of all test files of a name."""
+    texts: dict[str, str] = {}
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        texts[path.name] = texts.get(path.name, "") + path.read_text("utf-8")
+    return texts
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
