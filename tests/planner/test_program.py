@@ -9,12 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import MovementKind
+from ir_msgs_py.report import MovementKind, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
+from ir_planner.program.chain import TOLERANCE, layers_of
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.route import Route
+from ir_planner.program.steps import Scenes, placed_steps, steps_of
+from ir_planner.regional.regional import plan_regional
+from ir_planner.request.context import Context
+from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
+from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
+from ir_planner.search.registry import registered
+from ir_planner.service.service_lines import timed_service
+from ir_planner.service.withdrawals import EXIT_SEARCHES
 
 from ir_description import Cell, PowerData, load_cell
 
@@ -178,32 +188,102 @@ def test_automatic_pauses_take_the_cheapest_mode(power: PowerData) -> None:
     assert chosen == ["BUS_POWER_OFF"]
 
 
-def test_a_program_is_truncated_when_time_runs_out_in_any_of_its_movements(demo_cell: Cell) -> None:
-    """Time stands until the chosen movement is planned, then the ceiling of all of them has passed."""
+@pytest.mark.parametrize("cut", [1, 2])
+def test_a_program_is_truncated_when_time_runs_out_before_its_movements_are_planned(cut: int) -> None:
+    """Time stands until the graph has been looked at `cut` times, then the ceiling has passed."""
     now = [0.0]
     planner = Planner(lambda: now[0])
     planner.set_cell("", "demo")
-    stations, start = ("park", "home", "park"), np.array(demo_cell.machine_home)
+    stations, start = ("park", "home", "park"), np.array(planner.cell.machine_home)
 
-    def plan(cut: int) -> ProgramPlan:
+    def plan(last: int) -> ProgramPlan:
+        heard: list[str] = []
+
         def progress(phase: str, done: int, total: int, cost: float) -> None:
             assert total == len(stations)
-            now[0] = 1000.0 if phase == "movements" and done >= cut else 0.0
+            heard.append(phase)
+            now[0] = 1000.0 if heard.count("station graph") >= last else 0.0
 
         now[0] = 0.0
         return planner.plan_program(stations, 0.0, PlanOptions(planning_time=300.0), start, progress)
 
-    whole = plan(len(stations))
+    whole = plan(1000)
     assert not whole.info.truncated
-    for cut in range(len(stations)):
-        found = plan(cut)
-        assert found.status.ok, found.status.message
-        assert found.info.truncated
-        assert found.info.iterations < whole.info.iterations
-        same = [
-            a.trajectory_id == b.trajectory_id for a, b in zip(found.movements, whole.movements, strict=True)
-        ]
-        assert all(same[:cut])
+    found = plan(cut)
+    assert found.status.ok, found.status.message
+    assert found.info.truncated
+    assert found.info.iterations < whole.info.iterations
+
+
+def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
+    demo_cell: Cell, power: PowerData
+) -> None:
+    """Every movement between all configurations of two stations, planned one by one."""
+    stations = ("infeed_pick", "gauge_measure")
+    plan = planned(demo_cell, power, *stations)
+    assert plan.status.ok, plan.status.message
+    options = PlanOptions(planning_time=60.0)
+
+    def cost(report: TrajectoryReport) -> float:
+        return report.energy - report.base_energy + options.time_value * report.duration
+
+    def asked(scene: PlanningScene) -> Context:
+        return Context(scene, options, Journal(Work(10**7, np.inf, lambda: 0.0), 0))
+
+    steps = placed_steps(demo_cell, steps_of(demo_cell, stations), demo_cell.parts_at_start())
+    scenes = Scenes(demo_cell, power, "shared")
+    route = Route.over(steps, scenes)
+    home = np.array(demo_cell.machine_home)
+    layers = layers_of(route, home, asked(route.arriving(0)), EXIT_SEARCHES, no_progress)
+    total = {-1: 0.0}  # of the cheapest chain to each configuration of a stop
+    for hop in range(2):
+        scene, cheapest = route.arriving(hop), {}
+        for b, there in enumerate(layers[hop + 1]):
+            entry = timed_service(there.line, True, asked(scene).at(stations[hop])).evaluation.report
+            for a, before in total.items():
+                here = layers[hop][max(a, 0)]
+                across = plan_regional(here.outside, there.outside[None], asked(scene), registered())
+                chain = before + cost(across.report) + cost(entry)
+                if hop:
+                    line = timed_service(here.line, False, asked(scene).at(stations[hop - 1]))
+                    chain += cost(line.evaluation.report)
+                cheapest[b] = min(chain, cheapest.get(b, np.inf))
+        total = cheapest
+    found = sum(cost(movement.report) for movement in plan.movements if not movement.is_pause)
+    assert found <= min(total.values()) * (1.0 + 1.01 * TOLERANCE)
+    assert min(total.values()) < 0.9 * max(total.values())  # choosing mattered
+
+
+def test_with_movement_cost_the_chain_is_the_shortest_path_of_eq_9(demo_cell: Cell, power: PowerData) -> None:
+    plan = planned(demo_cell, power, "gauge_measure", "park", objective="movement_cost")
+    assert plan.status.ok, plan.status.message
+    scene = scene_with(demo_cell, load_text(demo_cell), power)
+    home, park = np.array(demo_cell.machine_home), np.array(demo_cell.park)
+    steps = placed_steps(demo_cell, steps_of(demo_cell, ("gauge_measure",)), demo_cell.parts_at_start())
+    route = Route.over(steps, Scenes(demo_cell, power, "shared"))
+    context = Context(scene, PlanOptions(), Journal(Work(10**7, np.inf, lambda: 0.0), 0))
+    nodes = layers_of(route, home, context, EXIT_SEARCHES, no_progress)[1]
+    costs = [
+        float(
+            (np.abs(node.outside - home) + np.abs(node.outside - park)) @ scene.weights
+            + 2.0 * np.abs(np.diff(node.line.points, axis=0)).sum(axis=0) @ scene.weights
+        )
+        for node in nodes
+    ]
+    entry = next(m for m in plan.movements if m.kind == MovementKind.SERVICE_ENTRY)
+    assert entry.trajectory is not None
+    at = np.array([np.abs(node.interaction - entry.trajectory.positions[-1]).max() for node in nodes])
+    assert costs[int(np.argmin(at))] == pytest.approx(min(costs))
+
+
+def test_the_answer_does_not_depend_on_the_number_of_cores(
+    demo_cell: Cell, power: PowerData, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ids = []
+    for cores in (1, 2, 5):
+        monkeypatch.setattr("os.sched_getaffinity", lambda _, cores=cores: set(range(cores)))
+        ids.append(planned(demo_cell, power, "infeed_pick", "park").program_id)
+    assert len(set(ids)) == 1
 
 
 def test_a_program_has_the_work_of_one_movement_for_each_of_its_steps(demo_cell: Cell) -> None:

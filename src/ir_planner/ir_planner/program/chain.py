@@ -5,17 +5,20 @@ cheapest chain through them.
 from collections.abc import Mapping
 
 import numpy as np
-from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.arrays import FloatArray
 
-from ir_planner.checks import FreeSpace
+from ir_planner.program.edges import CostEdges, TravelEdges
 from ir_planner.program.movements import Movements
+from ir_planner.program.node import Node
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.route import Route
-from ir_planner.program.station_graph import Gap, Node, StationGraph
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Chain, Part, StationGraph
 from ir_planner.program.stops import posture_nodes, station_nodes
 from ir_planner.request import Context
-from ir_planner.scene import path_cost
 from ir_planner.service import ExitSearch, ServiceLine
+
+TOLERANCE = 2e-3  # of the cost: a cheaper chain than that isn't looked for
+_PLANNED_PER_STOP = 8  # movements that may be planned for each stop once there is a chain
 
 
 def layers_of(
@@ -44,33 +47,43 @@ def layers_of(
     return layers
 
 
-def cheapest_chain(
-    layers: list[list[Node]], movements: Movements, context: Context, progress: Progress
-) -> tuple[list[Node], float]:
-    """The chain of least W and its W. Raises StageError where none connects the stops."""
-    route = movements.route
-    if not len(route):
-        return [layers[0][0]], 0.0
-    spaces = [
-        FreeSpace.of(route.arriving(place), context.safety_distance, context.work)
-        for place in range(len(route))
-    ]
+def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -> Chain:
+    """The cheapest chain by the objective. improvement: work of each movement for better answers.
 
-    def certify(place: int, q0: FloatArray, q1: FloatArray) -> BoolArray:
-        return spaces[place].edges_free(q0, q1)
+    Raises StageError where none connects the stops.
+    """
+    context, count = movements.context, len(movements.route)
+    if not count:
+        return Chain([0], 0.0, 0.0)
+    travel = context.options.objective == "movement_cost"
+    edges = (TravelEdges if travel else CostEdges)(movements, improvement)
 
-    def planned(place: int, first: Node, second: Node) -> float | None:
-        found = movements.across(place, first, second)
-        return None if found is None else path_cost(route.arriving(place).weights, found.waypoints)
+    def may_go_on() -> bool:
+        return movements.planned < count * (3 + _PLANNED_PER_STOP) and not context.work.exhausted
 
     with context.journal.stage("station graph") as notes:
-        gaps = [
-            Gap.between(layers[place], layers[place + 1], route.arriving(place).weights)
-            for place in range(len(route))
-        ]
-        graph = StationGraph(gaps, certify, planned)
-        chosen, cost = graph.solve(lambda best: progress("station graph", 0, len(route), best))
-        notes.append(f"W {cost:.0f}, {graph.settled} settled")
-    if not np.isfinite(cost):
+        graph = StationGraph(edges.hops(), edges.settle, TOLERANCE, may_go_on)
+        chain = graph.solve(lambda best: progress("station graph", 0, count, best))
+        unit = "W" if travel else "cost"
+        notes.append(
+            f"{unit} {chain.cost:.0f}, at most {100 * chain.gap:.2f} % above the best chain; "
+            f"{movements.planned} movements planned"
+        )
+    if not np.isfinite(chain.cost):
         raise StageError(movements.unreachable)
-    return [layer[k] for layer, k in zip(layers, chosen, strict=True)], cost
+    return chain
+
+
+def parts_of(chain: Chain, movements: Movements) -> list[list[Part]]:
+    """The parts of every hop along a chain that move."""
+    result = []
+    for hop in range(len(movements.route)):
+        first, second = chain.chosen[hop], chain.chosen[hop + 1]
+        a, b = movements.layers[hop][first], movements.layers[hop + 1][second]
+        parts = [
+            (Part(hop, LEAVE, first, -1), len(a.line.points) > 1),
+            (Part(hop, ACROSS, first, second), not np.allclose(a.outside, b.outside, rtol=0.0, atol=1e-9)),
+            (Part(hop, ENTER, -1, second), len(b.line.points) > 1),
+        ]
+        result.append([part for part, moves in parts if moves])
+    return result

@@ -1,65 +1,111 @@
 """The movements of a program: out of one stop, across, into the next; each is planned once."""
 
-import numpy as np
-from ir_msgs_py.report import MovementKind
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 
-from ir_planner.program.assembly import Leg
-from ir_planner.program.request import StageError
+from ir_planner.errors import TimingError
+from ir_planner.program.bounds import Rates
+from ir_planner.program.node import Node
+from ir_planner.program.parallel import mapped
 from ir_planner.program.route import Route
-from ir_planner.program.station_graph import Node
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
 from ir_planner.regional import Searches, search_regional
-from ir_planner.request import Context, Journal
-from ir_planner.scene import STILL
+from ir_planner.request import Context
 from ir_planner.service import timed_service
 from ir_planner.timing import TimedMovement
 
 
-class Movements:
-    """Movements between configurations at the stops of a route, by the objective of `context`."""
+def rates_of(context: Context) -> Rates:
+    """The objective of a request as cost per joule of the drives and per second."""
+    options = context.options
+    if options.objective == "time":
+        return Rates(0.0, 1.0)
+    return Rates(1.0, context.scene.base_watts if options.objective == "energy" else options.time_value)
 
-    def __init__(self, route: Route, context: Context, searches: Searches) -> None:
-        self.route, self.context, self.searches = route, context, searches
-        self._across: dict[tuple[int, int, int], TimedMovement] = {}
+
+def cost_of(report: TrajectoryReport, rates: Rates) -> float:
+    """What a movement costs."""
+    return rates.joule * (report.energy - report.base_energy) + rates.second * report.duration
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """A movement that isn't found, and why."""
+
+    status: Status
+
+
+class Movements:
+    """Movements between the configurations in `layers` of a route, by the objective of `context`."""
+
+    def __init__(self, route: Route, layers: list[list[Node]], context: Context, searches: Searches) -> None:
+        self.route, self.layers, self.context, self.searches = route, layers, context, searches
+        self._found: dict[Part, TimedMovement | Failure] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
         )
 
-    def across(self, place: int, first: Node, second: Node) -> TimedMovement | None:
-        """The regional movement to a stop, or None; then `unreachable` says why."""
-        key = (place, id(first), id(second))
-        if key not in self._across:
-            journal = Journal(self.context.work, self.context.journal.seed)
-            context = Context(self.route.arriving(place), self.context.options, journal)
-            status, found = search_regional(first.outside, second.outside, context, self.searches)
-            self.context.journal.rejected.update(journal.rejected)
-            if found is None:
-                first_name = self.route.name(place - 1) or "the start"
-                sentence = f"from {first_name} to {self.route.name(place)}: {status.message}"
-                self.unreachable = Status(status.code, sentence)
-                return None
-            self._across[key] = found
-        return self._across[key]
+    @property
+    def planned(self) -> int:
+        """How many movements were planned."""
+        return len(self._found)
 
-    def leg(self, place: int, first: Node, second: Node) -> Leg:
-        """All movements that reach a stop. Raises StageError where one of them isn't found."""
-        here, there = self.route.name(place - 1), self.route.name(place)
-        movements: list[tuple[MovementKind, TimedMovement]] = []
-        if len(first.line.points) > 1:
-            movements.append((MovementKind.SERVICE_EXIT, self._service(place, first, here, entry=False)))
-        if np.abs(second.outside - first.outside).max() > STILL:
-            across = self.across(place, first, second)
-            if across is None:
-                raise StageError(self.unreachable)
-            movements.append((MovementKind.REGIONAL, across))
-        if len(second.line.points) > 1:
-            movements.append((MovementKind.SERVICE_ENTRY, self._service(place, second, there, entry=True)))
-        return Leg(here, there, self.route.arriving(place), tuple(movements))
+    def plan(self, parts: Sequence[Part], improvement: int) -> list[TimedMovement | Failure]:
+        """The movements of parts of hops; those that aren't known yet side by side."""
+        new = list(dict.fromkeys(part for part in parts if part not in self._found))
 
-    def _service(self, place: int, node: Node, station: str, *, entry: bool) -> TimedMovement:
-        context = self.context.inside(self.route.arriving(place)).at(station)
-        movement = timed_service(node.line, entry, context)
+        for part, found in zip(new, mapped(self._planned, new, self.context, improvement), strict=True):
+            self._found[part] = found
+            if isinstance(found, Failure):
+                self.unreachable = found.status
+        return [self._found[part] for part in parts]
+
+    def better(self, parts: Sequence[Part], improvement: int) -> None:
+        """Plan parts again with more work, and keep what is cheaper."""
+        rates = rates_of(self.context)
+        known = {part: self._found.pop(part) for part in parts}
+        for part, again in zip(parts, self.plan(parts, improvement), strict=True):
+            before = known[part]
+            if (
+                isinstance(before, Failure)
+                or isinstance(again, Failure)
+                or cost_of(before.evaluation.report, rates) <= cost_of(again.evaluation.report, rates)
+            ):
+                self._found[part] = before
+
+    def nodes(self, part: Part) -> tuple[Node, Node]:
+        """The configurations of a part; the same twice where it is a service movement."""
+        layers = self.layers
+        first = layers[part.hop][part.first] if part.kind != ENTER else layers[part.hop + 1][part.second]
+        second = layers[part.hop + 1][part.second] if part.kind != LEAVE else first
+        return first, second
+
+    def ends(self, part: Part) -> tuple[FloatArray, FloatArray]:
+        """Where a part starts and ends (n,)."""
+        first, second = self.nodes(part)
+        if part.kind == ACROSS:
+            return first.outside, second.outside
+        ends = first.interaction, first.outside
+        return ends if part.kind == LEAVE else ends[::-1]
+
+    def _planned(self, part: Part, context: Context) -> TimedMovement | Failure:
+        first, second = self.nodes(part)
+        here, there = self.route.name(part.hop - 1), self.route.name(part.hop)
+        inside = context.inside(self.route.arriving(part.hop))
+        if part.kind == ACROSS:
+            status, found = search_regional(first.outside, second.outside, inside, self.searches)
+            what = f"from {here or 'the start'} to {there}"
+            return found or Failure(Status(status.code, f"{what}: {status.message}"))
+        entry = part.kind == ENTER
+        station, what = (there, f"entering {there}") if entry else (here, f"leaving {here}")
+        try:
+            movement = timed_service(first.line, entry, inside.at(station))
+        except TimingError as error:
+            return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {error}"))
         if movement.violation is not None:
-            what = f"{'entering' if entry else 'leaving'} {station}: {movement.violation.sentence}"
-            raise StageError(Status(StatusCode.PLANNING_FAILED, what))
+            return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {movement.violation.sentence}"))
         return movement

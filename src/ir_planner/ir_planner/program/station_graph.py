@@ -1,129 +1,134 @@
-"""Which configuration at which station: the shortest path of eq. (9) over stations x configurations.
+"""Which configuration at which station: the cheapest chain over stations x configurations, settled lazily.
 
-Each stop of a program is a layer of configurations; the cost between two of them is W. A straight movement
-may collide, so costs are settled lazily: the shortest path is found with what is known, the steps on it are
-certified (or a path around is planned), their true cost is entered, and the search repeats until all steps of
-the shortest path are settled.
+A hop leads from one stop to the next in three parts: leaving the first (service line), across, entering the
+second. Every part starts with a lower bound of its cost. The cheapest chain is found with what is known, its
+open parts are settled (to a higher bound or to their true cost), and that repeats until the cheapest chain is
+settled as a whole: then it is the cheapest of all, because no other can cost less than its bounds. Where work
+ends first, the cheapest settled chain is the answer, and `bound` says what the best could still cost.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from ir_msgs_py.arrays import BoolArray, FloatArray
-from numpy.typing import NDArray
 
-from ir_planner.scene import movement_cost
-from ir_planner.service import ServiceLine
-
-UNKNOWN, STRAIGHT, BLOCKED, PLANNED, IMPOSSIBLE = range(5)
-_BATCH = 12  # straight movements that are certified together: about a millisecond
-_DETOUR = 1.6  # a first guess: a path around what obstructs costs this times the straight movement
+LEAVE, ACROSS, ENTER = "leave", "across", "enter"
 
 
-@dataclass(frozen=True, eq=False)
-class Node:
-    """A configuration at a stop with its service line: where the arm works, and where nothing else may be
-    near it (`outside`).
+@dataclass(frozen=True, order=True)
+class Part:
+    """Part of a hop: from configuration `first` of its first stop and to `second` of its second one; -1: of
+    all of them, where only the other counts.
     """
 
-    line: ServiceLine
+    hop: int
+    kind: str
+    first: int
+    second: int
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A lower bound of a part's cost, or (exact) the cost itself; inf: the part is impossible."""
+
+    cost: float
+    exact: bool
+
+
+class Hop:
+    """Lower bounds of leaving (A,), across (A, B) and entering (B,), and which are exact."""
+
+    def __init__(self, leave: FloatArray, across: FloatArray, enter: FloatArray) -> None:
+        self.cost = {LEAVE: leave.copy()[:, None], ACROSS: across.copy(), ENTER: enter.copy()[None, :]}
+        self.exact: dict[str, BoolArray] = {
+            kind: np.zeros(cost.shape, dtype=bool) for kind, cost in self.cost.items()
+        }
+
+    def bounds(self) -> FloatArray:
+        """What is known of every pair (A, B): nothing costs less."""
+        return np.asarray(self.cost[LEAVE] + self.cost[ACROSS] + self.cost[ENTER])
+
+    def settled(self) -> FloatArray:
+        """Costs (A, B) of the pairs whose parts are all exact; inf: of the others."""
+        exact = self.exact[LEAVE] & self.exact[ACROSS] & self.exact[ENTER]
+        return np.asarray(np.where(exact, self.bounds(), np.inf))
+
+    def take(self, part: Part, found: Settled) -> None:
+        """Enter what was found of a part; a bound never falls."""
+        at = max(part.first, 0), max(part.second, 0)
+        cost = self.cost[part.kind]
+        cost[at] = found.cost if found.exact else max(found.cost, float(cost[at]))
+        self.exact[part.kind][at] |= found.exact
+
+    def open_parts(self, hop: int, first: int, second: int) -> list[Part]:
+        """Parts of one pair that aren't exact yet."""
+        parts = (Part(hop, LEAVE, first, -1), Part(hop, ACROSS, first, second), Part(hop, ENTER, -1, second))
+        return [p for p in parts if not self.exact[p.kind][max(p.first, 0), max(p.second, 0)]]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Index of the configuration at every stop, its cost (inf: there is none), and the least that any chain
+    can cost.
+    """
+
+    chosen: list[int]
+    cost: float
+    bound: float
 
     @property
-    def interaction(self) -> FloatArray:
-        """At the stop."""
-        return self.line.interaction
-
-    @property
-    def outside(self) -> FloatArray:
-        """Where regional movements start and end."""
-        return self.line.outside
+    def gap(self) -> float:
+        """How far the chain can be from the best, as a share of its cost."""
+        if not np.isfinite(self.cost) or self.cost <= 0.0:
+            return 0.0
+        return max(self.cost - self.bound, 0.0) / self.cost
 
 
-@dataclass
-class Gap:
-    """Costs (A, B) of the movements between the configurations of two stops, and what is known of each."""
-
-    first: list[Node]
-    second: list[Node]
-    cost: FloatArray
-    state: NDArray[np.int8]
-
-    @staticmethod
-    def between(first: list[Node], second: list[Node], weights: FloatArray) -> "Gap":
-        """All straight movements, none of them settled; with W of the service lines at the second stop."""
-        a = np.array([node.outside for node in first])
-        b = np.array([node.outside for node in second])
-        lines = [
-            2.0 * float(np.abs(np.diff(node.line.points, axis=0)).sum(axis=0) @ weights) for node in second
-        ]
-        cost = movement_cost(weights, a[:, None, :], b[None, :, :]) + np.array(lines)
-        return Gap(first, second, cost, np.full(cost.shape, UNKNOWN, dtype=np.int8))
-
-
-Certify = Callable[[int, FloatArray, FloatArray], BoolArray]
-Plan = Callable[[int, Node, Node], float | None]
+def shortest(costs: list[FloatArray]) -> tuple[list[int], float]:
+    """Indices of the cheapest chain through layers with costs (A, B) between them, and its cost (inf:
+    none).
+    """
+    total = np.zeros(len(costs[0]))
+    came = []
+    for cost in costs:
+        through = total[:, None] + cost
+        came.append(np.argmin(through, axis=0))
+        total = np.min(through, axis=0)
+    chosen = [int(np.argmin(total))]
+    for step in reversed(came):
+        chosen.append(int(step[chosen[-1]]))
+    return chosen[::-1], float(np.min(total))
 
 
 @dataclass
 class StationGraph:
-    """Gaps in order. certify(gap, q0 (K, n), q1 (K, n)): which are free; plan(gap, a, b): W of a path around,
-    or None.
+    """Hops in order. settle(parts): what was found of each, every one a higher bound or exact.
+
+    tolerance: share of the cost by which the answer may exceed the best. may_go_on: asked while a settled
+    chain is known.
     """
 
-    gaps: list[Gap]
-    certify: Certify
-    plan: Plan
-    settled: int = field(default=0)
+    hops: list[Hop]
+    settle: Callable[[list[Part]], list[Settled]]
+    tolerance: float = 0.0
+    may_go_on: Callable[[], bool] = lambda: True
 
-    def shortest(self) -> tuple[list[int], float]:
-        """Index of the configuration at each stop of the cheapest chain, and its cost (inf: none)."""
-        cost = np.zeros(len(self.gaps[0].first))
-        came = []
-        for gap in self.gaps:
-            through = cost[:, None] + gap.cost
-            came.append(np.argmin(through, axis=0))
-            cost = np.min(through, axis=0)
-        chosen = [int(np.argmin(cost))]
-        for step in reversed(came):
-            chosen.append(int(step[chosen[-1]]))
-        return chosen[::-1], float(np.min(cost))
-
-    def solve(self, on_cost: Callable[[float], None]) -> tuple[list[int], float]:
-        """Settle the shortest chain; `on_cost` gets the best cost known so far."""
+    def solve(self, on_cost: Callable[[float], None] = lambda cost: None) -> Chain:
+        """The cheapest chain; `on_cost` gets the cost of the best chain known so far."""
         while True:
-            chosen, cost = self.shortest()
-            if not np.isfinite(cost):
-                return chosen, cost
-            on_cost(cost)
-            open_gap = next(
-                (
-                    k
-                    for k, gap in enumerate(self.gaps)
-                    if gap.state[chosen[k], chosen[k + 1]] in (UNKNOWN, BLOCKED)
-                ),
-                None,
-            )
-            if open_gap is None:
-                return chosen, cost
-            self._settle(open_gap, chosen[open_gap], chosen[open_gap + 1])
-
-    def _settle(self, k: int, a: int, b: int) -> None:
-        gap = self.gaps[k]
-        self.settled += 1
-        if gap.state[a, b] == BLOCKED:
-            found = self.plan(k, gap.first[a], gap.second[b])
-            straight = float(gap.cost[a, b]) / _DETOUR
-            gap.state[a, b] = IMPOSSIBLE if found is None else PLANNED
-            gap.cost[a, b] = np.inf if found is None else max(found, straight)
-            return
-        rows, columns = np.nonzero(gap.state == UNKNOWN)
-        order = np.argsort(gap.cost[rows, columns], kind="stable")[:_BATCH]
-        pairs = {(a, b), *((int(rows[i]), int(columns[i])) for i in order)}
-        listed = sorted(pairs)
-        q0 = np.array([gap.first[i].outside for i, _ in listed])
-        q1 = np.array([gap.second[j].outside for _, j in listed])
-        for (i, j), free in zip(listed, self.certify(k, q0, q1), strict=True):
-            gap.state[i, j] = STRAIGHT if free else BLOCKED
-            if not free:
-                gap.cost[i, j] *= _DETOUR
+            chosen, bound = shortest([hop.bounds() for hop in self.hops])
+            if not np.isfinite(bound):
+                return Chain(chosen, np.inf, np.inf)
+            known, cost = shortest([hop.settled() for hop in self.hops])
+            on_cost(cost if np.isfinite(cost) else bound)
+            near = bound >= cost * (1.0 - self.tolerance)
+            if np.isfinite(cost) and (near or not self.may_go_on()):
+                return Chain(known, cost, min(bound, cost))
+            parts = [
+                part
+                for k, hop in enumerate(self.hops)
+                for part in hop.open_parts(k, chosen[k], chosen[k + 1])
+            ]
+            for part, found in zip(parts, self.settle(parts), strict=True):
+                self.hops[part.hop].take(part, found)

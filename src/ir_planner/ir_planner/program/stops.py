@@ -9,7 +9,7 @@ from ir_msgs_py.status import Status, StatusCode
 
 from ir_planner.checks import FreeSpace, too_near
 from ir_planner.configurations import free_configurations, no_configuration
-from ir_planner.program.station_graph import Node
+from ir_planner.program.node import Node
 from ir_planner.program.withdrawals import leaves_zone, withdrawn_lines
 from ir_planner.request import Context
 from ir_planner.scene import PlanningScene

@@ -1,0 +1,152 @@
+"""What the parts of hops cost: lower bounds first, then coarse solutions, then the planner's movements.
+
+By J, joules or time a part's bound is what physics demands, then a coarse solution without obstacles less its
+margin, then the cost of the movement that the planner finds. By W of eq. (9) it is the straight segment, and
+exact where that is free; else the path found.
+"""
+
+import numpy as np
+from ir_msgs_py.arrays import FloatArray
+
+from ir_planner.checks import FreeSpace
+from ir_planner.program.bounds import least_cost
+from ir_planner.program.coarse_cost import MARGIN, CoarseCost
+from ir_planner.program.movements import Failure, Movements, cost_of, rates_of
+from ir_planner.program.node import Node
+from ir_planner.program.route import Route
+from ir_planner.program.station_graph import ACROSS, Hop, Part, Settled
+from ir_planner.scene import STILL, movement_cost, path_cost
+
+Turned = Part | tuple[int, str, bytes]  # what parts that cost the same have in common
+
+
+class CostEdges:
+    """Parts by what they cost: J, joules or time."""
+
+    def __init__(self, movements: Movements, improvement: int) -> None:
+        self.movements, self.improvement = movements, improvement
+        self.rates = rates_of(movements.context)
+        route = movements.route
+        self._coarse_costs = [
+            CoarseCost(movements.context.inside(route.arriving(hop)), self.rates) for hop in range(len(route))
+        ]
+        self._looked_at: set[Part] = set()
+        self._costs: dict[Turned, float] = {}
+
+    def hops(self) -> list[Hop]:
+        """All hops with what physics demands of their parts."""
+        layers, route = self.movements.layers, self.movements.route
+        return [self._hop(hop, layers[hop], layers[hop + 1]) for hop in range(len(route))]
+
+    def _hop(self, hop: int, first: list[Node], second: list[Node]) -> Hop:
+        context = self.movements.context.inside(self.movements.route.arriving(hop))
+        from_out, to_out = _outsides(first), _outsides(second)
+        across = least_cost(from_out, to_out, context.scene, context.limits, self.rates)
+
+        def lines(nodes: list[Node], *, entry: bool) -> FloatArray:
+            work, outside = np.array([node.interaction for node in nodes]), _outsides(nodes)
+            ends = (outside, work) if entry else (work, outside)
+            costs = least_cost(ends[0], ends[1], context.scene, context.limits, self.rates)
+            return np.asarray(np.diagonal(costs))
+
+        return _with_standing_parts(
+            Hop(lines(first, entry=False), across, lines(second, entry=True)), first, second
+        )
+
+    def settle(self, parts: list[Part]) -> list[Settled]:
+        """Coarse solutions of the parts that have none yet; where all have, the movements."""
+        fresh = [part for part in parts if part not in self._looked_at]
+        if not fresh:
+            return self._planned(parts)
+        self._looked_at.update(fresh)
+        return [self._coarse(part) if part in fresh else Settled(0.0, exact=False) for part in parts]
+
+    def _coarse(self, part: Part) -> Settled:
+        first, second = self.movements.ends(part)
+        value = self._coarse_costs[part.hop].between(first, second)
+        return Settled(value * (1.0 - MARGIN), exact=False)
+
+    def _planned(self, parts: list[Part]) -> list[Settled]:
+        """Costs of the movements; a service line that is another one turned costs what that one does."""
+        turned = [self._turned(part) for part in parts]
+        new = {key: part for key, part in zip(turned, parts, strict=True) if key not in self._costs}
+        for key, found in zip(new, self.movements.plan(list(new.values()), self.improvement), strict=True):
+            self._costs[key] = (
+                np.inf if isinstance(found, Failure) else cost_of(found.evaluation.report, self.rates)
+            )
+        return [Settled(self._costs[key], exact=True) for key in turned]
+
+    def _turned(self, part: Part) -> Turned:
+        """The same for service lines that differ by whole turns of joints: nothing of a cost depends on
+        them.
+        """
+        if part.kind == ACROSS:
+            return part
+        points = self.movements.nodes(part)[0].line.points
+        return part.hop, part.kind, np.round(np.stack([np.sin(points), np.cos(points)]), 6).tobytes()
+
+
+class TravelEdges:
+    """Parts by W of eq. (9)."""
+
+    def __init__(self, movements: Movements, improvement: int) -> None:
+        self.movements, self.improvement = movements, improvement
+        context, route = movements.context, movements.route
+        self._spaces = [
+            FreeSpace.of(route.arriving(hop), context.safety_distance, context.work)
+            for hop in range(len(route))
+        ]
+        self._blocked: set[Part] = set()
+
+    def hops(self) -> list[Hop]:
+        """All hops with W of the straight segments; W of the service lines is exact."""
+        layers, route = self.movements.layers, self.movements.route
+        return [self._hop(route, hop, layers[hop], layers[hop + 1]) for hop in range(len(route))]
+
+    def _hop(self, route: Route, k: int, first: list[Node], second: list[Node]) -> Hop:
+        weights = route.arriving(k).weights
+        leave, enter = (
+            np.array([path_cost(weights, node.line.points) for node in nodes]) for nodes in (first, second)
+        )
+        across = movement_cost(weights, _outsides(first)[:, None], _outsides(second)[None])
+        hop = Hop(leave, across, enter)
+        for kind in hop.exact:
+            hop.exact[kind][:] = kind != ACROSS
+        return _with_standing_parts(hop, first, second)
+
+    def settle(self, parts: list[Part]) -> list[Settled]:
+        """W of straight segments where they are free; else, asked again, W of the path found."""
+        return [self._planned(part) if part in self._blocked else self._straight(part) for part in parts]
+
+    def _straight(self, part: Part) -> Settled:
+        first, second = self.movements.nodes(part)
+        free = self._spaces[part.hop].edges_free(first.outside[None], second.outside[None])[0]
+        if not free:
+            self._blocked.add(part)
+        weights = self.movements.route.arriving(part.hop).weights
+        return Settled(float(movement_cost(weights, first.outside, second.outside)), exact=bool(free))
+
+    def _planned(self, part: Part) -> Settled:
+        movement = self.movements.plan([part], self.improvement)[0]
+        if isinstance(movement, Failure):
+            return Settled(np.inf, exact=True)
+        weights = self.movements.route.arriving(part.hop).weights
+        straight = float(movement_cost(weights, movement.waypoints[0], movement.waypoints[-1]))
+        return Settled(max(path_cost(weights, movement.waypoints), straight), exact=True)
+
+
+def _outsides(nodes: list[Node]) -> FloatArray:
+    return np.array([node.outside for node in nodes])
+
+
+def _with_standing_parts(hop: Hop, first: list[Node], second: list[Node]) -> Hop:
+    """The hop, its parts in which nothing moves known to cost nothing."""
+    here = np.abs(_outsides(first)[:, None] - _outsides(second)[None]).max(axis=2) <= STILL
+    hop.cost[ACROSS][here] = 0.0
+    hop.exact[ACROSS][here] = True
+    for kind, nodes in (("leave", first), ("enter", second)):
+        still = np.array([len(node.line.points) == 1 for node in nodes])
+        still = still[:, None] if kind == "leave" else still[None, :]
+        hop.cost[kind][still] = 0.0
+        hop.exact[kind][still] = True
+    return hop
