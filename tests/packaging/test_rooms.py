@@ -14,7 +14,8 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 ROOMS = {
     "ir_planner": (
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
-        "regional", "trajectories", "service", "settings", "program", "store", "planner", "node",
+        "regional", "trajectories", "service", "settings", "program", "store", "current_cell",
+        "planner", "node",
     ),
     "ir_sim_driver": ("errors", "notices", "plant", "power", "motion", "plc", "controller", "node"),
 }  # fmt: skip

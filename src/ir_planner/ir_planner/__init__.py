@@ -10,9 +10,10 @@ Everything a user needs is exported here; the rooms below are the planner's own.
 
 from ir_msgs_py.options import PlanOptions
 
-from ir_planner.checks import Evaluation
+from ir_planner.checks import Evaluation, StateCheck
+from ir_planner.configurations import IkAnswer
 from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError
-from ir_planner.planner import IkAnswer, Planner, StateCheck, StoredProgram
+from ir_planner.planner import Planner, StoredProgram
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
 from ir_planner.request import Goal, parse_goal

@@ -6,24 +6,23 @@ Every request takes one immutable snapshot of the cell; changing the cell meanwh
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import DistancePair, PlannedMovement, PlanningInfo, PlanningStage, TrajectoryReport
-from ir_msgs_py.candidates import IkSolution
-from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.report import PlannedMovement, PlanningInfo, PlanningStage, TrajectoryReport
+from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 
-from ir_description import Cell, PowerData, cell_from_yaml, load_cell, load_power_data
-from ir_planner.checks import Evaluation, evaluate_trajectory, nearest_pairs, too_near_sentence
+from ir_description import Cell, PowerData, load_power_data
+from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory, state_check
 from ir_planner.configurations import (
+    IK_METHODS,
     STARTS_MAX,
+    IkAnswer,
+    configurations_at,
     free_configurations,
     no_configuration,
-    ranked_solutions,
-    searched_configurations,
 )
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.current_cell import CurrentCell
 from ir_planner.program import ProgramPlan, ProgramRequest, Standby, plan_program, plan_standby
 from ir_planner.regional import MovementPlan, plan_regional
 from ir_planner.request import (
@@ -38,7 +37,7 @@ from ir_planner.request import (
     safety_distance,
     within_limits,
 )
-from ir_planner.scene import PlanningScene, load_text, scene_with
+from ir_planner.scene import PlanningScene
 from ir_planner.service import (
     ServicePlan,
     ServiceRequest,
@@ -51,28 +50,8 @@ from ir_planner.settings import PlannerSettings
 from ir_planner.store import Store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 
-IK_METHODS = ("analytic", "ccd")
 PAIRS_MAX = 1000
 _NEVER: Callable[[], bool] = lambda: False  # noqa: E731 - a default argument
-
-
-@dataclass(frozen=True, eq=False)
-class StateCheck:
-    """Whether a state is free, its smallest distance [m] (inf: no pair) and the nearest pairs."""
-
-    status: Status
-    valid: bool
-    min_distance: float
-    pairs: tuple[DistancePair, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class IkAnswer:
-    """Ranked solutions; empty with a status that says why."""
-
-    status: Status
-    solutions: tuple[IkSolution, ...]
-    info: PlanningInfo
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +78,7 @@ class Planner:
         self.clock = clock
         self.settings = settings or PlannerSettings()
         self.power = power or load_power_data()
-        self._cell: Cell | None = None
-        # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
-        self._scenes: dict[tuple[str, str], tuple[Cell, PlanningScene]] = {}
+        self._current = CurrentCell(self.power, lambda: self.settings.braking_energy)
         self.trajectories: Store[JointTrajectory] = Store(
             "trajectory", self.settings.stored_trajectories, lambda trajectory: trajectory.trajectory_id
         )
@@ -114,48 +91,29 @@ class Planner:
     @property
     def cell(self) -> Cell:
         """The cell as it stands. Raises RequestError while there is none."""
-        if self._cell is None:
-            raise RequestError(StatusCode.INVALID_OBJECT_NAME, "no cell is loaded: call set_cell first")
-        return self._cell
+        return self._current.cell
 
     @property
     def has_cell(self) -> bool:
         """Whether a cell is loaded."""
-        return self._cell is not None
+        return self._current.loaded
 
     def set_cell(self, cell_yaml: str, cell_file: str) -> Cell:
         """Load a cell from its text, or from a path or the name of a bundled cell.
 
         Raises RequestError where not exactly one is given, DescriptionError for what is wrong with the cell.
         """
-        if bool(cell_yaml) == bool(cell_file):
-            given = "both are" if cell_yaml else "neither is"
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"exactly one of cell_yaml and cell_file must be given, {given}",
-            )
-        self._cell = cell_from_yaml(cell_yaml) if cell_yaml else load_cell(cell_file)
-        return self._cell
+        return self._current.load(cell_yaml, cell_file)
 
     def set_equipment(self, name: str, pose: FloatArray | None, enabled: bool, state: str) -> Cell:
-        """Move a machine, switch it on or off, or change its state (None, "": unchanged)."""
-        cell = self.cell
-        if name not in [machine.name for machine in cell.equipment]:
-            raise UnknownNameError("equipment", name, (machine.name for machine in cell.equipment))
-        self._cell = cell.with_equipment(name, pose, enabled, state or None)
-        return self._cell
+        """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "": unchanged)."""
+        return self._current.set_equipment(name, pose, enabled, state)
 
     def scene(self, load: str = "") -> PlanningScene:
         """Snapshot of the cell with `load` attached; "" = what is attached when its program starts: the
         tool.
         """
-        cell = self.cell
-        key = load or load_text(cell), self.settings.regeneration
-        known, scene = self._scenes.get(key, (None, None))
-        if scene is None or known is not cell:
-            scene = scene_with(cell, key[0], self.power, self.settings.braking_energy)
-            self._scenes[key] = cell, scene
-        return scene
+        return self._current.scene(load)
 
     # -- questions -------------------------------------------------------------------------------------------
 
@@ -167,17 +125,7 @@ class Planner:
         bounded(max_pairs, 0, PAIRS_MAX, "max_pairs")
         scene = self.scene(load)
         q = within_limits(q, scene.cell, "state", StatusCode.INVALID_ROBOT_STATE)
-        threshold = scene.thresholds(margin, station)
-        distance = scene.collision.distances(q[None])[0]
-        valid = bool((distance > threshold - 1e-6).all())
-        pairs = nearest_pairs(scene, q, threshold, max_pairs, station)
-        smallest = float(distance.min(initial=np.inf))
-        if valid or not len(distance):
-            return StateCheck(Status.success(), valid, smallest, pairs)
-        worst = nearest_pairs(scene, q, threshold, 1, station)[0]
-        kept = float(threshold[int(np.argmin(distance - threshold))])
-        sentence = too_near_sentence(worst, kept)
-        return StateCheck(Status.success(sentence), False, smallest, pairs)
+        return state_check(q, scene, margin, max_pairs, station)
 
     def compute_ik(
         self,
@@ -195,29 +143,9 @@ class Planner:
         chosen(method, IK_METHODS, "method")
         safety_distance(margin)
         bounded(starts, 1, STARTS_MAX, "starts")
-        if goal.pose is None:
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                "goal is a configuration: compute_ik takes a pose or a station",
-            )
         journal = Journal(self._work(PlanOptions(), _NEVER), seed, planner_id=method)
-        scene = self.scene(load)
-        threshold = scene.thresholds(margin, goal.station)
-        with journal.stage("closed form" if method == "analytic" else "ccd") as notes:
-            if method == "analytic":
-                found = free_configurations(goal.pose, scene, threshold, near)
-            else:
-                found = searched_configurations(
-                    goal.pose, scene, threshold, near, starts, seed, self.settings.interaction, journal.work
-                )
-            notes.append(f"{found.reached} reach the pose")
-        journal.rejected.update(found.rejected)
-        names = scene.cell.robot.joint_names
-        if len(found.q) == 0:
-            status = no_configuration(goal.pose, scene, found, goal.text or "goal")
-            return IkAnswer(status, (), journal.info(near, names))
-        solutions = ranked_solutions(found, goal.pose, scene, threshold, near)
-        return IkAnswer(Status.success(), solutions, journal.info(near, names))
+        context = Context(self.scene(load), PlanOptions(safety_distance=margin, seed=seed), journal)
+        return configurations_at(goal, near, context, starts, self.settings.interaction)
 
     def evaluate(self, trajectory: JointTrajectory, margin: float, load: str, station: str) -> Evaluation:
         """Everything that is known about a trajectory, with the first violation."""
@@ -269,7 +197,7 @@ class Planner:
         options: PlanOptions,
         cancelled: Callable[[], bool] = _NEVER,
     ) -> ServicePlan:
-        """Ways out of a station or into it. configuration (n,): at the station, None: the best; near (n,):
+        """Movements out of a station or into it. configuration (n,): there, None: the best; near (n,):
         where its cost counts from.
         """
         method = known_method(options.planner_id)

@@ -8,6 +8,7 @@ from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.shapes import CLOSEST, WAY, ZONES, Colour, Shape, cell_shapes, movement_shapes
 from ir_planner.checks.states import end_in_collision, too_near, too_near_sentence
+from ir_planner.checks.states import StateCheck, state_check
 
 __all__ = [
     "AT_REST",
@@ -19,6 +20,7 @@ __all__ = [
     "Evaluation",
     "FreeSpace",
     "Shape",
+    "StateCheck",
     "Violation",
     "cell_shapes",
     "clearance_violation",
@@ -30,6 +32,7 @@ __all__ = [
     "nearest_pair",
     "nearest_pairs",
     "pair_value",
+    "state_check",
     "too_near",
     "too_near_sentence",
     "total_report",

@@ -1,12 +1,41 @@
 """Whether a configuration is free, and the sentence that names the pair which is too near."""
 
+from dataclasses import dataclass
+
+import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 
-from ir_planner.checks.clearance import pair_value
+from ir_planner.checks.clearance import nearest_pairs, pair_value
 from ir_planner.checks.free_space import FreeSpace
-from ir_planner.scene import PROOF_TOLERANCE
+from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+
+
+@dataclass(frozen=True, eq=False)
+class StateCheck:
+    """Whether a state is free, its smallest distance [m] (inf: no pair) and the nearest pairs."""
+
+    status: Status
+    valid: bool
+    min_distance: float
+    pairs: tuple[DistancePair, ...]
+
+
+def state_check(
+    q: FloatArray, scene: PlanningScene, margin: float, max_pairs: int, station: str = ""
+) -> StateCheck:
+    """Nearest pairs at q (n,), and whether all keep S_m, `margin` m (or what `station` allows)."""
+    threshold = scene.thresholds(margin, station)
+    distance = scene.collision.distances(q[None])[0]
+    valid = bool((distance > threshold - PROOF_TOLERANCE).all())
+    pairs = nearest_pairs(scene, q, threshold, max_pairs, station)
+    smallest = float(distance.min(initial=np.inf))
+    if valid or not len(distance):
+        return StateCheck(Status.success(), valid, smallest, pairs)
+    worst = nearest_pairs(scene, q, threshold, 1, station)[0]
+    kept = float(threshold[int(np.argmin(distance - threshold))])
+    return StateCheck(Status.success(too_near_sentence(worst, kept)), False, smallest, pairs)
 
 
 def end_in_collision(

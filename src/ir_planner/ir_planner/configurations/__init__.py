@@ -7,10 +7,14 @@ from ir_planner.configurations.inverse_kinematics import (
     ranked_solutions,
 )
 from ir_planner.configurations.settings import InteractionSettings
+from ir_planner.configurations.answer import IK_METHODS, IkAnswer, configurations_at
 
 __all__ = [
+    "IK_METHODS",
     "STARTS_MAX",
+    "IkAnswer",
     "InteractionSettings",
+    "configurations_at",
     "free_configurations",
     "no_configuration",
     "ranked_solutions",

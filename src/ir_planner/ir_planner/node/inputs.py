@@ -47,7 +47,7 @@ class LastState:
     _lock: Lock = field(default_factory=Lock)
 
     def take(self, q: FloatArray, now: float, velocity: FloatArray | None = None) -> None:
-        """A state came; velocity None: it doesn't tell. It is kept to MEASURED decimals: a robot that stands
+        """A state came; velocity None: it has none. It is kept to MEASURED decimals: a robot that stands
         is one start, not a new one with every measurement, so the same request gives the same trajectory.
         """
         with self._lock:
@@ -86,7 +86,7 @@ class LastState:
 
 
 def measured_velocity(msg: Any, joint_names: tuple[str, ...]) -> FloatArray | None:
-    """Velocities (n,) rad/s of joint_states, None where they aren't told: drivers that measure none leave
+    """Velocities (n,) rad/s of joint_states, None where they are missing: drivers that measure none leave
     them out or say NaN.
     """
     try:

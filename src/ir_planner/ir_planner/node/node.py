@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point
 from ir_msgs.action import Plan
 from ir_msgs.srv import (
     CheckState,
@@ -31,7 +30,7 @@ from ir_msgs.srv import (
     SetEquipment,
 )
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.ros.conversions import configuration_from_msg, pose_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.ros.running import run_node
@@ -46,26 +45,19 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import MarkerArray
 
 from ir_description import DescriptionError
 from ir_kernels import compiled
 from ir_msgs_py import names
-from ir_planner.checks import Shape, cell_shapes, movement_shapes
+from ir_planner.checks import cell_shapes, movement_shapes
+from ir_planner.node.markers import ShownMarkers
 from ir_planner.node.inputs import LastState, measured_velocity
 from ir_planner.node.requests import Requests
 from ir_planner.planner import Planner
 from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
-_MARKER = {
-    "box": Marker.CUBE,
-    "cylinder": Marker.CYLINDER,
-    "sphere": Marker.SPHERE,
-    "line": Marker.LINE_STRIP,
-    "triangles": Marker.TRIANGLE_LIST,
-    "text": Marker.TEXT_VIEW_FACING,
-}
 _SHOWN = 100  # planned trajectories that late listeners still get
 _THREADS = 4
 
@@ -99,7 +91,7 @@ class PlannerNode(Node):
         once = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, once)
         self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
-        self._cell_markers: list[Marker] = []
+        self._shown = ShownMarkers()
         self._quick = MutuallyExclusiveCallbackGroup()
         self._long = MutuallyExclusiveCallbackGroup()
         self._offer()
@@ -185,25 +177,18 @@ class PlannerNode(Node):
         self._show_cell()
 
     def _show_cell(self) -> None:
-        self._cell_markers = [_marker(shape, k) for k, shape in enumerate(cell_shapes(self.planner.cell))]
-        self._publish_markers(())
+        self._markers.publish(self._shown.with_cell(cell_shapes(self.planner.cell)))
 
     def _show_movement(self, trajectory: JointTrajectory) -> None:
         self._trajectories.publish(trajectory_to_msg(trajectory))
-        self._publish_markers(movement_shapes(trajectory, self.planner.scene()))
+        self._markers.publish(self._shown.beside_cell(movement_shapes(trajectory, self.planner.scene())))
 
     def _show_service(self, station: str, plan: ServicePlan) -> None:
         for candidate in plan.candidates:
             if candidate.trajectory is not None:
                 self._trajectories.publish(trajectory_to_msg(candidate.trajectory))
-        self._publish_markers(service_shapes(plan.candidates, station, self.planner.scene()))
-
-    def _publish_markers(self, shapes: Sequence[Shape]) -> None:
-        """Everything in one message: a late listener gets the last one only."""
-        moving = [_marker(shape, k) for k, shape in enumerate(shapes)]
-        self._markers.publish(
-            MarkerArray(markers=[Marker(action=Marker.DELETEALL), *self._cell_markers, *moving])
-        )
+        shapes = service_shapes(plan.candidates, station, self.planner.scene())
+        self._markers.publish(self._shown.beside_cell(shapes))
 
     def _diagnose(self) -> None:
         self._look()
@@ -229,18 +214,6 @@ class PlannerNode(Node):
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
-
-
-def _marker(shape: Shape, number: int) -> Marker:
-    marker = Marker(
-        ns=shape.namespace, id=number, type=_MARKER[shape.kind], action=Marker.ADD, text=shape.text
-    )
-    marker.header.frame_id = names.WORLD_FRAME
-    marker.pose = pose_to_msg(shape.pose)
-    marker.scale.x, marker.scale.y, marker.scale.z = (float(value) for value in shape.size)
-    marker.color.r, marker.color.g, marker.color.b, marker.color.a = shape.colour
-    marker.points = [Point(x=float(x), y=float(y), z=float(z)) for x, y, z in shape.points]
-    return marker
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

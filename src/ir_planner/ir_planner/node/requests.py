@@ -65,7 +65,7 @@ def refused(error: Exception) -> Status:
 class Requests:
     """Handlers of the planner's services.
 
-    now: the node's clock [s]. cell_changed and planned: told after the cell changed or a trajectory was
+    now: the node's clock [s]. cell_changed and planned: called after the cell changed or a trajectory was
     planned; service_planned: the same for the candidates at a station. draw_seed: for random_seed. log:
     takes what nobody expected.
     """
@@ -245,7 +245,7 @@ class Requests:
         return self.last_state.fresh(self.now(), self.planner.settings.state_max_age, standing)
 
     def _known_or_home(self, at_rest: bool = False) -> FloatArray:
-        """The last known state, however old; machine home where no robot has told. at_rest: a robot that
+        """The last known state, however old; machine home where no state was received. at_rest: a robot that
         moves now is refused.
         """
         cell = self.planner.cell

@@ -101,7 +101,7 @@ def _along(
             break
         if k > 0:
             way, count = path.finer(way), 2 * count
-        descent = _Descent(path, scene, options, limits.paced(pace), stiffness, way, total)
+        descent = _Descent(path, scene, options, limits.for_speed(pace), stiffness, way, total)
         way, total, evaluations = descent.run(wished > 0.0)
         work.spend(int(np.ceil(evaluations * count * _EDGES_PER_INTERVAL)))
     way, total = _slowed_where_needed(path, way, total, limits, scene)

@@ -212,7 +212,7 @@ class Refinement:
         weights: ObjectiveWeights = objective_weights(self.options, scene, path)
         stiffness = weights.power * (_FINEST_STIFFNESS if draft.level == 2 else _STIFFNESS)
         stiffness *= _STIFFER if self.options.duration > 0.0 else 1.0
-        limits = self.limits.with_torque_share(_TORQUE_SHARES[0]).paced(draft.pace)
+        limits = self.limits.with_torque_share(_TORQUE_SHARES[0]).for_speed(draft.pace)
         terms = SplineTerms(
             limits.velocity,
             limits.acceleration,

@@ -3,7 +3,7 @@
 First the straight movement of all joints (PTP, cost W of eq. 9); where it collides, the searches of the
 registry. From the first free path on the answer gets better with work: paths of other homotopy classes are
 looked for, and the cheapest descend by gradient to the best path and time scaling near them, certified.
-Nothing found is an answer too: which pair is in the way, where, by how much, and what was tried.
+Nothing found is an answer too: which pair blocks, where, by how much, and what was tried.
 """
 
 import numpy as np

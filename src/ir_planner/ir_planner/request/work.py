@@ -1,4 +1,4 @@
-"""How much work a request may cost: counted in certified edges, with time only as a ceiling, and a way to
+"""How much work a request may cost: counted in certified edges, with time only as a ceiling, and how to
 stop it.
 
 Counting work keeps answers reproducible; a clock that cuts an answer short makes it say `truncated`.

@@ -37,15 +37,15 @@ class MotionLimits:
             self.torque_share,
         )
 
-    def paced(self, pace: float) -> "MotionLimits":
-        """Bounds that leave room: a motion within them keeps the true ones at 1 / pace times its speed; pace
-        in (0, 1].
+    def for_speed(self, share: float) -> "MotionLimits":
+        """Tighter bounds: a motion within them keeps the true ones at 1 / share times its speed; share in
+        (0, 1].
         """
         return MotionLimits(
-            self.velocity * pace,
-            self.acceleration * pace**2,
-            self.jerk * pace**3,
-            self.torque_share * pace**2,
+            self.velocity * share,
+            self.acceleration * share**2,
+            self.jerk * share**3,
+            self.torque_share * share**2,
         )
 
     def with_torque_share(self, share: float) -> "MotionLimits":

@@ -1,4 +1,4 @@
-"""Shorter ways through the same gap: leave waypoints out, and pull those that stay towards their neighbours.
+"""Shorter paths through the same gap: leave waypoints out, and pull those that stay towards their neighbours.
 
 Everything is tried in batches of certified edges, so a polished path is as free as the one it came from.
 """
@@ -74,10 +74,10 @@ def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArra
 def _best_pull(
     before: FloatArray, via: FloatArray, after: FloatArray, space: FreeSpace, weights: FloatArray
 ) -> FloatArray:
-    way = after - before
-    along = float(np.clip((via - before) @ way / max(float(way @ way), 1e-12), 0.05, 0.95))
+    step = after - before
+    along = float(np.clip((via - before) @ step / max(float(step @ step), 1e-12), 0.05, 0.95))
     inside = np.clip(via, np.minimum(before, after), np.maximum(before, after))
-    targets = [before + along * way, inside]
+    targets = [before + along * step, inside]
     for joint in range(len(via)):
         alone = via.copy()
         alone[joint] = inside[joint]
