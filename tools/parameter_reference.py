@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from ir_msgs_py.settings import settings_table
+from ir_msgs_py.transitions import PREFIX, TransitionTimes
+from ir_planner import PlannerSettings
 from ir_planner.search import registered
-from ir_planner.settings import PlannerSettings
+from ir_program_runner import LinkSettings, ProgramSettings
+from ir_recorder.settings import RecorderSettings
+from ir_sim_driver import (
+    LINKS,
+    ControllerSettings,
+    ControlSettings,
+    ExecutionSettings,
+    IdleTimes,
+    PlcSettings,
+)
+from ir_sim_driver.node.parameters import NodeSettings
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "parameters.md"
@@ -16,6 +30,23 @@ HEAD = """# Parameters
 Written by `make docs` from the settings classes; edit those. A setting is the ROS parameter of the same
 name. It is checked against its range when the node starts and whenever it is changed.
 """
+FIXED = "fixed: "  # the node takes these at its start only
+NODES: dict[str, tuple[tuple[str, Any], ...]] = {
+    "ir_planner": (("", PlannerSettings()),),
+    "ir_sim_driver": (
+        ("", NodeSettings()),
+        ("", ControllerSettings()),
+        *(("", link()) for link in LINKS),
+        ("control.", ControlSettings()),
+        ("execution.", ExecutionSettings()),
+        (f"{FIXED}{PREFIX}", TransitionTimes()),
+        (PREFIX, IdleTimes()),
+        ("plc.", PlcSettings()),
+    ),
+    "ir_program_runner": (("", ProgramSettings()), (PREFIX, TransitionTimes()), ("", LinkSettings())),
+    "ir_recorder": (("", RecorderSettings()),),
+}
+"""Settings of each node with the prefix of their names."""
 
 
 def searches() -> str:
@@ -27,18 +58,26 @@ def searches() -> str:
     return "\n".join(rows) + "\n"
 
 
+def table(node: str) -> Iterator[str]:
+    """Lines of the table of a node's parameters."""
+    for k, (prefix, settings) in enumerate(NODES[node]):
+        lines = settings_table(settings, prefix.removeprefix(FIXED)).splitlines()
+        yield from () if k else lines[:2]
+        for line in lines[2:]:
+            yield f"{line[:-2]} Fixed at start. |" if prefix.startswith(FIXED) else line
+
+
 def page() -> str:
     """Return the page as text."""
-    return "\n".join(
-        (
-            HEAD,
-            "## Searches\n",
-            "An empty `planner_id` is the portfolio of all of them; a name selects one search.\n",
-            searches(),
-            "## ir_planner\n",
-            settings_table(PlannerSettings()),
-        )
-    )
+    parts = [
+        HEAD,
+        "## Searches\n",
+        "An empty `planner_id` is the portfolio; a name selects one search.\n",
+        searches(),
+    ]
+    for node in NODES:
+        parts += [f"## {node}\n", "\n".join(table(node)) + "\n"]
+    return "\n".join(parts)
 
 
 def main() -> int:

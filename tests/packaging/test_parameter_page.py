@@ -1,0 +1,36 @@
+"""docs/parameters.md lists what the nodes declare: no parameter is missing, none is made up."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rclpy.node import Node
+
+from ir_msgs_py.ros.parameters import Parameters
+from ir_planner import PlannerSettings
+from ir_program_runner.parameters import declare_parameters
+from ir_recorder.parameters import declared_settings
+from ir_sim_driver.node.parameters import DriverParameters
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
+DECLARE: dict[str, Callable[[Node], object]] = {
+    "ir_planner": lambda node: Parameters(node, PlannerSettings),
+    "ir_sim_driver": lambda node: DriverParameters(node, lambda: "", lambda settings: None),
+    "ir_program_runner": lambda node: declare_parameters(node, lambda: False),
+    "ir_recorder": declared_settings,
+}
+
+
+@pytest.mark.parametrize("name", DECLARE)
+def test_the_page_lists_what_the_node_declares(name: str, ros_node: Node) -> None:
+    before = set(ros_node._parameters)
+    DECLARE[name](ros_node)
+    declared = {each: ros_node.describe_parameter(each) for each in set(ros_node._parameters) - before}
+    section = PAGE.read_text("utf-8").partition(f"## {name}\n")[2].partition("\n## ")[0]
+    rows = dict(re.findall(r"^\| `([\w.]+)` \|(.*)$", section, re.MULTILINE))
+    assert set(rows) == set(declared)
+    fixed = {each for each, row in rows.items() if row.endswith("Fixed at start. |")}
+    assert fixed == {each for each, described in declared.items() if described.read_only}
