@@ -76,7 +76,7 @@ def timed(task: Task, settings: Genetic, seed: int) -> tuple[Correction, float, 
 
 def searched(task: Task, settings: Genetic, seed: int) -> Search:
     """One seed."""
-    _, first_ms, _ = timed(task, replace(settings, settle=0, ways=1), seed)
+    _, first_ms, _ = timed(task, replace(settings, settle=0, paths=1), seed)
     found, all_ms, space = timed(task, settings, seed)
     work, weights = space.work.iterations, task.scene.weights
     if not found.paths:

@@ -18,7 +18,7 @@ Arrows = dict[str, set[str]]
 
 
 def rooms(package: str) -> dict[str, list[Path]]:
-    """Sub-packages and modules of a package, with their files; its own face is no room."""
+    """Sub-packages and modules of a package, with their files; its own face does not count."""
     folder = ROOT / "src" / package / package
     found: dict[str, list[Path]] = {}
     for path in sorted(folder.rglob("*.py")):

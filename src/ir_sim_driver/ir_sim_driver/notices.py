@@ -1,4 +1,4 @@
-"""What the driver wants to tell a person: kept in order until somebody takes it."""
+"""What the driver reports to a person: sentences kept in order until they are taken."""
 
 from __future__ import annotations
 

@@ -166,7 +166,7 @@ class Executor:
         self._fresh = not moving
 
     def stop(self, code: ErrorCode, sentence: str, canceled: bool = False) -> None:
-        """Stop along the path; the goal ends so when the robot stands. A stop that is already on its way
+        """Stop along the path; the goal ends so when the robot stands. A stop that has begun
         stays.
         """
         if self._run is not None and not self._run.stopping:

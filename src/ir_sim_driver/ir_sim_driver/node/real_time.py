@@ -1,7 +1,7 @@
 """A thread of its own for a stream with absolute deadlines: stamps on a gap-free grid of the clock.
 
 After a hiccup it catches up, stamp by stamp. Only when the clock itself jumps, back or farther ahead than
-`max_lag`, the grid starts anew, and `on_jump` is told.
+`max_lag`, the grid starts anew, and `on_jump` is called.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ _BACK = _NS // 2  # a clock that is this far behind the next stamp has jumped
 class GridThread:
     """Calls `tick(stamp_ns)` for every multiple of period_ns of `clock` until it is closed.
 
-    on_jump: told a sentence when the clock has jumped. on_failure: told what `tick` raised; the thread ends
-    then.
+    on_jump: called with a sentence when the clock has jumped. on_failure: called with what `tick` raised;
+    the thread ends then.
     """
 
     def __init__(

@@ -73,7 +73,7 @@ class PowerMeter:
         self._base: list[float] = []
         self._steps = 0
         self._stored = 0.0
-        self._energy = self._burnt = self._base_energy = 0.0
+        self._energy = self._dissipated = self._base_energy = 0.0
         self._axes: FloatArray = np.zeros(n)
         self._power: FloatArray = np.zeros(n)
         self._torque: FloatArray = np.zeros(n)
@@ -98,7 +98,7 @@ class PowerMeter:
         self._stored = float(bus.stored[-1])
         self._steps += len(base)
         self._energy += self._dt * float((base + bus.mains).sum())
-        self._burnt += self._dt * float(bus.burnt.sum())
+        self._dissipated += self._dt * float(bus.burnt.sum())
         self._base_energy += self._dt * float(base.sum())
         self._axes = self._axes + self._dt * axes.sum(axis=0)
         self._power, self._torque, self._last_base = axes[-1], work.torque[-1], float(base[-1])
@@ -108,7 +108,7 @@ class PowerMeter:
         return MeterReading(
             self._steps * self._dt,
             self._energy,
-            self._burnt,
+            self._dissipated,
             self._base_energy,
             self._axes,
             self._stored,

@@ -57,7 +57,7 @@ class WakeOnLan:
 class WakeListener:
     """Listens on a UDP port and calls `wake` for every packet that is for us; `close` ends it.
 
-    port 0 takes a free one; `port` tells which. Raises OSError when the port is taken.
+    port 0 takes a free one; `port` says which. Raises OSError when the port is taken.
     """
 
     def __init__(self, host: str, port: int, mac: str, wake: Callable[[], None]) -> None:
