@@ -126,7 +126,7 @@ def test_a_movement_with_155_kg_is_tracked_and_costs_what_the_model_says(make, p
     assert energies["pybullet"] == pytest.approx(energies["ideal"], rel=0.002)
 
 
-def test_a_torque_beyond_the_envelope_is_cut_and_the_tube_tells(make, cell):
+def test_a_torque_beyond_the_envelope_is_cut_and_the_tool_leaves_its_path(make, cell):
     simulation = make("pybullet")
     q0 = np.array(cell.machine_home)
     step = 0.02 * np.sin(np.linspace(0.0, np.pi, 30)) ** 2  # 30 ms: far beyond what the motors can do

@@ -42,8 +42,8 @@ def test_the_distance_from_the_path_is_published(stopped):
     assert 1e-5 < stopped.emergency.excursion < 0.05
     controller = {entry.name: entry for entry in report(stopped, 0.0)}["ir_sim_driver: controller"]
     assert controller.level == 2
-    told = float(controller.values["emergency stop left the path by [mm]"])
-    assert told == pytest.approx(stopped.emergency.excursion * 1e3, abs=0.01)
+    published = float(controller.values["emergency stop left the path by [mm]"])
+    assert published == pytest.approx(stopped.emergency.excursion * 1e3, abs=0.01)
 
 
 def test_brakes_take_no_motor_power_and_hold_against_gravity(stopped):

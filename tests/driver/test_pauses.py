@@ -66,9 +66,9 @@ def test_ending_a_pause_early_finishes_the_shortest_stay(make):
     simulation = make()
     simulation.pauses.start(200.0, executing=False)
     simulation.run(3.1)
-    told = simulation.pauses.end()
-    assert told == pytest.approx(1.9 + 20.0, abs=0.01)
-    simulation.run(told + 0.01)
+    announced = simulation.pauses.end()
+    assert announced == pytest.approx(1.9 + 20.0, abs=0.01)
+    simulation.run(announced + 0.01)
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
 
 

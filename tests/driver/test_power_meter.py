@@ -76,7 +76,7 @@ def test_base_power_follows_the_level():
     assert watts == pytest.approx([105.0, 205.0, 325.0, 602.16])
 
 
-def test_ways_in_cost_the_mode_that_is_left_and_ways_out_stand_on_motors(make):
+def test_entering_costs_the_mode_that_is_left_and_leaving_stands_on_motors(make):
     simulation = make(load="none")
     simulation.run(0.01)
 

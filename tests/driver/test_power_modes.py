@@ -63,7 +63,7 @@ def test_a_packet_before_the_shortest_sleep_is_over_wakes_when_it_is():
     assert time_until(modes, Mode.FROM_HIBERNATION) == pytest.approx(120.0, abs=2 * STEP)
 
 
-def test_a_packet_on_the_way_to_sleep_is_lost():
+def test_a_packet_while_hibernation_is_entered_is_lost():
     modes = PowerModes(*TIMES)
     run(modes, 1.0, Demand(rest=Mode.HIBERNATION))
     run(modes, 1.0, Demand(rest=Mode.HIBERNATION, wake=True))
@@ -134,8 +134,8 @@ def test_a_cold_start_takes_as_long_as_waking():
 def test_time_to_ready_is_what_it_then_takes():
     modes = PowerModes(*TIMES)
     run(modes, 1.0, Demand(rest=Mode.BUS_POWER_OFF))
-    told = modes.time_to_ready()
-    assert time_until(modes, Mode.STAND_ON_MOTORS) == pytest.approx(told, abs=2 * STEP)
+    announced = modes.time_to_ready()
+    assert time_until(modes, Mode.STAND_ON_MOTORS) == pytest.approx(announced, abs=2 * STEP)
 
 
 def test_a_start_in_the_middle_of_something_is_refused():

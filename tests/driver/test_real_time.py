@@ -13,7 +13,7 @@ PERIOD = 2_000_000
 
 
 class Clock:
-    """A clock that shows what it is told; every reading lets it pass `rate` ns."""
+    """A clock that shows what is set; every reading lets it pass `rate` ns."""
 
     def __init__(self, start, rate):
         self.now, self.rate = start, rate
@@ -75,7 +75,7 @@ def test_a_hiccup_is_caught_up_stamp_by_stamp(run):
 
 
 @pytest.mark.parametrize(("jump", "word"), [(-3_000_000_000, "back"), (20_000_000_000, "ahead")])
-def test_a_clock_that_jumps_starts_the_grid_anew_and_is_told(run, jump, word):
+def test_a_clock_that_jumps_starts_the_grid_anew_and_is_reported(run, jump, word):
     clock = Clock(30_000_000_000, PERIOD // 4)
 
     def leap(k):
@@ -102,7 +102,7 @@ def test_a_clock_that_has_not_started_or_stands_still_makes_no_ticks(run):
     thread.close()
 
 
-def test_what_a_tick_raises_is_told_and_ends_the_thread(run):
+def test_what_a_tick_raises_is_reported_and_ends_the_thread(run):
     def fail(k):
         if k == 3:
             raise RuntimeError("boom")

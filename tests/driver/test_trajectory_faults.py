@@ -91,7 +91,7 @@ def test_a_position_a_billionth_beyond_is_within_the_slack(make, start, run_out,
     assert run_out(simulation).code == ErrorCode.SUCCESSFUL
 
 
-def test_too_fast_too_hard_and_too_heavy_are_told_apart(standing, start, plan, home):
+def test_too_fast_too_hard_and_too_heavy_are_distinguished(standing, start, plan, home):
     turn = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0])
     refused(start, standing, plan(1.0, home, home + turn), INVALID, "joint_a1", "rad/s at", "exceeded")
     refused(start, standing, plan(0.2, home, home + 0.1 * turn), INVALID, "joint_a1", "rad/s^2")

@@ -166,11 +166,11 @@ def test_inputs_belong_to_their_owner_but_the_emergency_stop_to_everybody(
 ):
     make_driver(**{"plc.owner": "service"})
     in_force = listen(names.PLC_INPUTS_IN_FORCE, PlcInputs, latched=True)
-    told = listen(names.DIAGNOSTICS, DiagnosticArray)
+    heard = listen(names.DIAGNOSTICS, DiagnosticArray)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     publisher = ros_node.create_publisher(PlcInputs, names.PLC_INPUTS, latched)
     publisher.publish(PlcInputs(ab=True))
-    wait_for(lambda: any("plc.owner" in s.message for msg in told for s in msg.status), timeout=20.0)
+    wait_for(lambda: any("plc.owner" in s.message for msg in heard for s in msg.status), timeout=20.0)
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="drives_on", value=True))
     wait_for(lambda: in_force and in_force[-1].drives_on, timeout=20.0)
     publisher.publish(PlcInputs(ab=True, emergency_stop=True))
@@ -200,7 +200,7 @@ def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wai
         cell_client.execute(movement(), timeout=30.0)
     silent = len(states)
     wait_for(lambda: len(power) > asleep_from + 20, timeout=20.0)
-    assert len(states) <= silent + 1  # one may have been on its way
+    assert len(states) <= silent + 1  # one may have been sent before
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(magic_packet("02:00:00:c4:02:11"), ("127.0.0.1", driver.port_of("wake_on_lan")))
         sender.sendto(magic_packet(MAC), ("127.0.0.1", driver.port_of("wake_on_lan")))

@@ -159,17 +159,17 @@ def test_a_spoilt_goal_is_aborted_with_code_and_sentence(client, spoil, code, wo
     assert client.execute(movement(), timeout=30.0).energy > 0.0  # and the next one runs
 
 
-def test_a_bad_trajectory_on_the_topic_is_told_in_diagnostics(client, ros_node, wait_for):
+def test_a_bad_trajectory_on_the_topic_is_reported_in_diagnostics(client, ros_node, wait_for):
     received = []
     ros_node.create_subscription(DiagnosticArray, names.DIAGNOSTICS, received.append, 10)
     publisher = ros_node.create_publisher(JointTrajectoryMsg, names.COMMANDED_TRAJECTORY, 10)
     wait_for(lambda: publisher.get_subscription_count() > 0)
     publisher.publish(JointTrajectoryMsg(joint_names=["elbow"]))
 
-    def told():
+    def reported():
         return any("no points" in status.message for msg in received for status in msg.status)
 
-    wait_for(told, timeout=20.0)
+    wait_for(reported, timeout=20.0)
 
 
 def test_a_trajectory_on_the_topic_runs_and_overrides_the_action(client, ros_node, wait_for):

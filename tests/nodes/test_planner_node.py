@@ -75,7 +75,7 @@ def test_set_cell_names_the_stations_and_get_cell_gives_its_text_back(call: Call
     assert "<robot" in text.robot_description
 
 
-def test_a_closed_door_is_in_the_way_until_it_opens(call: Call) -> None:
+def test_a_closed_door_obstructs_until_it_opens(call: Call) -> None:
     inside = {"goal": "lathe_work"}
     assert call(ComputeIk, "compute_ik", **inside).status.code == Status.SUCCESS
     shut = call(SetEquipment, "set_equipment", name="lathe", state="door_closed")

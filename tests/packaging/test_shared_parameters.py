@@ -1,4 +1,4 @@
-"""What several nodes are told alike goes by one name, with one default and one range."""
+"""A setting that several nodes share has one name, with one default and one range."""
 
 from __future__ import annotations
 
