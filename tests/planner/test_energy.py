@@ -12,11 +12,12 @@ from ir_kernels.power import REGENERATIONS
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import holding_watts, movement_energy
+from ir_planner.request.context import Context
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import standing, stretched
-from ir_planner.timing.movement import timed_movement
 from ir_planner.timing.objective import best_stretch
+from ir_planner.timing.straight_steps import straight_steps
 
 Degrees = Callable[..., Any]
 
@@ -24,7 +25,7 @@ Degrees = Callable[..., Any]
 @pytest.fixture
 def fast(demo_scene: PlanningScene, degrees: Degrees, budget: Work) -> JointTrajectory:
     path = np.stack([degrees(0, -50, 60, 0, 0, 0), degrees(80, -110, 120, 0, 30, 0)])
-    return timed_movement(path, demo_scene, PlanOptions(objective="time"), budget).trajectory
+    return straight_steps(path, Context.of(demo_scene, PlanOptions(objective="time"), budget)).trajectory
 
 
 @pytest.mark.parametrize("regeneration", REGENERATIONS)
@@ -65,11 +66,13 @@ def test_lowering_a_load_gives_energy_back_on_the_bus(
     demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     path = np.stack([degrees(0, -90, 60, 0, 0, 0), degrees(0, -40, 60, 0, 0, 0)])
-    slow = timed_movement(path, demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget).trajectory
+    slow = straight_steps(
+        path, Context.of(demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget)
+    ).trajectory
     down = movement_energy(slow, demo_scene)
     back = movement_energy(
-        timed_movement(
-            path[::-1], demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget
+        straight_steps(
+            path[::-1], Context.of(demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget)
         ).trajectory,
         demo_scene,
     )
@@ -77,13 +80,17 @@ def test_lowering_a_load_gives_energy_back_on_the_bus(
     assert down.total >= down.base - 1e-9
 
 
-def test_the_objective_trades_time_for_joules(fast: JointTrajectory, demo_scene: PlanningScene) -> None:
-    assert best_stretch(fast, demo_scene, "time", 500.0) == 1.0
-    assert best_stretch(fast, demo_scene, "movement_cost", 500.0) == 1.0
-    both = best_stretch(fast, demo_scene, "time_and_energy", 500.0)
-    frugal = best_stretch(fast, demo_scene, "energy", 500.0)
+def test_the_objective_trades_time_for_joules(
+    fast: JointTrajectory, demo_scene: PlanningScene, budget: Work
+) -> None:
+    def factor(objective: str, time_value: float = 500.0) -> float:
+        options = PlanOptions(objective=objective, time_value=time_value)
+        return best_stretch(fast, Context.of(demo_scene, options, budget))
+
+    assert factor("time") == 1.0
+    assert factor("movement_cost") == 1.0
+    both, frugal = factor("time_and_energy"), factor("energy")
     assert 1.0 <= both <= frugal
-    assert (
-        movement_energy(stretched(fast, frugal), demo_scene).total < movement_energy(fast, demo_scene).total
-    )
-    assert best_stretch(fast, demo_scene, "time_and_energy", 1e6) == 1.0
+    slow = movement_energy(stretched(fast, frugal), demo_scene)
+    assert slow.total < movement_energy(fast, demo_scene).total
+    assert factor("time_and_energy", 1e6) == 1.0

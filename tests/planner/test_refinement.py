@@ -1,4 +1,4 @@
-"""Path and pace that descend together: better than what they came from, and within every bound."""
+"""Path and time scaling, optimised together: better than what they came from, within every bound."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.curves.uniform_spline import UniformSpline, along_path
 from ir_planner.errors import RequestError
-from ir_planner.optimize.refinement import Refinement, movement_over
+from ir_planner.optimize.movement_over import movement_over
+from ir_planner.optimize.refinement import Refinement
 from ir_planner.request.context import Context
-from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.service.service_movement import plan_service
 from ir_planner.service.work_configurations import ServiceRequest
-from ir_planner.timing.movement import timed_movement
-from ir_planner.timing.objective import objective_value, trajectory_value
+from ir_planner.timing.straight_steps import straight_steps
+from ir_planner.timing.objective import coarse_cost, objective_value
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
@@ -81,10 +81,10 @@ def test_a_spline_along_a_path_stays_near_it_and_rests_at_its_ends() -> None:
     path = np.array([[0.0] * 6, [1.0, 0.5, 0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.5, 0.0, 0.0, 0.0]])
     spline = along_path(path, 60, 2.0)
     q, _, _ = spline.samples(5)
-    ways = np.concatenate(
+    places = np.concatenate(
         [a + np.linspace(0, 1, 400)[:, None] * (b - a) for a, b in itertools.pairwise(path)]
     )
-    assert max(np.abs(ways - row).max(axis=1).min() for row in q) < 0.02
+    assert max(np.abs(places - row).max(axis=1).min() for row in q) < 0.02
     assert spline.duration == pytest.approx(2.0)
 
 
@@ -94,19 +94,17 @@ def test_refined_is_better_than_the_same_path_in_straight_steps(
 ) -> None:
     path = np.radians([[0, -125, 120, 0, 80, 0], [40, -100, 100, 20, 60, 0], [70, -90, 80, 0, 40, 30]])
     options = PlanOptions(objective=objective, safety_distance=0.0)
-    refined = movement_over(path, demo_scene, options, unhurried())
-    straight = timed_movement(path, demo_scene, options, unhurried())
+    refined = movement_over(path, Context.of(demo_scene, options, unhurried()))
+    straight = straight_steps(path, Context.of(demo_scene, options, unhurried()))
     assert refined.violation is None
-    value, before = (
-        objective_value(m.evaluation.report, objective, options.time_value) for m in (refined, straight)
-    )
+    value, before = (objective_value(m.report, objective, options.time_value) for m in (refined, straight))
     assert value < before
-    assert trajectory_value(refined.trajectory, demo_scene, options) == pytest.approx(value, rel=0.01)
+    assert coarse_cost(refined.trajectory, refined.context) == pytest.approx(value, rel=0.01)
 
 
 def test_j_counts_the_drives_and_not_the_base_load(demo_scene: PlanningScene) -> None:
     path = np.radians([[0, -90, 90, 0, 0, 0], [30, -100, 100, 0, 20, 0]])
-    report = movement_over(path, demo_scene, PlanOptions(safety_distance=0.0), unhurried()).evaluation.report
+    report = movement_over(path, Context.of(demo_scene, PlanOptions(safety_distance=0.0), unhurried())).report
     drives = float(np.sum(report.joint_energy)) + report.burnt_energy
     value = objective_value(report, "time_and_energy", 500.0)
     assert value == pytest.approx(report.energy - report.base_energy + 500.0 * report.duration)
@@ -128,30 +126,30 @@ def test_a_movement_at_the_joint_limits_stays_within_them(scene_of: SceneOf) -> 
     assert (plan.trajectory.positions >= robot.position_min).all()
 
 
-def test_joules_fall_with_the_wished_duration_and_it_is_met(demo_scene: PlanningScene) -> None:
+def test_joules_fall_with_the_requested_duration_and_it_is_met(demo_scene: PlanningScene) -> None:
     path = np.radians([[0, -90, 90, 0, 0, 0], [60, -100, 100, 0, 20, 0]])
     options = PlanOptions(objective="time", safety_distance=0.0)
-    fastest = movement_over(path, demo_scene, options, unhurried()).trajectory.duration
+    fastest = movement_over(path, Context.of(demo_scene, options, unhurried())).trajectory.duration
     joules = []
     for factor in (1.02, 1.2, 1.6):
-        wished = replace(options, duration=factor * fastest)
-        movement = movement_over(path, demo_scene, wished, unhurried())
+        requested = replace(options, duration=factor * fastest)
+        movement = movement_over(path, Context.of(demo_scene, requested, unhurried()))
         assert movement.violation is None
         assert movement.trajectory.duration == pytest.approx(factor * fastest, rel=2e-6)
-        report = movement.evaluation.report
+        report = movement.report
         joules.append(report.energy - report.base_energy)
     assert joules == sorted(joules, reverse=True)
     with pytest.raises(RequestError, match="the shortest within the limits is"):
-        movement_over(path, demo_scene, replace(options, duration=0.7 * fastest), unhurried())
+        movement_over(path, Context.of(demo_scene, replace(options, duration=0.7 * fastest), unhurried()))
 
 
-def test_a_draft_costs_no_more_with_more_work(demo_scene: PlanningScene) -> None:
+def test_a_coarse_solution_costs_no_more_with_more_work(demo_scene: PlanningScene) -> None:
     path = np.radians([[0, -90, 90, 0, 0, 0], [60, -100, 100, 0, 20, 0]])
     costs = []
     for evaluations in (10, 40, 160):
         budget = unhurried()
-        refinement = Refinement(demo_scene, PlanOptions(safety_distance=0.0), budget)
-        costs.append(refinement.drafted(path, evaluations).cost)
+        refinement = Refinement(Context.of(demo_scene, PlanOptions(safety_distance=0.0), budget))
+        costs.append(refinement.coarse(path, evaluations).cost)
         assert budget.iterations > 0
     assert costs == sorted(costs, reverse=True)
 
@@ -162,7 +160,7 @@ def test_a_station_s_contacts_hold_in_its_zone_only(scene_of: SceneOf) -> None:
     assert stations
     for station in stations[:2]:
         request = ServiceRequest(station, "exit", None, np.array(scene.cell.park), 1)
-        context = Context(scene, PlanOptions(), Journal(unhurried(), 0))
+        context = Context.of(scene, PlanOptions(), unhurried())
         plan = plan_service(request, context)
         assert plan.status.ok, plan.status.message
         trajectory = plan.candidates[0].trajectory

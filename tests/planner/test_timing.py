@@ -16,6 +16,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import movement_energy
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
+from ir_planner.request.context import Context
 from ir_planner.request.goals import Goal
 from ir_planner.request.work import Work
 from ir_planner.scene.motion_limits import MotionLimits, torque_use
@@ -23,10 +24,10 @@ from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.asynchronous import own_laws
 from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing, stretched
 from ir_planner.timing.level_timing import fastest
-from ir_planner.timing.movement import timed_movement
 from ir_planner.timing.objective import best_stretch
 from ir_planner.timing.ptp import fastest_law
 from ir_planner.timing.spline_timing import time_spline
+from ir_planner.timing.straight_steps import straight_steps
 from ir_planner.timing.time_law import StepLaws, TimeLaw
 
 _spec = importlib.util.spec_from_file_location("planner_oracles", Path(__file__).parent / "oracles.py")
@@ -55,7 +56,9 @@ def test_a_ptp_keeps_all_limits_and_uses_one_of_them_up(
     start: Any, goal: Any, demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     options = PlanOptions(objective="time", safety_distance=0.0)
-    movement = timed_movement(np.stack([degrees(*start), degrees(*goal)]), demo_scene, options, budget)
+    movement = straight_steps(
+        np.stack([degrees(*start), degrees(*goal)]), Context.of(demo_scene, options, budget)
+    )
     motion = at_10_khz(movement.trajectory)
     robot = demo_scene.cell.robot
     tau = oracles.torques(demo_scene, motion.q, motion.qd, motion.qdd)
@@ -69,7 +72,7 @@ def test_a_ptp_keeps_all_limits_and_uses_one_of_them_up(
     assert max(largest.values()) <= 1.0 + 1e-6, largest
     # the jerk is at its limit by construction, unless torque slowed the ramps: then torque is near its share
     assert max(largest["velocity"], largest["acceleration"], largest["torque"]) > 0.93, largest
-    report = movement.evaluation.report
+    report = movement.report
     assert report.certified
     assert (report.torque_ratio >= share["torque"].max(axis=0) - 1e-6).all(), "the bound is no bound"
 
@@ -97,7 +100,7 @@ def test_scaling_limits_what_it_says(demo_scene: PlanningScene, degrees: Degrees
     options = PlanOptions(
         objective="time", velocity_scaling=0.3, acceleration_scaling=0.5, safety_distance=0.0
     )
-    report = timed_movement(path, demo_scene, options, budget).evaluation.report
+    report = straight_steps(path, Context.of(demo_scene, options, budget)).report
     assert report.velocity_ratio.max() == pytest.approx(0.3, rel=0.02)
     assert report.acceleration_ratio.max() <= 0.5 + 1e-9
 
@@ -106,11 +109,11 @@ def test_a_wished_duration_is_met_and_too_short_a_one_refused(
     demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(40, -80, 90, 0, 0, 0)])
-    movement = timed_movement(path, demo_scene, PlanOptions(duration=3.25), budget)
+    movement = straight_steps(path, Context.of(demo_scene, PlanOptions(duration=3.25), budget))
     assert movement.trajectory.duration == pytest.approx(3.25, abs=1e-5)
     assert movement.violation is None
     with pytest.raises(RequestError, match=r"duration is 0\.2 s: the shortest"):
-        timed_movement(path, demo_scene, PlanOptions(duration=0.2), budget)
+        straight_steps(path, Context.of(demo_scene, PlanOptions(duration=0.2), budget))
 
 
 @pytest.mark.parametrize(("start", "goal"), MOVES[:3])
@@ -119,7 +122,7 @@ def test_asynchronous_joints_arrive_on_their_own(
 ) -> None:
     path = np.stack([degrees(*start), degrees(*goal)])
     options = PlanOptions(objective="time", timing="asynchronous", safety_distance=0.0)
-    movement = timed_movement(path, demo_scene, options, budget)
+    movement = straight_steps(path, Context.of(demo_scene, options, budget))
     assert movement.note == ""
     assert movement.violation is None
     laws = own_laws(path[0], path[1], demo_scene.limits, demo_scene.dynamics)
@@ -140,7 +143,7 @@ def test_corners_are_cut_within_the_limits_and_save_time(
         [degrees(0, -90, 90, 0, 0, 0), degrees(30, -95, 95, 0, 0, 0), degrees(60, -90, 90, 0, 0, 0)]
     )
     options = PlanOptions(objective="time")
-    movement = timed_movement(path, demo_scene, options, budget)
+    movement = straight_steps(path, Context.of(demo_scene, options, budget))
     laws = tuple(
         StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),)) for a, b in pairwise(path)
     )
@@ -192,12 +195,10 @@ def test_a_movement_that_would_take_hours_is_refused(scaling: float, says: str, 
 
 def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene, budget: Work) -> None:
     home = np.array(demo_scene.cell.machine_home)
-    movement = timed_movement(np.stack([home, home]), demo_scene, PlanOptions(), budget)
+    movement = straight_steps(np.stack([home, home]), Context.of(demo_scene, PlanOptions(), budget))
     assert movement.trajectory == standing(home, NAMES)
-    assert movement.evaluation.report.certified
-    assert movement.evaluation.report.energy == pytest.approx(
-        movement.evaluation.report.duration * 735.0, rel=0.01
-    )
+    assert movement.report.certified
+    assert movement.report.energy == pytest.approx(movement.report.duration * 735.0, rel=0.01)
 
 
 def test_a_spline_through_points_keeps_its_limits(demo_scene: PlanningScene, degrees: Degrees) -> None:
@@ -234,10 +235,10 @@ def test_where_joules_count_the_best_shape_is_taken(
     """The fastest law stretched is one of the candidates: never worse than it."""
     path = np.stack([degrees(*start), degrees(*goal)])
     options = PlanOptions(safety_distance=0.0)
-    report = timed_movement(path, demo_scene, options, budget).evaluation.report
+    report = straight_steps(path, Context.of(demo_scene, options, budget)).report
     law = fastest(path[0], path[1], demo_scene.limits, demo_scene.dynamics)
     quickest = blended(TimedPath(path, (StepLaws((law,)),), ()), NAMES)
-    factor = best_stretch(quickest, demo_scene, "time_and_energy", options.time_value)
+    factor = best_stretch(quickest, Context.of(demo_scene, options, budget))
     alone = stretched(quickest, factor)
     value = report.energy + options.time_value * report.duration
     other = movement_energy(alone, demo_scene).total + options.time_value * alone.duration

@@ -13,10 +13,11 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.checks.verification import verify
+from ir_planner.request.context import Context
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.scene.zones import polynomials_between
-from ir_planner.timing.movement import timed_movement
+from ir_planner.timing.straight_steps import straight_steps
 
 from ir_description import load_cell, load_power_data
 
@@ -110,7 +111,9 @@ def test_a_load_that_is_too_much_for_the_speed_is_a_torque_violation(
 ) -> None:
     path = np.stack([HOME, HOME + np.radians([0, 40, -40, 0, 40, 0])])
     light = scene_with(demo_scene.cell, "none", demo_scene.power)
-    fast = timed_movement(path, light, PlanOptions(objective="time", safety_distance=0.0), budget).trajectory
+    fast = straight_steps(
+        path, Context.of(light, PlanOptions(objective="time", safety_distance=0.0), budget)
+    ).trajectory
     assert verify(fast, light, 0.0).certified
     violation = verify(fast, demo_scene, 0.0).violation
     assert violation is not None
@@ -159,7 +162,9 @@ def test_allowed_contacts_hold_only_while_the_tcp_is_in_the_zone(
 
 def test_a_cut_trajectory_is_the_same_motion(demo_scene: PlanningScene, budget: Work) -> None:
     path = np.stack([HOME, HOME + np.radians([40, 10, -10, 0, 20, 0])])
-    trajectory = timed_movement(path, demo_scene, PlanOptions(safety_distance=0.0), budget).trajectory
+    trajectory = straight_steps(
+        path, Context.of(demo_scene, PlanOptions(safety_distance=0.0), budget)
+    ).trajectory
     begin, end = 0.21 * trajectory.duration, 0.77 * trajectory.duration
     coefficients, durations = polynomials_between(trajectory, begin, end)
     assert durations.sum() == pytest.approx(end - begin)

@@ -3,12 +3,13 @@
 from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
 from ir_planner.checks.clearance_checks import clearance_violation
 from ir_planner.checks.energy import holding_watts, movement_energy
-from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, total_report
+from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.shapes import CLOSEST, WAY, ZONES, Colour, Shape, cell_shapes, movement_shapes
 from ir_planner.checks.states import end_in_collision, too_near, too_near_sentence
 from ir_planner.checks.states import StateCheck, state_check
+from ir_planner.checks.verification import TorqueProof, Verification, torque_proof, verified
 
 __all__ = [
     "AT_REST",
@@ -21,12 +22,15 @@ __all__ = [
     "FreeSpace",
     "Shape",
     "StateCheck",
+    "TorqueProof",
+    "Verification",
     "Violation",
     "cell_shapes",
     "clearance_violation",
     "end_in_collision",
     "evaluate_trajectory",
     "holding_watts",
+    "measured",
     "movement_energy",
     "movement_shapes",
     "nearest_pair",
@@ -35,5 +39,7 @@ __all__ = [
     "state_check",
     "too_near",
     "too_near_sentence",
+    "torque_proof",
     "total_report",
+    "verified",
 ]

@@ -29,6 +29,13 @@ def evaluate_trajectory(
 ) -> Evaluation:
     """Verify and measure a trajectory with the loads of the scene."""
     verification = verify(trajectory, scene, safety_distance, station)
+    return measured(trajectory, scene, station, verification)
+
+
+def measured(
+    trajectory: JointTrajectory, scene: PlanningScene, station: str, verification: Verification
+) -> Evaluation:
+    """The evaluation of a trajectory that has been verified."""
     energy = movement_energy(trajectory, scene)
     clearance = clearance_profile(trajectory, scene, station)
     report = TrajectoryReport(

@@ -55,26 +55,42 @@ class Verification:
         return Status(StatusCode.INVALID_MOTION_PLAN, sentence)
 
 
+@dataclass(frozen=True, eq=False)
+class TorqueProof:
+    """upper (n,): guaranteed bound of the share of the torque envelope that is used; the violation where it
+    exceeds 1.
+    """
+
+    upper: FloatArray
+    violation: Violation | None
+
+
 def verify(
     trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
 ) -> Verification:
     """Check a trajectory against the robot's limits and S_m (or what `station` allows its pairs)."""
-    coefficients, durations = trajectory.coefficients()
-    largest = extremes(coefficients, durations)
+    clearance = clearance_violation(trajectory, scene, safety_distance, station)
+    return verified(trajectory, scene, clearance, torque_proof(trajectory, scene))
+
+
+def verified(
+    trajectory: JointTrajectory, scene: PlanningScene, clearance: Violation | None, torque: TorqueProof
+) -> Verification:
+    """The verification of a trajectory whose clearance and torque have been examined."""
+    largest = extremes(*trajectory.coefficients())
     robot, limits = scene.cell.robot, scene.limits
     share = {
         "velocity": largest.velocity / limits.velocity,
         "acceleration": largest.acceleration / limits.acceleration,
         "jerk": largest.jerk / limits.jerk,
     }
-    torque, torque_violation = _torque(trajectory, scene)
     found = [
         position_violation(trajectory, largest, scene),
         rest_violation(trajectory, scene),
         jump_violation(trajectory, robot.joint_names),
-        torque_violation,
+        torque.violation,
         *(share_violation(name, values, trajectory, robot.joint_names) for name, values in share.items()),
-        clearance_violation(trajectory, scene, safety_distance, station),
+        clearance,
     ]
     violations = sorted((v for v in found if v is not None), key=lambda violation: violation.time)
     top = {name: values.max(axis=0, initial=0.0) for name, values in share.items()}
@@ -83,22 +99,22 @@ def verify(
         top["velocity"],
         top["acceleration"],
         top["jerk"],
-        torque,
+        torque.upper,
         largest.travel.sum(axis=0),
         tuple(violations[1:]),
     )
 
 
-def _torque(trajectory: JointTrajectory, scene: PlanningScene) -> tuple[FloatArray, Violation | None]:
-    """Guaranteed bound (n,) of the share of the torque envelope, and the violation where it exceeds 1."""
+def torque_proof(trajectory: JointTrajectory, scene: PlanningScene) -> TorqueProof:
+    """Bounds of the torque that a trajectory needs."""
     coefficients, durations = trajectory.coefficients()
     if len(durations) == 0:
         rest = np.zeros_like(trajectory.positions)
-        return torque_use(scene.dynamics, trajectory.positions, rest, rest).max(axis=0), None
+        return TorqueProof(torque_use(scene.dynamics, trajectory.positions, rest, rest).max(axis=0), None)
     bounds = scene.dynamics.torque_bounds(coefficients, durations)
     upper = np.asarray(bounds.upper)
     if upper.max() <= 1.0 + SLACK:
-        return upper, None
+        return TorqueProof(upper, None)
     j = int(np.argmax(upper))
     time = float(trajectory.times[0]) + float(bounds.time[j])
     k = segment_at(trajectory, time)
@@ -107,4 +123,4 @@ def _torque(trajectory: JointTrajectory, scene: PlanningScene) -> tuple[FloatArr
         f"torque limit after waypoint {k} at {time:.3f} s: it must be at most 1 "
         f"(excess {100.0 * (upper[j] - 1.0):.1f} %)"
     )
-    return upper, Violation(time, k, "torque", float(upper[j] - 1.0), sentence)
+    return TorqueProof(upper, Violation(time, k, "torque", float(upper[j] - 1.0), sentence))

@@ -1,11 +1,14 @@
-"""A path p(s) that stays as it is: the places that a trajectory passes, whatever its pace."""
+"""A path p(s) that stays as it is: the configurations that a trajectory passes, at any speed profile."""
+
+from functools import lru_cache
 
 import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import cholesky_banded
+from scipy.linalg.lapack import dpbtrs
 
 from ir_planner.curves import UniformSpline
 
@@ -36,49 +39,76 @@ class FixedPath:
         s = np.concatenate([[0.0], np.cumsum(middle * np.diff(self._share))])
         self._s = s / s[-1]
         self.q = q
-        self.at = make_interp_spline(self._s, q, k=3)
-        self.slope = self.at.derivative()
+        spline = make_interp_spline(self._s, q, k=3)
+        self._breaks = np.unique(spline.t)
+        begins = self._breaks[:-1]
+        self._cubics = np.stack(
+            [spline(begins), spline(begins, 1), spline(begins, 2) / 2, spline(begins, 3) / 6]
+        )
         self._passed = np.interp(knots[_in_order(given.positions, points)], self._share, self._s)
 
+    def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """p (N, n) rad and its derivative by s (N, n) at s (N,) in [0, 1]."""
+        k = np.clip(np.searchsorted(self._breaks, s, side="right") - 1, 0, len(self._breaks) - 2)
+        u = (s - self._breaks[k])[:, None]
+        a, b, c, d = self._cubics[:, k]
+        return a + u * (b + u * (c + u * d)), b + u * (2.0 * c + 3.0 * u * d)
+
     def places(self, count: int) -> FloatArray:
-        """s at the inner knots (count - 3,) at the pace that was given."""
+        """s at the inner knots (count - 3,) with the speed profile that was given."""
         return np.asarray(np.interp(np.linspace(0.0, 1.0, count + 1)[2:-2], self._share, self._s))
 
-    def finer(self, way: FloatArray) -> FloatArray:
-        """The same pace with a knot more in every interval."""
-        knots = np.concatenate([[0.0], np.arange(2.0, len(way) + 2.0), [len(way) + 3.0]])
-        pace = make_interp_spline(knots, np.concatenate([[0.0], way, [1.0]]), k=3)
-        return np.clip(pace(np.arange(2.0, 2.0 * len(way) + 5.0) / 2.0), 0.0, 1.0)
+    def finer(self, s: FloatArray) -> FloatArray:
+        """The same speed profile with a knot more in every interval."""
+        knots = np.concatenate([[0.0], np.arange(2.0, len(s) + 2.0), [len(s) + 3.0]])
+        profile = make_interp_spline(knots, np.concatenate([[0.0], s, [1.0]]), k=3)
+        return np.clip(profile(np.arange(2.0, 2.0 * len(s) + 5.0) / 2.0), 0.0, 1.0)
 
-    def knots_at_points(self, way: FloatArray) -> FloatArray:
-        """Where inner points are passed, in knots from the beginning (M - 2,); places (C,) of the knots."""
-        rising = np.concatenate([[0.0], np.maximum.accumulate(way), [1.0]])
-        knots = np.concatenate([[0.0], np.arange(2.0, len(way) + 2.0), [len(way) + 3.0]])
+    def knots_at_points(self, s: FloatArray) -> FloatArray:
+        """Where inner points are passed, in knots from the beginning (M - 2,); s (C,) at the inner knots."""
+        rising = np.concatenate([[0.0], np.maximum.accumulate(s), [1.0]])
+        knots = np.concatenate([[0.0], np.arange(2.0, len(s) + 2.0), [len(s) + 3.0]])
         return np.asarray(np.interp(self._passed[1:-1], rising, knots))
 
-    def spline(self, way: FloatArray, duration: float) -> UniformSpline:
-        """The spline that passes p(way) at its inner knots, at rest at both ends."""
-        right = 6.0 * self.at(way)
+    def spline(self, s: FloatArray, duration: float) -> UniformSpline:
+        """The spline that passes p(s) at its inner knots, at rest at both ends."""
+        return self.spline_over(self.at(s)[0], duration)
+
+    def spline_over(self, inner: FloatArray, duration: float) -> UniformSpline:
+        """The spline that passes `inner` (C, n) at its inner knots, at rest at both ends."""
+        right = 6.0 * inner
         right[0] -= self.q[0]
         right[-1] -= self.q[-1]
-        inner = cho_solve_banded((knot_factor(len(way)), False), right)
-        ends = (np.repeat(self.q[k][None], 3, axis=0) for k in (0, -1))
-        first, last = ends
-        return UniformSpline(np.concatenate([first, inner, last]), duration / (len(way) + 3))
+        control = np.empty((len(inner) + 6, inner.shape[1]))
+        control[:3], control[-3:] = self.q[0], self.q[-1]
+        control[3:-3] = from_knots(right)
+        return UniformSpline(control, duration / (len(inner) + 3))
 
-    def deviation(self, spline: UniformSpline, way: FloatArray) -> float:
-        """Largest distance of the spline from the path [rad]: to the nearest place of two knots around."""
+    def deviation(self, spline: UniformSpline, s: FloatArray) -> float:
+        """Largest distance of the spline from the path [rad]: to its nearest configuration within
+        two knots.
+        """
         q = spline.samples(_NEAREST)[0]
-        s = np.concatenate([[0.0, 0.0], np.maximum.accumulate(np.clip(way, 0.0, 1.0)), [1.0, 1.0]])
+        around = np.concatenate([[0.0, 0.0], np.maximum.accumulate(np.clip(s, 0.0, 1.0)), [1.0, 1.0]])
         worst = 0.0
-        for k in range(len(s) - 1):
-            near = self.at(np.linspace(s[max(k - 1, 0)], s[min(k + 2, len(s) - 1)], 16 * _NEAREST))
+        for k in range(len(around) - 1):
+            near = self.at(
+                np.linspace(around[max(k - 1, 0)], around[min(k + 2, len(around) - 1)], 16 * _NEAREST)
+            )[0]
             mine = q[k * _NEAREST : (k + 1) * _NEAREST]
             worst = max(worst, float(np.abs(mine[:, None] - near[None]).max(axis=2).min(axis=1).max()))
         return worst
 
 
-def knot_factor(count: int) -> FloatArray:
+def from_knots(right: FloatArray) -> FloatArray:
+    """The control points (C, n) whose values at their knots, times 6, are `right` (C, n); the matrix is
+    symmetric.
+    """
+    return np.asarray(dpbtrs(_knot_factor(len(right)), right)[0])
+
+
+@lru_cache(maxsize=64)
+def _knot_factor(count: int) -> FloatArray:
     """Factor of the matrix that leads from control points to knots, times 6."""
     bands = np.ones((2, count))
     bands[1] = 4.0

@@ -21,7 +21,7 @@ _FIRST = 0.3  # largest change of a number in the first step
 def descend(
     function: Function, x: FloatArray, evaluations: int, tolerance: float = 1e-5
 ) -> tuple[FloatArray, int]:
-    """Go down from x (N,); function: value and gradient (N,). Ends after `evaluations`, or when ten steps
+    """Minimise from x (N,); function: value and gradient (N,). Ends after `evaluations`, or when ten steps
     gain less than `tolerance` of the value. Returns the lowest x and how many evaluations it took.
     """
     value, gradient = function(x)
@@ -71,7 +71,7 @@ def descend(
 
 
 def _by_inverse(gradient: FloatArray, pairs: deque[tuple[FloatArray, FloatArray, float]]) -> FloatArray:
-    """The gradient times the inverse of the Hessian that the steps have told."""
+    """The gradient times the inverse of the Hessian that the steps imply."""
     result = gradient.copy()
     shares = []
     for moved, turned, inverse in reversed(pairs):

@@ -7,11 +7,10 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.transitions import TransitionTimes
 
-from ir_planner.checks import evaluate_trajectory
 from ir_planner.program.standby import pause_energy, plan_standby
 from ir_planner.program.steps import PlacedStep, Scenes, signal_text
 from ir_planner.scene import PlanningScene
-from ir_planner.timing import TimedMovement, stretched
+from ir_planner.timing import Movement
 
 AUTO = "AUTO"
 
@@ -23,32 +22,18 @@ class Leg:
     from_name: str
     to_name: str
     scene: PlanningScene
-    movements: tuple[tuple[MovementKind, TimedMovement], ...]
+    movements: tuple[tuple[MovementKind, Movement], ...]
 
-    def slower(self, factor: float, safety_distance: float) -> "Leg":
+    def slower(self, factor: float) -> "Leg":
         """The same leg with every movement stretched by `factor`, verified again."""
-        return Leg(
-            self.from_name,
-            self.to_name,
-            self.scene,
-            tuple(
-                (kind, self._slower(kind, movement, factor, safety_distance))
-                for kind, movement in self.movements
-            ),
-        )
+        movements = tuple((kind, movement.stretched_by(factor)) for kind, movement in self.movements)
+        return Leg(self.from_name, self.to_name, self.scene, movements)
 
     def station_of(self, kind: MovementKind) -> str:
         """The station whose allowed contacts hold in a movement of this kind."""
         return {MovementKind.SERVICE_EXIT: self.from_name, MovementKind.SERVICE_ENTRY: self.to_name}.get(
             kind, ""
         )
-
-    def _slower(
-        self, kind: MovementKind, movement: TimedMovement, factor: float, safety_distance: float
-    ) -> TimedMovement:
-        trajectory = stretched(movement.trajectory, factor)
-        evaluation = evaluate_trajectory(trajectory, self.scene, safety_distance, self.station_of(kind))
-        return TimedMovement(movement.waypoints, trajectory, evaluation, movement.note)
 
 
 def assembled(
@@ -105,7 +90,7 @@ def _moves(leg: Leg) -> list[PlannedMovement]:
                 to_station=station or leg.to_name,
                 trajectory_id=movement.trajectory.trajectory_id,
                 trajectory=movement.trajectory,
-                report=movement.evaluation.report,
+                report=movement.report,
                 duration=movement.trajectory.duration,
                 load=leg.scene.load_text,
             )

@@ -32,7 +32,7 @@ class CoarseCost:
         scene, limits = context.scene, context.limits
         robot, nobody = scene.cell.robot, np.full((1, len(scene.collision.pairs)), -np.inf)
         ends = np.zeros((2, robot.n))
-        self.weights = weights = objective_weights(context.options, scene, ends)
+        self.weights = weights = objective_weights(context, ends)
         terms = SplineTerms(
             limits.velocity,
             limits.acceleration,

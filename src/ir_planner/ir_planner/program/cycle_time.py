@@ -18,7 +18,6 @@ def within_cycle(
     legs: Legs,
     assemble: Callable[[Legs], tuple[PlannedMovement, ...]],
     hurried: Callable[[], Legs],
-    safety_distance: float,
 ) -> tuple[PlannedMovement, ...]:
     """The program in `cycle` s. assemble: steps of legs. hurried: the legs as fast as they can.
 
@@ -44,7 +43,7 @@ def within_cycle(
             f"cycle_time is {cycle:g} s: stretched to it, a movement would take {longest:.4g} s, at most "
             f"{DURATION_MAX:g} s; a shorter cycle time with a pause in the program costs less",
         )
-    return assemble({k: leg.slower(factor, safety_distance) for k, leg in legs.items()})
+    return assemble({k: leg.slower(factor) for k, leg in legs.items()})
 
 
 def _seconds(planned: tuple[PlannedMovement, ...]) -> tuple[float, float]:

@@ -71,9 +71,7 @@ class CostEdges:
         turned = [self._turned(part) for part in parts]
         new = {key: part for key, part in zip(turned, parts, strict=True) if key not in self._costs}
         for key, found in zip(new, self.movements.plan(list(new.values()), self.improvement), strict=True):
-            self._costs[key] = (
-                np.inf if isinstance(found, Failure) else cost_of(found.evaluation.report, self.rates)
-            )
+            self._costs[key] = np.inf if isinstance(found, Failure) else cost_of(found.report, self.rates)
         return [Settled(self._costs[key], exact=True) for key in turned]
 
     def _turned(self, part: Part) -> Turned:
@@ -131,8 +129,8 @@ class TravelEdges:
         if isinstance(movement, Failure):
             return Settled(np.inf, exact=True)
         weights = self.movements.route.arriving(part.hop).weights
-        straight = float(movement_cost(weights, movement.waypoints[0], movement.waypoints[-1]))
-        return Settled(max(path_cost(weights, movement.waypoints), straight), exact=True)
+        straight = float(movement_cost(weights, movement.path[0], movement.path[-1]))
+        return Settled(max(path_cost(weights, movement.path), straight), exact=True)
 
 
 def _outsides(nodes: list[Node]) -> FloatArray:

@@ -16,7 +16,7 @@ from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
 from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context
 from ir_planner.service import timed_service
-from ir_planner.timing import TimedMovement
+from ir_planner.timing import Movement
 
 
 def rates_of(context: Context) -> Rates:
@@ -44,7 +44,7 @@ class Movements:
 
     def __init__(self, route: Route, layers: list[list[Node]], context: Context, searches: Searches) -> None:
         self.route, self.layers, self.context, self.searches = route, layers, context, searches
-        self._found: dict[Part, TimedMovement | Failure] = {}
+        self._found: dict[Part, Movement | Failure] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
         )
@@ -54,7 +54,7 @@ class Movements:
         """How many movements were planned."""
         return len(self._found)
 
-    def plan(self, parts: Sequence[Part], improvement: int) -> list[TimedMovement | Failure]:
+    def plan(self, parts: Sequence[Part], improvement: int) -> list[Movement | Failure]:
         """The movements of parts of hops; those that aren't known yet side by side."""
         new = list(dict.fromkeys(part for part in parts if part not in self._found))
 
@@ -73,7 +73,7 @@ class Movements:
             if (
                 isinstance(before, Failure)
                 or isinstance(again, Failure)
-                or cost_of(before.evaluation.report, rates) <= cost_of(again.evaluation.report, rates)
+                or cost_of(before.report, rates) <= cost_of(again.report, rates)
             ):
                 self._found[part] = before
 
@@ -92,7 +92,7 @@ class Movements:
         ends = first.interaction, first.outside
         return ends if part.kind == LEAVE else ends[::-1]
 
-    def _planned(self, part: Part, context: Context) -> TimedMovement | Failure:
+    def _planned(self, part: Part, context: Context) -> Movement | Failure:
         first, second = self.nodes(part)
         here, there = self.route.name(part.hop - 1), self.route.name(part.hop)
         inside = context.inside(self.route.arriving(part.hop))

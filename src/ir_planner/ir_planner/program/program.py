@@ -83,7 +83,7 @@ def _planned(
         return _legs(faster, chain, improvement, progress)
 
     if request.cycle_time > 0.0:
-        return within_cycle(request.cycle_time, legs, assemble, hurried, context.safety_distance)
+        return within_cycle(request.cycle_time, legs, assemble, hurried)
     return assemble(legs)
 
 

@@ -21,7 +21,7 @@ Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M,
 FIRST = ("direct", "tree", "detours", "retract")
 # that find other homotopy classes with another seed
 EXPLORERS = ("detours", "tree", "genetic")
-_FINISHED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
+_REFINED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
 
 
 def first_paths(ends: Ends, space: FreeSpace, context: Context, searches: Searches) -> list[Path]:
@@ -66,7 +66,7 @@ def improve(
 
     with journal.stage("refine") as notes:
         portfolio.add(paths[0][0], [path for _, path in paths])
-        notes.append(f"{portfolio.finish_best(1)} certified")
+        notes.append(f"{portfolio.refine_best(1)} certified")
     explorers = [name for name in EXPLORERS if context.options.planner_id in ("", name)]
     turn = 0
     with journal.stage("improve") as notes:
@@ -79,7 +79,7 @@ def improve(
                     seed = _seed(context.options.seed, turn, name)
                     found = quick(searches[name]).find(ends, portfolio.space, seed, work)
                     new[name] += portfolio.add(name, found.paths)
-            certified += portfolio.finish_best(_FINISHED) if more() else 0
+            certified += portfolio.refine_best(_REFINED) if more() else 0
             if more():
                 certified += portfolio.deepen()
             turn += 1

@@ -20,9 +20,9 @@ from ir_planner.regional.refusal import refusal
 from ir_planner.request import Context
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
-from ir_planner.timing import TimedMovement
+from ir_planner.timing import Movement
 
-_TIMED_BY_LAWS = 3  # paths that get straight steps with blended corners: the cheapest by W is rarely not best
+_TIMED = 3  # paths that get straight steps with blended corners: the cheapest by W is rarely not best
 
 
 def plan_regional(start: FloatArray, goals: FloatArray, context: Context, searches: Searches) -> MovementPlan:
@@ -35,12 +35,12 @@ def plan_regional(start: FloatArray, goals: FloatArray, context: Context, search
     info = context.journal.info(start, context.joint_names)
     if found is None:
         return MovementPlan(status, info, TrajectoryReport())
-    return MovementPlan(status, info, found.evaluation.report, found.trajectory, found.waypoints)
+    return MovementPlan(status, info, found.report, found.trajectory, found.path)
 
 
 def search_regional(
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
-) -> tuple[Status, TimedMovement | None]:
+) -> tuple[Status, Movement | None]:
     """The best movement found, with the status that says so or says why not; start (n,), goals (n,) or
     (G, n).
     """
@@ -49,16 +49,16 @@ def search_regional(
     blocked = end_in_collision(start, ends.goals[0], space, context.safety_distance)
     if blocked is not None:
         return blocked, None
-    refinement = Refinement(context.scene, context.options, context.work)
-    portfolio = Portfolio(space, refinement, context.journal)
+    refinement = Refinement(context)
+    portfolio = Portfolio(space, refinement)
     paths = first_paths(ends, space, context, searches)
-    best: tuple[str, TimedMovement] | None = None
+    best: tuple[str, Movement] | None = None
     there = np.abs(ends.goals - start).max(axis=1).min() < STILL
-    if paths and not there and not _by_laws(context.options):
+    if paths and not there and not _straight_steps_only(context.options):
         improve(ends, paths, portfolio, context, searches)
         best = portfolio.best()
         if best is None:
-            refinement.check_wish()
+            refinement.check_requested()
     if paths and best is None:
         best = _in_straight_steps(paths, portfolio, context)
     if best is None:
@@ -67,7 +67,7 @@ def search_regional(
     return Status.success(), movement
 
 
-def _by_laws(options: PlanOptions) -> bool:
+def _straight_steps_only(options: PlanOptions) -> bool:
     """Whether the movement is to keep to straight steps: PTP by name, or joints with a time each of their
     own.
     """
@@ -76,13 +76,13 @@ def _by_laws(options: PlanOptions) -> bool:
 
 def _in_straight_steps(
     paths: list[Path], portfolio: Portfolio, context: Context
-) -> tuple[str, TimedMovement] | None:
+) -> tuple[str, Movement] | None:
     """The best of the cheapest paths by W, in straight steps with blended corners."""
     weights = context.scene.weights
     with context.journal.stage("straight steps") as notes:
-        cheapest = sorted(paths, key=lambda path: path_cost(weights, path[1]))[:_TIMED_BY_LAWS]
+        cheapest = sorted(paths, key=lambda path: path_cost(weights, path[1]))[:_TIMED]
         shorter = [(method, _straightened(path, portfolio.space)) for method, path in cheapest]
-        best = portfolio.timed_by_laws(shorter)
+        best = portfolio.in_straight_steps(shorter)
         notes.append("certified" if best else "nothing certified")
         if best is not None and best[1].note:
             notes.append(best[1].note)

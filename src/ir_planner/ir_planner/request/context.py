@@ -21,6 +21,11 @@ class Context:
     journal: Journal
     station: str = ""
 
+    @staticmethod
+    def of(scene: PlanningScene, options: PlanOptions, work: Work, station: str = "") -> "Context":
+        """The context of a new request, with a journal of its own."""
+        return Context(scene, options, Journal(work, options.seed), station)
+
     @property
     def work(self) -> Work:
         """What the request may still cost."""

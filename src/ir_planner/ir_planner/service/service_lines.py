@@ -12,15 +12,15 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 
 from ir_description import Station
-from ir_planner.checks import FreeSpace, evaluate_trajectory
+from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
 from ir_planner.optimize import movement_over
 from ir_planner.request import Context
-from ir_planner.timing import TimedMovement, best_stretch, stretched, time_spline
+from ir_planner.scene import MotionLimits
+from ir_planner.timing import Movement, best_stretch, stretched, time_spline, within_torque
 
 SPACING = 0.03  # m between points of the line: in between, the tool leaves it by less than a millimetre
 _JUMP = 0.35  # rad: a larger step between neighbours is another branch or a singular wrist
-_TORQUE_SHARES = (0.97, 0.92, 0.85)  # tried in turn: torque is sampled while timing, and proved afterwards
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,31 +93,28 @@ def lines_free(lines: list[ServiceLine], context: Context, rejected: Counter[str
     return [bool(free) for free in inside & ends]
 
 
-def timed_service(line: ServiceLine, entry: bool, context: Context) -> TimedMovement:
+def timed_service(line: ServiceLine, entry: bool, context: Context) -> Movement:
     """The movement along the line, outwards or (entry) inwards, verified with the allowed contacts of the
     context's station.
 
     Raises TimingError when a torque does not suffice.
     """
     points = line.points[::-1] if entry else line.points
-    scene, options, station = context.scene, context.options, context.station
     if len(points) < 3 or not line.straight:
-        return movement_over(points, scene, options, context.work, station)
-    for share in _TORQUE_SHARES:
+        return movement_over(points, context)
+
+    def timed(limits: MotionLimits) -> Movement:
+        quickest = time_spline(points, context.joint_names, limits, context.scene.dynamics)
         context.work.check()
-        limits = context.limits.with_torque_share(share)
-        fastest = time_spline(points, context.joint_names, limits, scene.dynamics)
-        context.work.check()
-        factor = best_stretch(fastest, scene, options.objective, options.time_value)
-        trajectory = stretched(fastest, factor)
-        context.work.check()
-        evaluation = evaluate_trajectory(trajectory, scene, options.safety_distance, station)
-        violation = evaluation.verification.violation
-        if violation is None:
-            break
-        if violation.what == "clearance":
-            # the spline leaves the certified polyline where points lie far apart: refined from the polyline
-            return movement_over(points, scene, options, context.work, station)
+        trajectory = stretched(quickest, best_stretch(quickest, context))
+        return Movement(np.array(points), trajectory, context)
+
+    movement = within_torque(timed, context)
+    assert movement is not None  # timed always makes one
+    violation = movement.violation
+    if violation is not None and violation.what == "clearance":
+        # the spline leaves the certified polyline where points lie far apart: refined from the polyline
+        return movement_over(points, context)
     if violation is not None and violation.what != "torque":
         raise TimingError(violation.sentence, 0)
-    return TimedMovement(np.array(points), trajectory, evaluation)
+    return movement

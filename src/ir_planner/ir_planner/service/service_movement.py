@@ -27,7 +27,7 @@ from ir_planner.service.withdrawals import (
     withdrawal,
 )
 from ir_planner.service.work_configurations import ENTRY, ServiceRequest, work_configurations
-from ir_planner.timing import TimedMovement, objective_value
+from ir_planner.timing import Movement, objective_value
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +76,11 @@ def _search(
     return failed, ()
 
 
-def _timed(
-    path: ExitPath, request: ServiceRequest, context: Context
-) -> tuple[ExitPath, TimedMovement] | None:
+def _timed(path: ExitPath, request: ServiceRequest, context: Context) -> tuple[ExitPath, Movement] | None:
     """The certified movement over an exit path, or None with its reason counted."""
     points = path.points[::-1] if request.direction == ENTRY else path.points
     try:
-        movement = movement_over(points, context.scene, context.options, context.work, context.station)
+        movement = movement_over(points, context)
     except TimingError as error:
         context.journal.reject(f"torque: {error}")
         return None
@@ -92,13 +90,11 @@ def _timed(
     return path, movement
 
 
-def _ranked(
-    certified: list[tuple[ExitPath, TimedMovement]], context: Context
-) -> tuple[ServiceCandidate, ...]:
+def _ranked(certified: list[tuple[ExitPath, Movement]], context: Context) -> tuple[ServiceCandidate, ...]:
     options = context.options
 
-    def key(entry: tuple[ExitPath, TimedMovement]) -> tuple[float, float, float]:
-        report = entry[1].evaluation.report
+    def key(entry: tuple[ExitPath, Movement]) -> tuple[float, float, float]:
+        report = entry[1].report
         cost = objective_value(report, options.objective, options.time_value)
         return round(cost, 6), -report.min_clearance, report.duration
 
@@ -110,7 +106,7 @@ def _ranked(
             outside=path.points[-1],
             trajectory_id=movement.trajectory.trajectory_id,
             trajectory=movement.trajectory,
-            report=movement.evaluation.report,
+            report=movement.report,
         )
         for path, movement in sorted(certified, key=key)
     )

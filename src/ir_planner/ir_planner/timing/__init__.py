@@ -1,43 +1,44 @@
 """Time scaling: seven-phase laws, straight movements (PTP), blended corners, the best duration."""
 
 from ir_planner.timing.blending import TimedPath, blended, stretched
+from ir_planner.timing.durations import DURATION_SLACK, at_best_duration, check_duration, check_requested
 from ir_planner.timing.level_timing import fastest
-from ir_planner.timing.movement import (
-    DURATION_SLACK,
-    TimedMovement,
-    check_duration,
-    distinct,
-    stretched_to_wish,
-    timed_movement,
-)
+from ir_planner.timing.limit_use import lasting_longer
+from ir_planner.timing.movement import Movement
 from ir_planner.timing.objective import (
     ObjectiveWeights,
     best_stretch,
+    coarse_energy_cost,
     objective_value,
     objective_weights,
-    pace_value,
-    trajectory_value,
+    request_cost,
 )
 from ir_planner.timing.spline_timing import time_spline
+from ir_planner.timing.straight_steps import distinct, straight_steps
 from ir_planner.timing.time_law import StepLaws
+from ir_planner.timing.torque_shares import TORQUE_SHARES, within_torque
 
 __all__ = [
     "DURATION_SLACK",
+    "TORQUE_SHARES",
+    "Movement",
     "ObjectiveWeights",
     "StepLaws",
-    "TimedMovement",
     "TimedPath",
+    "at_best_duration",
     "best_stretch",
     "blended",
     "check_duration",
+    "check_requested",
+    "coarse_energy_cost",
     "distinct",
     "fastest",
+    "lasting_longer",
     "objective_value",
     "objective_weights",
-    "pace_value",
+    "request_cost",
+    "straight_steps",
     "stretched",
-    "stretched_to_wish",
     "time_spline",
-    "timed_movement",
-    "trajectory_value",
+    "within_torque",
 ]

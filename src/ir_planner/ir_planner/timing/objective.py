@@ -13,7 +13,8 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_planner.checks import movement_energy
-from ir_planner.scene import PlanningScene, path_cost
+from ir_planner.request import Context
+from ir_planner.scene import path_cost
 from ir_planner.timing.blending import stretched
 
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
@@ -36,6 +37,13 @@ def objective_value(report: TrajectoryReport, objective: str, time_value: float)
     return values[objective]
 
 
+def request_cost(report: TrajectoryReport, options: PlanOptions) -> float:
+    """What a request minimises: its objective, or joules where it asks for a duration."""
+    if options.duration > 0.0:
+        return report.energy
+    return objective_value(report, options.objective, options.time_value)
+
+
 @dataclass(frozen=True, eq=False)
 class ObjectiveWeights:
     """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about what a
@@ -48,10 +56,11 @@ class ObjectiveWeights:
     power: float
 
 
-def objective_weights(options: PlanOptions, scene: PlanningScene, path: FloatArray) -> ObjectiveWeights:
-    """The objective as a sum that a descent can follow; with a wished duration only joules are left to
-    choose.
+def objective_weights(context: Context, path: FloatArray) -> ObjectiveWeights:
+    """The objective as a sum that a descent can follow, for movements near `path` (M, n); with a requested
+    duration only joules are left to choose.
     """
+    options, scene = context.options, context.scene
     still = np.zeros(len(scene.weights))
     if options.duration > 0.0 or options.objective == "energy":
         return ObjectiveWeights(1.0, scene.base_watts, still, _DRIVES_WATTS + scene.base_watts)
@@ -68,31 +77,32 @@ def coarse_step(trajectory: JointTrajectory) -> float:
     return max(_COARSE_STEP, trajectory.duration / _MOST_STEPS)
 
 
-def pace_value(trajectory: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
-    """J of a trajectory at the pace it has, or its joules where the objective is not J; sampled coarsely."""
-    energy = movement_energy(trajectory, scene, coarse_step(trajectory))
-    if objective == "time_and_energy":
-        return energy.total - energy.base + time_value * trajectory.duration
+def coarse_energy_cost(trajectory: JointTrajectory, context: Context) -> float:
+    """J of a trajectory as it is, or its joules where the objective is not J; sampled coarsely."""
+    energy = movement_energy(trajectory, context.scene, coarse_step(trajectory))
+    if context.options.objective == "time_and_energy":
+        return energy.total - energy.base + context.options.time_value * trajectory.duration
     return energy.total
 
 
-def trajectory_value(trajectory: JointTrajectory, scene: PlanningScene, options: PlanOptions) -> float:
-    """What is minimised, for comparing movements: energies and ways are sampled coarsely."""
-    if options.objective == "time":
+def coarse_cost(trajectory: JointTrajectory, context: Context) -> float:
+    """The objective of a trajectory for comparisons: energies and path lengths are sampled coarsely."""
+    weights = context.scene.weights
+    if context.options.objective == "time":
         return trajectory.duration
-    if options.objective == "movement_cost":
+    if context.options.objective == "movement_cost":
         times = np.arange(trajectory.times[0], trajectory.times[-1], coarse_step(trajectory))
-        return path_cost(scene.weights, trajectory.sample(times).q) * (1.0 + 1e-6 * trajectory.duration)
-    return pace_value(trajectory, scene, options.objective, options.time_value)
+        return path_cost(weights, trajectory.sample(times).q) * (1.0 + 1e-6 * trajectory.duration)
+    return coarse_energy_cost(trajectory, context)
 
 
-def best_stretch(fastest: JointTrajectory, scene: PlanningScene, objective: str, time_value: float) -> float:
+def best_stretch(fastest: JointTrajectory, context: Context) -> float:
     """Factor >= 1 on the duration of the fastest movement that minimises the objective."""
-    if objective in ("time", "movement_cost"):
+    if context.options.objective in ("time", "movement_cost"):
         return 1.0
 
     def cost(factor: float) -> float:
-        return pace_value(stretched(fastest, factor), scene, objective, time_value)
+        return coarse_energy_cost(stretched(fastest, factor), context)
 
     costs = [cost(float(factor)) for factor in _FACTORS]
     k = int(np.argmin(costs))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ir_planner.curves import extremes, natural_durations, spline_through, virtual_knots
 from ir_planner.errors import TimingError
 from ir_planner.scene import Dynamics, MotionLimits
+from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.ptp import torque_per_segment
 from ir_planner.timing.time_law import GRID_NS, GRID_S
 
@@ -33,7 +34,7 @@ def time_spline(
 ) -> JointTrajectory:
     """Trajectory through `points` (M, n), M >= 3, within the limits; neighbouring points differ.
 
-    `given` (M-1,) s: wished durations; their proportions are kept, and all are stretched where limits ask
+    `given` (M-1,) s: requested durations; their proportions are kept, and all are stretched where limits ask
     for it. Raises TimingError when a joint's torque does not suffice however slowly.
     """
     if given is None:
@@ -73,14 +74,8 @@ def _interval_use(
 ) -> FloatArray:
     """By what factor each of the M-1 intervals should be longer: above 1 where a limit is exceeded."""
     largest = extremes(*trajectory.coefficients())
-    use = np.maximum.reduce(
-        [
-            (largest.velocity / limits.velocity).max(axis=1),
-            np.sqrt((largest.acceleration / limits.acceleration).max(axis=1)),
-            np.cbrt((largest.jerk / limits.jerk).max(axis=1)),
-            np.sqrt(torque_per_segment(trajectory, dynamics).max(axis=1) / limits.torque_share),
-        ]
-    )
+    torque = torque_per_segment(trajectory, dynamics)
+    use = lasting_longer(limits, largest.velocity, largest.acceleration, largest.jerk, torque)
     # segments to intervals: the first and the last interval have two segments each
     interval = np.clip(np.arange(len(use)) - 1, 0, points - 2)
     result = np.zeros(points - 1)

@@ -1,9 +1,9 @@
 """A trajectory that came from anywhere becomes cheaper between the same end points, and is proved.
 
-Its path is fitted by uniform splines (at its own pace, at an even one, and with corners left out), which
-descend for the objective; the best that is certified is the answer, unless the original is and costs less. A
-path that hits something is pushed out of it by the same descent; where that fails, ways round are searched.
-The trade of time for energy comes with the answer.
+Its path is fitted by uniform splines (with its own speed profile, with an even one, and with corners left
+out), which are optimised for the objective; the best that is certified is the answer, unless the original is
+and costs less. A path that hits something is pushed out of it by the same descent; where that fails, new
+paths are searched. The trade of time for energy comes with the answer.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
 from ir_planner.curves import UniformSpline, evenly_spaced
 from ir_planner.errors import RequestError
-from ir_planner.optimize import Descents, Measured, Task, path_of
+from ir_planner.optimize import Descents, path_of
 from ir_planner.regional import Searches, search_regional
 from ir_planner.request import DURATION_MAX, Context, Journal, Work, bounded, within_limits
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.search import fewest_corners
-from ir_planner.timing import stretched
+from ir_planner.timing import Movement, request_cost
 from ir_planner.trajectories.pareto import pareto_front, thinned
 
 POINTS_MAX = 10_000
@@ -43,7 +43,7 @@ class OptimizationPlan:
     before: TrajectoryReport
     after: TrajectoryReport
     trajectory: JointTrajectory | None = None
-    front: tuple[Measured, ...] = ()
+    front: tuple[Movement, ...] = ()
 
 
 def optimize_trajectory(
@@ -94,14 +94,14 @@ class _Optimization:
         self.scene, self.options, self.searches = scene, options, searches
         self.path = path_of(original, scene)
         self.journal = Journal(work, options.seed, planner_id="descent")
-        self.task = Task(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
-        self.space = FreeSpace.of(scene, options.safety_distance, work, self.task.station)
-        self.descents = Descents(self.task)
-        if self.task.station:
-            self.journal.note("station", f"allowed contacts of {self.task.station} hold in its zone")
+        self.context = Context(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
+        self.space = FreeSpace.of(scene, options.safety_distance, work, self.context.station)
+        self.descents = Descents(self.context)
+        if self.context.station:
+            self.journal.note("station", f"allowed contacts of {self.context.station} hold in its zone")
         with self.journal.stage("before") as notes:
-            self.original = self.task.measured(original)
-            violation = self.original.evaluation.verification.violation
+            self.original = Movement(original.positions, original, self.context)
+            violation = self.original.violation
             self.wrong = "" if violation is None else violation.sentence
             notes.append(self.wrong or "certified")
 
@@ -114,51 +114,50 @@ class _Optimization:
         if np.abs(goal - start).max() < STILL:
             return self._standing()
         known = [self.original] if self._within_options(self.original) else []
-        found = self._descended()
+        found = self._optimised()
         if found is None and not self._fits(known):
-            status, found = self._round()
+            status, found = self._rerouted()
             if found is None:
                 return self._answer(status)
         known += [found] if found is not None else []
         with self.journal.stage("pareto front") as notes:
             first = sorted(known, key=lambda movement: movement is not found)
-            front = pareto_front(first, self.task)
+            front = pareto_front(first, self.context)
             shown = thinned(front)
             notes.append("; ".join(_point(movement) for movement in shown))
-        best = min(self._fits([*known, *front]), key=self.descents.value)
+        best = min(self._fits([*known, *front]), key=self._cost)
         if best is self.original:
             what = "energy" if self.options.duration > 0.0 else self.options.objective
             self.journal.note("result", f"the original is kept: nothing better by {what} was found")
         return self._answer(Status.success(), best, shown)
 
-    def _descended(self) -> Measured | None:
+    def _optimised(self) -> Movement | None:
         """The best certified movement near the original."""
         with self.journal.stage("descent") as notes:
             found = self.descents.improved(self.original.trajectory, self._shortcut())
             notes.append("certified" if found else "nothing certified")
             if found is None and self.options.duration > 0.0:
-                found = self._slowed()
-                notes.append("the fastest one, slowed" if found else "nor is the fastest one")
+                found = self._fastest_stretched()
+                notes.append("the fastest one, stretched" if found else "nor is the fastest one")
         return found
 
-    def _slowed(self) -> Measured | None:
-        """The fastest movement near the original, slowed to the wished duration.
+    def _fastest_stretched(self) -> Movement | None:
+        """The fastest movement near the original, stretched to the requested duration.
 
         Raises RequestError where it is longer already.
         """
-        wished = self.options.duration
-        descents = Descents(self.task.asking("time"))
+        requested = self.options.duration
+        descents = Descents(self.context.asking("time"))
         fastest = descents.improved(self.original.trajectory, self._shortcut())
         if fastest is None:
             return None
-        if fastest.report.duration > wished:
+        if fastest.report.duration > requested:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"duration is {wished:g} s: the shortest within the limits near the trajectory is "
+                f"duration is {requested:g} s: the shortest within the limits near the trajectory is "
                 f"{fastest.report.duration:.4g} s",
             )
-        slowed = stretched(fastest.trajectory, wished / fastest.report.duration)
-        movement = self.task.measured(slowed)
+        movement = fastest.stretched_by(requested / fastest.report.duration)
         return movement if movement.certified else None
 
     def _shortcut(self) -> list[UniformSpline]:
@@ -168,20 +167,19 @@ class _Optimization:
             return []
         return [self.descents.start_along(fewest_corners(corners, self.space, self.scene.weights))]
 
-    def _round(self) -> tuple[Status, Measured | None]:
+    def _rerouted(self) -> tuple[Status, Movement | None]:
         """A new movement between the same end points."""
-        self.journal.note("repair", "no descent from the original was certified: ways round are searched")
+        self.journal.note("repair", "no descent from the original was certified: new paths are searched")
         self.journal.planner_id = ""
         start, goal = self.path[0], self.path[-1]
-        context = Context(self.scene, self.options, self.journal)
-        status, found = search_regional(start, goal, context, self.searches)
+        status, found = search_regional(start, goal, self.context.at(""), self.searches)
         if found is None:
             why = f"the original can't be repaired ({self.wrong})" if self.wrong else "nothing was certified"
             return Status(status.code, f"{why}; {status.message}"), None
-        self.journal.note("result", "not the original's way but a new one between its end points")
-        return status, Measured(found.trajectory, found.evaluation)
+        self.journal.note("result", "not the original's path but a new one between its end points")
+        return status, found
 
-    def _within_options(self, movement: Measured) -> bool:
+    def _within_options(self, movement: Movement) -> bool:
         """Whether a movement is certified and within the scalings."""
         options, report = self.options, movement.report
         return bool(
@@ -191,10 +189,16 @@ class _Optimization:
             and (report.jerk_ratio <= options.acceleration_scaling + SLACK).all()
         )
 
-    def _fits(self, movements: list[Measured]) -> list[Measured]:
-        """Those that last as long as wished."""
-        wished = self.options.duration
-        return [m for m in movements if wished == 0.0 or abs(m.report.duration - wished) < _SAME_DURATION]
+    def _fits(self, movements: list[Movement]) -> list[Movement]:
+        """Those of the requested duration."""
+        requested = self.options.duration
+        if requested == 0.0:
+            return movements
+        return [m for m in movements if abs(m.report.duration - requested) < _SAME_DURATION]
+
+    def _cost(self, movement: Movement) -> float:
+        """What the request minimises; the front's movements were made for other objectives."""
+        return request_cost(movement.report, self.options)
 
     def _standing(self) -> OptimizationPlan:
         """The end points are the same."""
@@ -206,7 +210,7 @@ class _Optimization:
         return self._answer(Status.success(), self.original)
 
     def _answer(
-        self, status: Status, best: Measured | None = None, front: tuple[Measured, ...] = ()
+        self, status: Status, best: Movement | None = None, front: tuple[Movement, ...] = ()
     ) -> OptimizationPlan:
         info = self.journal.info(self.path[0], self.scene.cell.robot.joint_names)
         before = self.original.report
@@ -224,7 +228,7 @@ def _station_at(ends: FloatArray, scene: PlanningScene) -> str:
     return ""
 
 
-def _point(movement: Measured) -> str:
+def _point(movement: Movement) -> str:
     return (
         f"{movement.report.duration:.3f} s {movement.report.energy:.0f} J {movement.trajectory.trajectory_id}"
     )

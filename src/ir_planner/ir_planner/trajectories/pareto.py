@@ -1,32 +1,34 @@
 """Time against energy: certified movements between the fastest and the one of least energy at the mains.
 
-Each descends at a duration of its own, from its neighbour among others. Energy is that of the report, with
-the base load: beyond the duration at which it is least, slower costs more of both.
+Each is optimised at a duration of its own, from its neighbour among others. Energy is that of the report,
+with the base load: beyond the duration at which it is least, slower costs more of both.
 """
 
 import numpy as np
 
 from ir_planner.errors import RequestError
-from ir_planner.optimize import Descents, Measured, Task
+from ir_planner.optimize import Descents
+from ir_planner.request import Context
+from ir_planner.timing import Movement
 
-COUNT = 8
+COUNT = 8  # durations from the fastest to the slowest end
 _APART = (1.005, 0.98)  # factors on duration or energy by which neighbours of a thinned front differ
 
 
-def pareto_front(known: list[Measured], task: Task) -> tuple[Measured, ...]:
-    """The non-dominated of the known certified movements and of those that descend from the first of them:
-    durations increase, energies fall. The task's own objective and duration don't count.
+def pareto_front(known: list[Movement], context: Context) -> tuple[Movement, ...]:
+    """The non-dominated of the known certified movements and of those that are optimised from the first of
+    them: durations increase, energies fall. The request's own objective and duration don't count.
 
     Ends early where the budget is exhausted. Raises CancelledError when asked to stop.
     """
     points = list(known)
 
-    def descend(start: Measured, objective: str, duration: float = 0.0) -> Measured | None:
-        if task.journal.work.exhausted:
+    def descend(start: Movement, objective: str, duration: float = 0.0) -> Movement | None:
+        if context.work.exhausted:
             return None
         rounds = 1 if duration > 0.0 else 3
         try:
-            found = Descents(task.asking(objective, duration)).improved(start.trajectory, rounds=rounds)
+            found = Descents(context.asking(objective, duration)).improved(start.trajectory, rounds=rounds)
         except RequestError:  # longer than a movement may be
             return None
         if found is not None:
@@ -38,22 +40,22 @@ def pareto_front(known: list[Measured], task: Task) -> tuple[Measured, ...]:
     ends = non_dominated(points)
     neighbour = ends[-1]
     between = np.geomspace(ends[0].report.duration, ends[-1].report.duration, COUNT)[1:-1]
-    for duration in between[::-1] if len(ends) > 1 else ():  # the gentle ones lead to the fast ones
+    for duration in between[::-1] if len(ends) > 1 else ():  # slow movements lead to fast ones
         neighbour = descend(neighbour, "energy", float(duration)) or neighbour
     descend(neighbour, "time")
     return non_dominated(points)
 
 
-def non_dominated(points: list[Measured]) -> tuple[Measured, ...]:
+def non_dominated(points: list[Movement]) -> tuple[Movement, ...]:
     """Those beside which no other is as quick and takes as little energy; by duration."""
-    front: list[Measured] = []
+    front: list[Movement] = []
     for point in sorted(points, key=lambda point: (point.report.duration, point.report.energy)):
         if not front or point.report.energy < front[-1].report.energy:
             front.append(point)
     return tuple(front)
 
 
-def thinned(front: tuple[Measured, ...]) -> tuple[Measured, ...]:
+def thinned(front: tuple[Movement, ...]) -> tuple[Movement, ...]:
     """A front without points that hardly differ from the one before; both ends stay."""
     kept = list(front[:1])
     for point in front[1:]:

@@ -1,4 +1,4 @@
-"""Pace along a path that stays: faster than by rules, near TOPP-RA, within the limits, through the points."""
+"""Time scaling of a fixed path: faster than by rules, near TOPP-RA, within limits, through the points."""
 
 from __future__ import annotations
 
@@ -16,12 +16,17 @@ from ir_planner.curves.uniform_spline import along_path
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.optimize.fixed_path import FixedPath
 from ir_planner.optimize.passing import Passing
-from ir_planner.optimize.path_timing import Paced, _Descent, along_its_path
+from ir_planner.optimize.path_timing import PathTiming, along_its_path
+from ir_planner.optimize.profile_descent import _Descent
+from ir_planner.optimize.terms import spline_cost
 from ir_planner.regional.regional import MovementPlan
+from ir_planner.request.context import Context
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import stretched
+from ir_planner.timing.objective import objective_weights
 from ir_planner.timing.spline_timing import time_spline
+from ir_planner.timing.torque_shares import TORQUE_SHARES
 from ir_planner.trajectories.through_points import KEPT, Reference, plan_through
 from numpy.typing import NDArray
 
@@ -39,7 +44,7 @@ def scene(scene_of: Callable[[str], PlanningScene]) -> PlanningScene:
 
 
 def waved(scene: PlanningScene, count: int, by: float = 0.25) -> FloatArray:
-    """Points of a smooth free way that turns."""
+    """Points of a smooth free path that turns."""
     task = scene.cell.task("home->p1")
     start, goal = np.array(task.start), np.array(task.goal)
     share = np.linspace(0.0, 1.0, count)[:, None]
@@ -49,9 +54,11 @@ def waved(scene: PlanningScene, count: int, by: float = 0.25) -> FloatArray:
     return np.asarray(points)
 
 
-def by_rules(points: FloatArray, scene: PlanningScene, share: float = 0.97) -> JointTrajectory:
-    limits = scene.limits.with_torque_share(share)
-    return time_spline(points, scene.cell.robot.joint_names, limits, scene.dynamics)
+def by_rules(points: FloatArray, scene: PlanningScene) -> JointTrajectory:
+    """The spline timed by rules alone: what is left of a request without work."""
+    plan = plan_through(Reference(points), scene, TIME, budget(work=0))
+    assert plan.trajectory is not None
+    return plan.trajectory
 
 
 def planned(points: FloatArray, scene: PlanningScene, options: PlanOptions = TIME) -> MovementPlan:
@@ -102,16 +109,16 @@ def test_dense_points_are_passed_within_the_deviation(scene: PlanningScene) -> N
     assert "mrad of its path" in plan.info.stages[0].note
 
 
-def test_a_wished_duration_costs_less_than_slowing_the_rules(scene: PlanningScene) -> None:
+def test_a_requested_duration_costs_less_than_slowing_the_rules(scene: PlanningScene) -> None:
     points = waved(scene, 5)
     rules = by_rules(points, scene)
-    wished = round(1.1 * rules.duration, 3)
-    plan = planned(points, scene, replace(TIME, duration=wished))
+    requested = round(1.1 * rules.duration, 3)
+    plan = planned(points, scene, replace(TIME, duration=requested))
     assert plan.report.certified
-    assert plan.report.duration == pytest.approx(wished, abs=1e-6)
+    assert plan.report.duration == pytest.approx(requested, abs=1e-6)
     assert plan.trajectory is not None
     assert deviation(plan.trajectory, rules) < KEPT
-    slowed = stretched(rules, wished / rules.duration)
+    slowed = stretched(rules, requested / rules.duration)
     assert plan.report.energy < 0.98 * movement_energy(slowed, scene).total
 
 
@@ -137,7 +144,7 @@ def test_a_duration_that_is_too_short_is_refused_with_the_shortest(scene: Planni
         planned(points, scene, replace(TIME, duration=0.9 * shortest))
 
 
-def test_wished_times_keep_their_proportions(scene: PlanningScene) -> None:
+def test_given_times_keep_their_proportions(scene: PlanningScene) -> None:
     points = waved(scene, 4)
     times = np.array([0.0, 3.0, 4.0, 9.0])
     plan = plan_through(Reference(points, times), scene, TIME, budget())
@@ -149,7 +156,9 @@ def test_wished_times_keep_their_proportions(scene: PlanningScene) -> None:
 def test_without_work_left_the_rules_time_it_and_a_cancel_is_heard(scene: PlanningScene) -> None:
     points = waved(scene, 5)
     plan = plan_through(Reference(points), scene, TIME, budget(work=0))
-    assert plan.report.duration == by_rules(points, scene).duration
+    limits = (scene.limits.with_torque_share(share) for share in TORQUE_SHARES[:2])
+    timed = [time_spline(points, scene.cell.robot.joint_names, one, scene.dynamics) for one in limits]
+    assert plan.trajectory in timed
     asked = iter(range(1000))
     with pytest.raises(CancelledError):
         plan_through(Reference(points), scene, TIME, budget(lambda: next(asked) >= 3))
@@ -168,15 +177,15 @@ def test_near_the_time_of_toppra_that_needs_no_jerk_limit(
     points = waved(scene, count, by)
     rules = by_rules(points, scene)
     bound = toppra_seconds(rules, scene)
-    pace = paced(rules, points, scene)
-    assert verify(pace.trajectory, scene, 0.0).certified
-    assert 0.99 * bound <= pace.trajectory.duration <= 1.6 * bound
-    print(f"{count} points, by {by}: {pace.trajectory.duration / bound:.3f} times TOPP-RA's time")
+    timing = rescaled(rules, points, scene)
+    assert verify(timing.trajectory, scene, 0.0).certified
+    assert 0.99 * bound <= timing.trajectory.duration <= 1.6 * bound
+    print(f"{count} points, by {by}: {timing.trajectory.duration / bound:.3f} times TOPP-RA's time")
 
 
-def paced(rules: JointTrajectory, points: FloatArray, scene: PlanningScene) -> Paced:
-    limits = scene.limits.with_torque_share(0.97)
-    found = along_its_path(rules, points, scene, TIME, limits, budget())
+def rescaled(rules: JointTrajectory, points: FloatArray, scene: PlanningScene) -> PathTiming:
+    limits = scene.limits.with_torque_share(0.98)
+    found = along_its_path(rules, points, limits, Context.of(scene, TIME, budget()))
     assert found is not None
     return found
 
@@ -217,15 +226,18 @@ def test_the_derivatives_are_those_of_differences(scene: PlanningScene) -> None:
     points = waved(scene, 5)
     rules = by_rules(points, scene)
     path = FixedPath(rules, points)
-    way = path.places(60)
-    descent = _Descent(path, scene, replace(TIME, objective="energy"), scene.limits, 4.0, way, rules.duration)
+    s = path.places(60)
+    context = Context.of(scene, replace(TIME, objective="energy"), budget())
+    weights = objective_weights(context, path.q)
+    cost = spline_cost(context, scene.limits, weights, 4.0 * weights.power)
+    descent = _Descent(path, s, rules.duration, fixed=False)
     rng = np.random.default_rng(2)
-    x = rng.normal(0.0, 0.02, len(way) + 1)
-    value, gradient = descent._value(x, fixed=False)
+    x = rng.normal(0.0, 0.02, len(s) + 1)
+    value, gradient = descent.value(x, cost)
     assert value > 0.0
     for direction in rng.normal(0.0, 1.0, (4, len(x))):
         step = 1e-5 * direction
-        difference = (descent._value(x + step, False)[0] - descent._value(x - step, False)[0]) / 2e-5
+        difference = (descent.value(x + step, cost)[0] - descent.value(x - step, cost)[0]) / 2e-5
         assert gradient @ direction == pytest.approx(
             difference, rel=2e-3, abs=1e-3 * np.linalg.norm(gradient)
         )

@@ -1,0 +1,25 @@
+"""A uniform spline within the limits: the same path and speed profile, as much slower as they ask for."""
+
+from ir_planner.curves import UniformSpline
+from ir_planner.scene import MotionLimits, PlanningScene, torque_use
+from ir_planner.timing import lasting_longer
+
+_TORQUE_SAMPLES = 6  # per interval; the proof comes after
+_ROUNDS = 25  # gravity doesn't fall with speed: a load near the envelope takes several
+_BELOW = 1.0005  # a little slower than asked for, so that few rounds end it
+
+
+def slowed_to_limits(
+    spline: UniformSpline, limits: MotionLimits, scene: PlanningScene
+) -> UniformSpline | None:
+    """The spline at its own duration or longer, within the limits; torque at samples. None where no duration
+    carries it.
+    """
+    for _ in range(_ROUNDS):
+        top = spline.extremes()
+        torque = torque_use(scene.dynamics, *spline.samples(_TORQUE_SAMPLES)).max(axis=0)
+        longer = float(lasting_longer(limits, top.velocity, top.acceleration, top.jerk, torque))
+        if longer <= 1.0:
+            return spline
+        spline = UniformSpline(spline.control, spline.interval * longer * _BELOW)
+    return None

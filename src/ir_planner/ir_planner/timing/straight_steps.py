@@ -1,0 +1,158 @@
+"""A movement in straight steps between waypoints: laws in time, corners cut as far as allowed, the best
+duration.
+
+Proved free are the straight steps between waypoints. Cutting corners leaves them, so the blended trajectory
+is certified itself, and a corner whose overlap violates something is cut less, down to a stop. Then the whole
+movement is stretched to the duration that the objective likes best.
+"""
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_planner.checks import SLACK, Violation, clearance_violation
+from ir_planner.curves import extremes
+from ir_planner.request import Context
+from ir_planner.scene import STILL, Dynamics, MotionLimits
+from ir_planner.timing.asynchronous import own_laws
+from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing
+from ir_planner.timing.durations import at_best_duration
+from ir_planner.timing.level_timing import fastest
+from ir_planner.timing.limit_use import lasting_longer
+from ir_planner.timing.movement import Movement
+from ir_planner.timing.objective import coarse_energy_cost
+from ir_planner.timing.ptp import fastest_law, torque_per_segment
+from ir_planner.timing.time_law import GRID_S, Law, StepLaws
+from ir_planner.timing.torque_shares import within_torque
+
+MakeLaw = Callable[[FloatArray, FloatArray, MotionLimits, Dynamics], Law]
+# how steps are timed, and the share of the acceleration they may use; the fastest first. The fastest is not
+# always the one that costs the least joules once it is stretched.
+_SHAPES: tuple[tuple[MakeLaw, float], ...] = ((fastest, 1.0), (fastest_law, 1.0), (fastest_law, 0.6))
+_CUTS = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.0)  # shares of the largest overlap, down to a stop
+
+
+def straight_steps(waypoints: FloatArray, context: Context) -> Movement:
+    """The movement over `waypoints` (M, n), whose straight steps are free, at the best duration for the
+    objective.
+
+    Raises TimingError when a torque does not suffice, RequestError when the requested duration is too short.
+    """
+    waypoints = distinct(waypoints)
+    if len(waypoints) == 1:
+        trajectory = standing(waypoints[0], context.joint_names)
+        return Movement(waypoints, trajectory, context, "the goal is the start")
+
+    def timed(limits: MotionLimits) -> Movement:
+        trajectory, note = _best_shape(waypoints, limits, context)
+        return Movement(waypoints, trajectory, context, note)
+
+    movement = within_torque(timed, context)
+    assert movement is not None  # timed always makes one
+    return movement
+
+
+def distinct(waypoints: FloatArray) -> FloatArray:
+    """The waypoints (M, n) without those that are where the one before is."""
+    keep = [0]
+    for k in range(1, len(waypoints)):
+        if np.max(np.abs(waypoints[k] - waypoints[keep[-1]])) >= STILL:
+            keep.append(k)
+    result = np.array(waypoints[keep])
+    if len(keep) > 1:
+        result[-1] = waypoints[-1]
+    return result
+
+
+def _best_shape(waypoints: FloatArray, limits: MotionLimits, context: Context) -> tuple[JointTrajectory, str]:
+    """The trajectory in the shape and at the duration that the objective likes best, and a note."""
+    options = context.options
+    best: tuple[float, JointTrajectory, str] | None = None
+    for law, share in _SHAPES if _joules_count(options) else _SHAPES[:1]:
+        context.work.check()
+        quickest, note = _fastest(waypoints, limits.scaled(1.0, share), law, context)
+        if best is not None and 0.0 < options.duration < quickest.duration:
+            continue
+        trajectory = at_best_duration(quickest, context)
+        if not _joules_count(options):
+            return trajectory, note
+        value = coarse_energy_cost(trajectory, context)
+        if best is None or value < best[0]:
+            best = (value, trajectory, note)
+    assert best is not None  # the first shape is taken or refused
+    return best[1], best[2]
+
+
+def _joules_count(options: PlanOptions) -> bool:
+    return options.duration > 0.0 or options.objective in ("energy", "time_and_energy")
+
+
+def _fastest(
+    waypoints: FloatArray, limits: MotionLimits, law: MakeLaw, context: Context
+) -> tuple[JointTrajectory, str]:
+    """The fastest trajectory in one shape, and a note where its timing is not the one that was asked for."""
+    dynamics = context.scene.dynamics
+    steps = list(itertools.pairwise(waypoints))
+    note = ""
+    if context.options.timing == "asynchronous":
+        own = tuple(own_laws(a, b, limits, dynamics) for a, b in steps)
+        trajectory = blended(TimedPath(waypoints, own, (0,) * (len(own) - 1)), context.joint_names)
+        blocked = _blocked(trajectory, context)
+        if blocked is None:
+            return trajectory, note
+        note = f"asynchronous timing is not free ({blocked.sentence}), so the timing is synchronous"
+    laws = tuple(StepLaws((law(a, b, limits, dynamics),)) for a, b in steps)
+    return _cut_corners(waypoints, laws, limits, context), note
+
+
+def _blocked(trajectory: JointTrajectory, context: Context) -> Violation | None:
+    return clearance_violation(trajectory, context.scene, context.safety_distance, context.station)
+
+
+def _cut_corners(
+    waypoints: FloatArray, laws: tuple[StepLaws, ...], limits: MotionLimits, context: Context
+) -> JointTrajectory:
+    """The blended trajectory with the largest overlaps that keep limits and clearance."""
+    largest = largest_overlaps(laws)
+    cut = [0] * len(largest)  # index into _CUTS per corner
+    while True:
+        context.work.check()
+        overlaps = tuple(int(full * _CUTS[k]) for full, k in zip(largest, cut, strict=True))
+        path = TimedPath(waypoints, laws, overlaps)
+        trajectory = blended(path, context.joint_names)
+        violating = _corners_beyond_limits(path, trajectory, limits, context)
+        if not violating and any(overlaps):
+            violation = _blocked(trajectory, context)
+            violating = set() if violation is None else _corner_at(path, violation.time)
+        violating = {corner for corner in violating if overlaps[corner] > 0}
+        if not violating:
+            return trajectory
+        for corner in violating:
+            cut[corner] += 1
+
+
+def _corner_at(path: TimedPath, time: float) -> set[int]:
+    """The corner whose overlap is nearest to an instant [s]."""
+    windows = [path.corner_window(corner) for corner in range(len(path.overlaps))]
+    step = time / GRID_S
+    away = [max(begin - step, step - end, 0.0) if end > begin else np.inf for begin, end in windows]
+    return {int(np.argmin(away))} if away else set()
+
+
+def _corners_beyond_limits(
+    path: TimedPath, trajectory: JointTrajectory, limits: MotionLimits, context: Context
+) -> set[int]:
+    """Corners in whose overlap a limit is exceeded."""
+    if not any(path.overlaps):
+        return set()
+    largest = extremes(*trajectory.coefficients())
+    torque = torque_per_segment(trajectory, context.scene.dynamics)
+    use = lasting_longer(limits, largest.velocity, largest.acceleration, largest.jerk, torque)
+    middle = 0.5 * (trajectory.times[:-1] + trajectory.times[1:]) / GRID_S
+    beyond = middle[use > 1.0 + SLACK]
+    windows = [path.corner_window(corner) for corner in range(len(path.overlaps))]
+    return {k for k, (begin, end) in enumerate(windows) if ((begin <= beyond) & (beyond <= end)).any()}
