@@ -1,0 +1,192 @@
+"""All chains of configurations of a small program, and the cheapest of them.
+
+The configurations at the stops are the planner's own. Every edge costs what the planner finds for it with the
+request's options; a chain is enumerated by dynamic programming. Edges are planned in the order of a lower
+bound that nothing can undercut: what is left unplanned cannot belong to a cheaper chain.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from _lower_bounds import least_cost, least_travel
+
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.names import NO_LOAD
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import TrajectoryReport
+from ir_planner import Planner
+from ir_planner.program.chain import layers_of
+from ir_planner.program.movements import Movements
+from ir_planner.program.request import StageError
+from ir_planner.program.route import Route
+from ir_planner.program.station_graph import Node
+from ir_planner.program.steps import Scenes, placed_steps, steps_of
+from ir_planner.request import Context, Journal, Work
+from ir_planner.service import exit_searches
+
+CEILING = 120.0  # s: work ends a search, never the clock
+EdgeCosts = dict[tuple[bytes, ...], float]  # of edges of a cell that other instances share
+
+
+def cost_of(report: TrajectoryReport, options: PlanOptions) -> float:
+    """J [J], or W of eq. (9) where that is the objective."""
+    if options.objective == "movement_cost":
+        return report.movement_cost
+    return report.energy - report.base_energy + options.time_value * report.duration
+
+
+@dataclass(eq=False)
+class Chains:
+    """Layers of nodes with costs (A, B) of the edges between them, lower bounds first; `planned` (A, B).
+
+    `known` is shared by the instances of one cell. `edges`: how many were planned here.
+    """
+
+    planner: Planner
+    route: Route
+    options: PlanOptions
+    layers: list[list[Node]]
+    known: EdgeCosts
+    costs: list[FloatArray] = field(default_factory=list)
+    planned: list[BoolArray] = field(default_factory=list)
+    edges: int = 0
+
+    def __post_init__(self) -> None:
+        for place in range(len(self.route)):
+            first, second = self.layers[place], self.layers[place + 1]
+            lines = [self._lines(place, node, entry=True) for node in second]
+            exits = [self._lines(place, node, entry=False) for node in first]
+            self.costs.append(np.add.outer(exits, lines) + self._bounds(place))
+            self.planned.append(np.zeros(self.costs[-1].shape, dtype=np.bool_))
+
+    @staticmethod
+    def of(
+        planner: Planner, stations: tuple[str, ...], start: FloatArray, options: PlanOptions, known: EdgeCosts
+    ) -> Chains:
+        """Chains through stations from start (n,). Raises StageError where a stop has no configuration."""
+        cell, settings = planner.cell, planner.settings
+        steps = placed_steps(cell, steps_of(cell, stations), cell.parts_at_start())
+        scenes = Scenes(cell, planner.power, settings.braking_energy, options.load == NO_LOAD)
+        route = Route.over(steps, scenes)
+        context = Context(
+            scenes.of(cell.parts_at_start()), options, _journal(planner, options, len(stations))
+        )
+        searches = exit_searches(settings.withdrawal)
+        layers = layers_of(route, start, context, searches, lambda *_: None)
+        return Chains(planner, route, options, layers, known)
+
+    @property
+    def count(self) -> float:
+        """How many chains there are."""
+        return float(np.prod([float(len(layer)) for layer in self.layers]))
+
+    def cheapest(self, until: Callable[[], bool] = lambda: False) -> tuple[list[int], float, bool]:
+        """Configuration at each stop of the cheapest chain, its cost (inf: none), whether it is proved."""
+        while True:
+            chosen, cost = self._shortest()
+            open_edges = [k for k in range(len(self.costs)) if not self.planned[k][chosen[k], chosen[k + 1]]]
+            if not open_edges or not np.isfinite(cost):
+                return chosen, cost, True
+            if until():
+                return chosen, cost, False
+            for place in open_edges:
+                self._plan(place, chosen[place], chosen[place + 1])
+
+    def cost_along(self, chosen: list[int]) -> float:
+        """Cost of one chain, all of its edges planned."""
+        for place in range(len(self.costs)):
+            self._plan(place, chosen[place], chosen[place + 1])
+        steps = zip(self.costs, chosen, chosen[1:], strict=False)
+        return float(sum(cost[a, b] for cost, a, b in steps))
+
+    def nearest(self, stops: list[FloatArray]) -> list[int]:
+        """Index of the node at each stop whose interaction configuration is nearest to stops [(n,)]."""
+        chosen = [0]
+        for layer, q in zip(self.layers[1:], stops, strict=True):
+            chosen.append(int(np.argmin([np.abs(node.interaction - q).max() for node in layer])))
+        return chosen
+
+    def _shortest(self) -> tuple[list[int], float]:
+        total, came = np.zeros(len(self.layers[0])), []
+        for cost in self.costs:
+            through = total[:, None] + cost
+            came.append(np.argmin(through, axis=0))
+            total = np.min(through, axis=0)
+        chosen = [int(np.argmin(total))]
+        for step in reversed(came):
+            chosen.append(int(step[chosen[-1]]))
+        return chosen[::-1], float(np.min(total))
+
+    def _bounds(self, place: int) -> FloatArray:
+        scene = self.route.arriving(place)
+        goals = np.array([node.outside for node in self.layers[place + 1]])
+        if self.options.objective == "movement_cost":
+            return np.array([least_travel(scene, node.outside, goals) for node in self.layers[place]])
+        value = self.options.time_value
+        return np.array([least_cost(scene, node.outside, goals, value) for node in self.layers[place]])
+
+    def _plan(self, place: int, a: int, b: int) -> None:
+        """Replace the bound of an edge by what the planner finds."""
+        if self.planned[place][a, b]:
+            return
+        first, second = self.layers[place][a], self.layers[place + 1][b]
+        bound = self._bound(place, first, second)
+        found = self._across(place, first, second)
+        if found < bound - 1e-6 * abs(bound):
+            raise AssertionError(f"an edge costs {found:g}, less than its lower bound of {bound:g}")
+        self.costs[place][a, b] += found - bound
+        self.planned[place][a, b] = True
+
+    def _bound(self, place: int, first: Node, second: Node) -> float:
+        scene, goals = self.route.arriving(place), second.outside[None]
+        if self.options.objective == "movement_cost":
+            return float(least_travel(scene, first.outside, goals)[0])
+        return float(least_cost(scene, first.outside, goals, self.options.time_value)[0])
+
+    def _movements(self, place: int) -> Movements:
+        scene = self.route.arriving(place)
+        context = Context(scene, self.options, _journal(self.planner, self.options, 1))
+        return Movements(self.route, context, self.planner.settings.searches)
+
+    def _across(self, place: int, first: Node, second: Node) -> float:
+        key = (first.outside.tobytes(), second.outside.tobytes(), self._asked())
+        if key not in self.known:
+            moved = np.abs(second.outside - first.outside).max() > 1e-9
+            found = self._movements(place).across(place, first, second) if moved else None
+            cost = cost_of(found.evaluation.report, self.options) if found is not None else np.inf
+            self.known[key] = cost if moved else 0.0
+            self.edges += 1
+        return self.known[key]
+
+    def _lines(self, place: int, node: Node, *, entry: bool) -> float:
+        """Cost of a service line into the stop of a place or out of the one before it; inf: not possible."""
+        if len(node.line.points) < 2:
+            return 0.0
+        key = (node.line.points.tobytes(), self._asked(), b"in" if entry else b"out")
+        if key not in self.known:
+            name = self.route.name(place if entry else place - 1)
+            try:
+                found = self._movements(place)._service(place, node, name, entry=entry)
+                self.known[key] = cost_of(found.evaluation.report, self.options)
+            except StageError:
+                self.known[key] = np.inf
+        return self.known[key]
+
+    def _asked(self) -> bytes:
+        o = self.options
+        return f"{o.objective} {o.load} {o.seed} {o.time_value} {o.safety_distance}".encode()
+
+
+def _journal(planner: Planner, options: PlanOptions, movements: int) -> Journal:
+    """A journal with the work of a request of so many movements."""
+    work = Work(
+        planner.settings.max_iterations * movements,
+        time.monotonic() + CEILING * movements,
+        time.monotonic,
+        improvement=planner.settings.improvement_iterations,
+    )
+    return Journal(work, options.seed)

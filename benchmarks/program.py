@@ -1,0 +1,202 @@
+"""Does a program go through the best configurations, and how far is it from the best where it does not?
+
+    python benchmarks/program.py [--cell FILE]... [--instances N] [--seeds N] [--quick] [--json FILE]
+
+Small programs are drawn by seed: 3 to 6 stops of a cell, with its tool and without. Each is planned for J
+(drive energy + 500 W x T) and for W of eq. (9). Beside it stand all chains of the same configurations, every
+edge at the cost that the planner finds for it (edges that cannot belong to a cheaper chain by an exact lower
+bound are left out). "answer": cost of the movements of the answer over the best chain's; "chain": cost of its
+configurations with the same edges, over the best's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import asdict, dataclass
+from functools import cache
+
+import numpy as np
+from _program_chains import CEILING, Chains, EdgeCosts, cost_of
+from _regional_tasks import SHARE_OF_ENDS, scene_of
+from _results import Claim, at_least, at_most, command_line, finish, line_of
+from _service_stations import margin_at
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.names import NO_LOAD
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import MovementKind
+from ir_planner import Planner, ProgramPlan
+from ir_planner.program.request import StageError
+
+CELLS = ("demo", "open", "table_columns", "cnc_door", "deep_box")
+OBJECTIVES = {"J": "time_and_energy", "W": "movement_cost"}
+BOUND = 1.01  # of the best chain
+STOPS = (3, 6)
+CHAINS_S = 300.0  # ceiling of the search through all chains of one instance
+
+
+@dataclass(frozen=True)
+class Instance:
+    """Stops in a cell, from machine home; load: "" the tool, or none; margin: S_m [m]."""
+
+    cell: str
+    stops: tuple[str, ...]
+    load: str
+    margin: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One program and objective; costs J or W, ratios to the best chain (inf: nothing found), seconds."""
+
+    cell: str
+    stops: str
+    load: str
+    objective: str
+    chains: float
+    edges: int
+    proved: bool
+    best: float
+    answer: float
+    chain: float
+    planning_s: float
+    chains_s: float
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is a chain, or the planner says that there is."""
+        return bool(np.isfinite(self.best)) or not np.isfinite(self.chain)
+
+    @property
+    def near(self) -> bool:
+        """Whether the configurations are those of the best chain, or as good."""
+        return self.chain <= BOUND
+
+
+@cache
+def planner_of(cell: str) -> Planner:
+    """A planner with the cell."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", cell)
+    return planner
+
+
+def instances(cell: str, count: int, seed: int) -> list[Instance]:
+    """Programs of a cell drawn by seed; the stops of a cell repeat with both loads."""
+    scene = scene_of(cell)
+    rng = np.random.default_rng([seed, *scene.cell.name.encode()])
+    names = [station.name for station in scene.cell.stations]
+    home = np.array(scene.cell.machine_home)[None]
+    margin = SHARE_OF_ENDS * float(scene.collision.min_distance(home).distance[0])
+    margin = min(margin, *(margin_at(scene, station) for station in scene.cell.stations))
+    found: list[Instance] = []
+    while len(found) < count:
+        stops: list[str] = []
+        length = int(rng.integers(STOPS[0], STOPS[1] + 1))
+        while len(stops) < length:
+            name = str(rng.choice([*names, "home"]))
+            if name != (stops[-1] if stops else "home"):
+                stops.append(name)
+        found += [Instance(cell, tuple(stops), load, margin) for load in ("", NO_LOAD)]
+    return found[:count]
+
+
+def compared(instance: Instance, objective: str, seed: int, known: EdgeCosts) -> Row:
+    """The program as it is planned, beside all chains."""
+    planner, wanted = planner_of(instance.cell), OBJECTIVES[objective]
+    options = PlanOptions(
+        seed=seed,
+        planning_time=CEILING,
+        safety_distance=instance.margin,
+        objective=wanted,
+        load=instance.load,
+    )
+    start = np.array(planner.cell.machine_home)
+    begin = time.perf_counter()
+    plan = planner.plan_program(instance.stops, 0.0, options, start)
+    planned = time.perf_counter()
+    count, edges, proved, best, ratios = 0.0, 0, True, float("inf"), (1.0, 1.0)
+    try:
+        chains = Chains.of(planner, instance.stops, start, options, known)
+        _, best, proved = chains.cheapest(lambda: time.perf_counter() > planned + CHAINS_S)
+        count, edges = chains.count, chains.edges
+        ratios = _ratios(plan, chains, best, options)
+    except StageError:
+        ratios = (float("inf"), float("inf")) if plan.status.ok else ratios
+    took = time.perf_counter() - planned
+    stops, load = " ".join(instance.stops), instance.load or "tool"
+    return Row(
+        instance.cell, stops, load, objective, count, edges, proved, best, *ratios, planned - begin, took
+    )
+
+
+def _ratios(plan: ProgramPlan, chains: Chains, best: float, options: PlanOptions) -> tuple[float, float]:
+    """Cost of the answer, and of its configurations, over the best chain's; 1 where neither found any."""
+    if not plan.status.ok:
+        return (float("inf"),) * 2 if np.isfinite(best) else (1.0, 1.0)
+    answer = sum(cost_of(movement.report, options) for movement in plan.movements)
+    along = chains.cost_along(chains.nearest(_stops(plan)))
+    return answer / best, along / best
+
+
+def _stops(plan: ProgramPlan) -> list[FloatArray]:
+    """Configuration (n,) at each stop: where an entry ends, or a regional movement that no entry follows."""
+    kinds = [str(movement.kind) for movement in plan.movements]
+    ends = []
+    for movement, following in zip(plan.movements, [*kinds[1:], ""], strict=True):
+        last = movement.kind == MovementKind.REGIONAL and following != MovementKind.SERVICE_ENTRY
+        if movement.trajectory is not None and (last or movement.kind == MovementKind.SERVICE_ENTRY):
+            ends.append(movement.trajectory.positions[-1])
+    return ends
+
+
+def claims_of(rows: list[Row]) -> list[Claim]:
+    """What the programs are held to, per objective."""
+    claims = []
+    for objective in OBJECTIVES:
+        mine = [row for row in rows if row.objective == objective and row.possible]
+        if not mine:
+            continue
+        near = 100.0 * sum(row.near for row in mine) / len(mine)
+        name = f"{objective}: programs at most 1 % above the best chain, of {len(mine)}"
+        worst = 100.0 * (max(row.chain for row in mine) - 1.0)
+        answers = 100.0 * (max(row.answer for row in mine) - 1.0)
+        claims += [
+            at_least(name, near, "%", 100.0),
+            at_most(f"{objective}: chosen chain above the best, worst", worst, "%", 1.0),
+            at_most(f"{objective}: answer above the best chain, worst", answers, "%", 1.0),
+        ]
+    possible = sum(row.possible for row in rows) / len(OBJECTIVES)
+    claims.append(at_least("instances that have a chain", possible, "", 30))
+    unproved = sum(not row.proved for row in rows)
+    claims.append(at_most("searches through all chains that were cut", unproved, "", 0))
+    return claims
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = command_line(__doc__, CELLS, 1, "2 programs of each cell")
+    parser.add_argument("--instances", type=int, default=8, help="programs of each cell; default: 8")
+    given = parser.parse_args()
+    if given.quick:
+        given.instances = min(given.instances, 2)
+    return given
+
+
+def main() -> None:
+    """Measure, print, write."""
+    given = arguments()
+    rows: list[Row] = []
+    for cell in given.cell or CELLS:
+        for seed in range(given.seeds):
+            known: EdgeCosts = {}
+            for instance in instances(cell, given.instances, seed):
+                for objective in OBJECTIVES:
+                    rows.append(compared(instance, objective, seed, known))
+                    print(line_of(asdict(rows[-1])), flush=True)
+    finish(given.json, [asdict(row) for row in rows], claims_of(rows))
+
+
+if __name__ == "__main__":
+    main()
