@@ -7,6 +7,5 @@ source /ws/ros_ws/install/local_setup.bash
 for folder in /ws/ros_ws/install/lib/ir_*/; do
   PATH="$PATH:${folder%/}"
 done
-site=$(python3 -c 'import ir_msgs_py; print(ir_msgs_py.__path__[0])')
-export PATH FASTRTPS_DEFAULT_PROFILES_FILE="${FASTRTPS_DEFAULT_PROFILES_FILE:-$site/ros/fast_discovery.xml}"
+export PATH
 exec "$@"

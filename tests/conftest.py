@@ -6,13 +6,13 @@ settings are environment variables because the tests' own subprocesses inherit t
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from ir_msgs_py.ros.network import apply_network
 
 DOMAINS = 100  # 1 to 100: the ports of higher domains lie among those that Linux hands out to clients
 
@@ -28,13 +28,9 @@ def pytest_configure(config: pytest.Config) -> None:
     session = int(os.environ.setdefault("IR_TEST_SESSION", str(os.getpid())))
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     os.environ["ROS_DOMAIN_ID"] = str(1 + (7 * session + worker) % DOMAINS)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    apply_network()
     os.environ["RCUTILS_COLORIZED_OUTPUT"] = "0"
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
-    spec = importlib.util.find_spec("ir_msgs_py")
-    if spec is not None and spec.origin is not None:
-        profile = Path(spec.origin).parent / "ros" / "fast_discovery.xml"
-        os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(profile))
 
 
 @pytest.fixture(scope="session", autouse=True)

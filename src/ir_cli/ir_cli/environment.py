@@ -5,20 +5,19 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from importlib.resources import files
+
+from ir_msgs_py.ros.network import network_variables
 
 DEMONSTRATION_DOMAINS = range(1, 101)
 """ROS domain ids whose ports stay, for all participants, below the ephemeral ports of Linux."""
 
 
 def ros_defaults() -> dict[str, str]:
-    """Variables for nodes on this machine, without those that the user has set."""
-    wanted = {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "FASTRTPS_DEFAULT_PROFILES_FILE": str(files("ir_msgs_py") / "ros" / "fast_discovery.xml"),
-        "AMENT_PREFIX_PATH": sys.prefix,
-    }
-    return {name: value for name, value in wanted.items() if name not in os.environ}
+    """Variables for nodes on this machine; raises ParameterError for an IR_NETWORK that is not known."""
+    variables, _ = network_variables(os.environ)
+    if "AMENT_PREFIX_PATH" not in os.environ:
+        variables["AMENT_PREFIX_PATH"] = sys.prefix
+    return variables
 
 
 def apply(variables: Mapping[str, str]) -> None:

@@ -40,6 +40,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.goals import GoalSender
 from ir_msgs_py.ros.graph import Graph
+from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.types import owner_of
 from ir_msgs_py.trajectory import JointTrajectory
 
@@ -67,6 +68,7 @@ class Client:
         self._own_context = context is None
         self._context = Context() if context is None else context
         if self._own_context:
+            apply_network()
             rclpy.init(context=self._context, domain_id=domain_id)
         self.node = Node(
             node_name, namespace=namespace or None, context=self._context, start_parameter_services=False

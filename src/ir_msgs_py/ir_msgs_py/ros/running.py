@@ -20,6 +20,9 @@ from rclpy.executors import Executor, ExternalShutdownException, ShutdownExcepti
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from ir_msgs_py.errors import ParameterError
+from ir_msgs_py.ros.network import apply_network
+
 N = TypeVar("N", bound=Node)
 _POLL = 0.1  # s
 
@@ -73,6 +76,11 @@ def run_node(
     1). Call it in the main thread, as the last thing of a process: its signals stay taken.
     """
     spinning = Spinning()
+    try:
+        apply_network()
+    except ParameterError as error:
+        sys.stderr.write(f"{name}: {error}\n")
+        return 1
     _on_signals(spinning.end)
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:

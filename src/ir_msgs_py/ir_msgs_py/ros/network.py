@@ -1,0 +1,66 @@
+"""Who can see and reach the nodes: nobody outside this host, unless somebody chose otherwise.
+
+IR_NETWORK chooses, whatever starts the node:
+
+    loopback   (or unset) this host only: discovery and transport are bound to 127.0.0.1 and shared memory
+    secure     as ROS's own variables say, with DDS security enforced (ROS_SECURITY_ENABLE=true and
+               ROS_SECURITY_STRATEGY=Enforce); a build without security then refuses to start
+    insecure   as ROS's own variables say: whoever reaches the network can command the robot
+
+The variables are read by the middleware when a context starts, so `apply_network` comes before `rclpy.init`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, MutableMapping
+from importlib.resources import files
+
+from ir_msgs_py.errors import ParameterError
+
+VARIABLE = "IR_NETWORK"
+CHOICES = ("loopback", "secure", "insecure")
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+PEERS = "ROS_STATIC_PEERS"
+PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_SECURITY = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
+_NARROW = ("LOCALHOST", "OFF")
+
+
+def profile(name: str) -> str:
+    """Path of a Fast DDS profile that comes with the package."""
+    return str(files("ir_msgs_py") / "ros" / f"{name}.xml")
+
+
+def network_variables(environment: Mapping[str, str]) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Variables to set for the choice in `environment`, and those to remove.
+
+    Raises ParameterError for an unknown choice, and for `secure` where security isn't enforced.
+    """
+    choice = environment.get(VARIABLE, "") or "loopback"
+    if choice not in CHOICES:
+        raise ParameterError(f"{VARIABLE} is {choice[:60]!a}: known are {', '.join(CHOICES)}")
+    if choice == "loopback":
+        narrow = environment.get(RANGE, "").upper()
+        return {RANGE: narrow if narrow in _NARROW else "LOCALHOST", PROFILES: profile("loopback")}, (PEERS,)
+    missing = [f"{name}={value}" for name, value in _SECURITY.items() if environment.get(name) != value]
+    if choice == "secure" and missing:
+        raise ParameterError(f"{VARIABLE} is secure: {' and '.join(missing)} must be set as well")
+    return ({} if environment.get(PROFILES) else {PROFILES: profile("fast_discovery")}), ()
+
+
+def apply_network(environment: MutableMapping[str, str] = os.environ) -> None:
+    """Set the variables in this process; a line on stderr says which of the user's own are not followed."""
+    wanted, removed = network_variables(environment)
+    ignored = [f"{PEERS}={environment[PEERS]}" for name in removed if environment.get(name)]
+    if environment.get(RANGE, "").upper() not in ("", "SYSTEM_DEFAULT", *_NARROW) and RANGE in wanted:
+        ignored.append(f"{RANGE}={environment[RANGE]}")
+    if ignored:
+        sys.stderr.write(
+            f"{', '.join(ignored)[:200]!a} is not followed: nodes stay on this host. "
+            f"{VARIABLE}=secure or {VARIABLE}=insecure opens them.\n"
+        )
+    environment.update(wanted)
+    for name in removed:
+        environment.pop(name, None)

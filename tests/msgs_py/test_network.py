@@ -1,0 +1,106 @@
+"""Nodes are reached from this host only, unless somebody chose otherwise and said what it costs."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ir_msgs_py.errors import ParameterError
+from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables
+
+RANGE, PEERS, PROFILES = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "FASTRTPS_DEFAULT_PROFILES_FILE"
+LOOPBACK = ("0100007F", "00000000000000000000000001000000")  # of /proc/net/udp and udp6
+MULTICAST = "EF"  # 239.255.0.1: a group that is joined, on the interfaces of the transport
+
+
+@pytest.mark.parametrize("asked", ["SUBNET", "SYSTEM_DEFAULT", "", "LOCALHOST", "localhost", "nonsense"])
+def test_whatever_the_range_says_discovery_stays_here(asked: str) -> None:
+    environment = {RANGE: asked, PEERS: "192.0.2.7", PROFILES: "/somewhere/open.xml"}
+    apply_network(environment)
+    assert environment[RANGE] == "LOCALHOST"
+    assert PEERS not in environment
+    assert "<address>127.0.0.1</address>" in Path(environment[PROFILES]).read_text(encoding="utf-8")
+
+
+def test_no_discovery_at_all_stays_none() -> None:
+    assert network_variables({RANGE: "OFF"})[0][RANGE] == "OFF"
+
+
+def test_what_is_not_followed_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    apply_network({RANGE: "SUBNET", PEERS: "192.0.2.7"})
+    said = capsys.readouterr().err
+    assert "SUBNET" in said
+    assert "192.0.2.7" in said
+    assert "IR_NETWORK=secure or IR_NETWORK=insecure" in said
+
+
+def test_an_unknown_choice_lists_the_known() -> None:
+    with pytest.raises(ParameterError, match="loopback, secure, insecure"):
+        network_variables({"IR_NETWORK": "open"})
+
+
+def test_secure_asks_for_security() -> None:
+    asked = {"IR_NETWORK": "secure", "ROS_SECURITY_ENABLE": "true"}
+    with pytest.raises(ParameterError, match="ROS_SECURITY_STRATEGY=Enforce must be set"):
+        network_variables(asked)
+    assert RANGE not in network_variables({**asked, "ROS_SECURITY_STRATEGY": "Enforce"})[0]
+
+
+def test_insecure_leaves_ros_s_own_variables() -> None:
+    variables, removed = network_variables({"IR_NETWORK": "insecure", RANGE: "SUBNET", PEERS: "192.0.2.7"})
+    assert RANGE not in variables
+    assert removed == ()
+    assert set(CHOICES) == {"loopback", "secure", "insecure"}
+
+
+NODE = """
+import os, sys
+from rclpy.node import Node
+from ir_msgs_py.ros.running import run_node
+
+class Listed(Node):
+    def __init__(self):
+        super().__init__("listed")
+        self.create_timer(0.1, self.show)
+        self.looks = 0
+
+    def show(self):
+        self.looks += 1
+        if self.looks == 5:
+            links = [f"/proc/self/fd/{n}" for n in os.listdir("/proc/self/fd")]
+            inodes = {os.readlink(link) for link in links if os.path.islink(link)}
+            for family in ("udp", "udp6", "tcp", "tcp6"):
+                for line in open(f"/proc/self/net/{family}").read().splitlines()[1:]:
+                    fields = line.split()
+                    if f"socket:[{fields[9]}]" in inodes:
+                        print("socket", family, fields[1], fields[3], flush=True)
+            print("done", flush=True)
+
+run_node("listed", Listed, sys.argv, goes_on=lambda node: node.looks < 6)
+"""
+
+
+def test_a_node_started_without_any_preparation_listens_on_loopback_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sockets at the ports of RTPS take data; those at ephemeral ports only send, and nothing reads them."""
+    for name in (RANGE, PEERS, PROFILES):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(RANGE, "SUBNET")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "97")
+    script = tmp_path / "node.py"
+    script.write_text(NODE, encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=True
+    )
+    sockets = re.findall(r"socket (\S+) ([0-9A-F]+):([0-9A-F]+)", run.stdout)
+    assert "done" in run.stdout, run.stderr
+    ports = range(7400 + 250 * 97, 7400 + 250 * 98)
+    listening = [(family, address) for family, address, port in sockets if int(port, 16) in ports]
+    assert listening, run.stdout
+    assert {address for _, address in listening} <= set(LOOPBACK), listening
+    assert not any(family.startswith("tcp") for family, _, _ in sockets)
