@@ -114,9 +114,9 @@ def test_a_last_velocity_that_is_not_zero_is_refused(standing, start, cell, home
 
 def test_lines_that_kink_too_sharply_are_refused_and_gentle_ones_run(make, start, run_out, plan, home):
     simulation = make("pybullet")
-    refused(start, simulation, plan(1.0, home, home + 0.3, velocities=False), INVALID, "jumps", "rad/s")
+    refused(start, simulation, plan(1.0, home, home + 0.3, velocities=False), INVALID, "corners", "rad/s^2")
     sharp = plan([1.0, 2.0, 3.0], home, home + 0.2, home, velocities=False)
-    refused(start, simulation, sharp, INVALID, "jumps", "give the points velocities")
+    refused(start, simulation, sharp, INVALID, "corners", "give the points velocities")
     start(simulation, plan([1.0, 2.0, 3.0], home, home + 0.01, home + 0.02, velocities=False))
     outcome = run_out(simulation)
     assert outcome.code == ErrorCode.SUCCESSFUL

@@ -104,7 +104,7 @@ class Simulation:
         """
         dynamics, settings = self.dynamics, self.settings.execution
         checked = check_goal(goal, tuple(self.robot.joint_names), settings, now_ns)
-        check_trajectory(checked.trajectory, self.robot, dynamics, settings, self.settings.dt)
+        check_trajectory(checked.trajectory, self.robot, dynamics, settings)
         return VettedGoal(checked, dynamics)
 
     def execute(self, vetted: VettedGoal, now_ns: int) -> int:
@@ -116,13 +116,12 @@ class Simulation:
             refusal = "the load changed while the trajectory was checked"
         if refusal:
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
-        goal, s = vetted.goal, self.settings
-        route = checked_route(
-            goal.trajectory, self.executor.motion(), self.robot, self.dynamics, s.execution, s.dt
-        )
+        goal = vetted.goal
+        now, delay = self.executor.motion(), max(0.0, (goal.stamp_ns - now_ns) * 1e-9)
+        delay = 0.0 if goal.stamp_ns == 0 else delay
+        route = checked_route(goal.trajectory, now, self.robot, self.dynamics, self.settings.execution, delay)
         self._goals += 1
-        delay = 0.0 if goal.stamp_ns == 0 else max(0.0, (goal.stamp_ns - now_ns) * 1e-9)
-        self.executor.start(self._goals, goal, route, delay)
+        self.executor.start(self._goals, goal, route, 0.0 if now.qd.any() else delay)
         self._collect_outcomes()
         self._goal_energy = self.mains.energy()
         return self._goals

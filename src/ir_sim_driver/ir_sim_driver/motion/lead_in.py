@@ -1,8 +1,9 @@
 """From where the command is onto a trajectory, without a jump.
 
 First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference (within the start
-tolerance) is closed before path time starts. First time 0 in motion: a polynomial bridges to the next point
-far enough away.
+tolerance) is closed before path time starts. First time 0 in motion, or with a first velocity: a polynomial
+bridges to the next point far enough away. A movement that is replaced by one with a later start leads in
+until that start.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode
 from ir_sim_driver.motion.path import Motion, Path, quintic
+from ir_sim_driver.motion.rounding import rounded
 
 _GENTLE = 0.25  # share of the acceleration limit that closing the last difference may use
 _PEAK = 10.0 / math.sqrt(3.0)  # largest acceleration of a unit quintic step of unit duration
-_SAME = 1e-12
+_SAME = 1e-12  # rad; what rounding leaves of a difference
+AT_REST = 1e-6  # rad/s that still count as standing
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,32 +39,46 @@ class Route:
 
 
 def route_onto(
-    trajectory: JointTrajectory, now: Motion, acceleration_max: FloatArray, settings: ExecutionSettings
+    trajectory: JointTrajectory,
+    now: Motion,
+    acceleration_max: FloatArray,
+    settings: ExecutionSettings,
+    delay: float = 0.0,
 ) -> Route:
-    """Path from the commanded motion `now` onto and along the trajectory. Raises TrajectoryRefusedError."""
-    coefficients, durations = trajectory.coefficients()
-    first = float(trajectory.times[0])
+    """Path from the commanded motion `now` onto and along what is executed of the trajectory.
+
+    delay [s]: until time 0 of the trajectory; a robot at rest waits for it. Raises TrajectoryRefusedError.
+    """
+    moving = bool(now.qd.any())
+    first = float(trajectory.times[0]) + (delay if moving else 0.0)
+    executed = rounded(trajectory, settings.blend_time)
+    coefficients, durations = executed.coefficients()
     if first > 0.0:
-        lead = quintic(now, _motion_at_point(trajectory, 0), first)
+        lead = quintic(now, _motion_at_point(executed, 0), first)
         return Route(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0, 1)
     _check_start(trajectory, now, acceleration_max, settings)
+    if moving or np.abs(_motion_at_point(executed, 0).qd).max() > AT_REST:
+        return _bridged(executed, now, settings.bridge_time)
     delta = np.abs(trajectory.positions[0] - now.q)
-    if now.qd.any():
-        if len(durations) == 0:
-            raise TrajectoryRefusedError(
-                ErrorCode.INVALID_GOAL,
-                "the only point has time 0 s and the robot moves: give it a time above 0 s",
-            )
-        k = min(int(np.searchsorted(trajectory.times, settings.bridge_time)), len(durations))
-        bridge = quintic(now, _motion_at_point(trajectory, k), float(trajectory.times[k]))
-        pieces = [bridge, coefficients[k:]], [trajectory.times[k : k + 1], durations[k:]]
-        return Route(_path(*pieces, now.q), 0.0, 1)
     if delta.max() <= _SAME:
         return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
     T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / _GENTLE)
     still = np.zeros_like(delta)
     closing = quintic(Motion(now.q, still, still), Motion(trajectory.positions[0], still, still), T)
     return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
+
+
+def _bridged(executed: JointTrajectory, now: Motion, bridge_time: float) -> Route:
+    coefficients, durations = executed.coefficients()
+    if len(durations) == 0:
+        raise TrajectoryRefusedError(
+            ErrorCode.INVALID_GOAL,
+            "the only point has time 0 s and the robot moves: give it a time above 0 s",
+        )
+    k = min(int(np.searchsorted(executed.times, bridge_time)), len(durations))
+    bridge = quintic(now, _motion_at_point(executed, k), float(executed.times[k]))
+    pieces = [bridge, coefficients[k:]], [executed.times[k : k + 1], durations[k:]]
+    return Route(_path(*pieces, now.q), 0.0, 1)
 
 
 def _path(coefficients: list[FloatArray], durations: list[FloatArray], rest: FloatArray) -> Path:

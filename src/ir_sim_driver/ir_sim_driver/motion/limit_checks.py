@@ -1,22 +1,47 @@
-"""Does a path keep the limits of position, velocity, acceleration and torque? Sampled as it will be
-executed.
+"""Does a path keep the limits of position, velocity, acceleration and torque? Proved for every instant.
+
+Positions, velocities and accelerations are compared by the exact extremes of the polynomials, torques by
+guaranteed bounds (ir_kernels): segments of a nanosecond and paths of an hour alike, nothing is sampled.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ir_description import RobotModel
+from ir_kernels import Extrema, polynomial_extrema
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode
+from ir_sim_driver.motion.path import Path
 
-_CHUNK = 4096
-_SAMPLES_MAX = 400_000
+
+class Range(NamedTuple):
+    """Smallest and largest position (n,) [rad]."""
+
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> Range:
+        """The robot's own."""
+        return cls(robot.position_min, robot.position_max)
+
+    def including(self, q: FloatArray) -> Range:
+        """This range and q (n,): who is outside may come back, and go no farther out."""
+        return Range(np.minimum(self.low, q), np.maximum(self.high, q))
+
+
+class _Excess(NamedTuple):
+    """The earliest instant at which a limit is exceeded most."""
+
+    time: float
+    sentence: str
 
 
 def check_limits(
@@ -26,106 +51,100 @@ def check_limits(
     robot: RobotModel,
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
-    dt: float,
+    allowed: Range | None = None,
 ) -> None:
-    """Raise TrajectoryRefusedError naming joint, time, value, limit and excess of the first violation.
+    """Raise TrajectoryRefusedError naming joint, time, value, limit and excess where a limit is
+    exceeded first: of position, velocity, acceleration or torque, in this order.
 
-    Segments (S, n, 6) with durations (S,) [s], the first at time `start` [s] of the trajectory. dynamics: an
-    ir_kernels DynamicsModel with the present load. Samples every dt [s], coarser for paths of more than 400
-    000 steps, and every point.
+    Segments (S, n, 6) with durations (S,) [s], the first at time `start` [s] of the trajectory. dynamics:
+    with the present load. allowed: positions, the robot's own range unless given.
     """
-    slack = 1.0 + settings.limit_slack
-    for t, q, qd, qdd in _samples(coefficients, durations, start, dt):
-        beyond = np.maximum(q - robot.position_max, robot.position_min - q)
-        bound = np.where(q > robot.position_max, robot.position_max, robot.position_min)
-        _refuse_first(robot, t, q, bound, beyond - settings.position_slack, beyond, "is at", "rad")
-        for value, limit, unit, margin in (
-            (qd, robot.velocity_max, "rad/s", slack),
-            (qdd, robot.acceleration_max, "rad/s^2", slack),
-        ):
-            excess = np.abs(value) - limit
-            _refuse_first(
-                robot,
-                t,
-                value,
-                np.broadcast_to(limit, value.shape),
-                excess - limit * (margin - 1.0),
-                excess,
-                "needs",
-                unit,
-            )
-        torque = dynamics.inverse_dynamics(q, qd, qdd)
-        limits = dynamics.torque_limit(qd)
-        excess = np.abs(torque) - limits
-        _refuse_first(robot, t, torque, limits, excess - limits * (slack - 1.0), excess, "needs", "Nm")
-
-
-def _samples(
-    coefficients: FloatArray, durations: FloatArray, start: float, dt: float
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
-    """Times (M,), q, qd, qdd (M, n) of stretches of the path, ends of segments included."""
-    dt = max(dt, float(durations.sum()) / _SAMPLES_MAX)
-    for c, length in zip(coefficients, durations.tolist(), strict=True):
-        count = max(2, int(np.ceil(length / dt)) + 1)
-        for first in range(0, count, _CHUNK):
-            t = np.linspace(0.0, length, count)[first : first + _CHUNK]
-            powers = t[:, None] ** np.arange(6.0)
-            once = np.zeros_like(powers)
-            twice = np.zeros_like(powers)
-            once[:, 1:] = np.arange(1.0, 6.0) * powers[:, :5]
-            twice[:, 2:] = np.arange(2.0, 6.0) * np.arange(1.0, 5.0) * powers[:, :4]
-            yield start + t, powers @ c.T, once @ c.T, twice @ c.T
-        start += length
-
-
-def _refuse_first(
-    robot: RobotModel,
-    t: FloatArray,
-    value: FloatArray,
-    bound: FloatArray,
-    over: FloatArray,
-    excess: FloatArray,
-    verb: str,
-    unit: str,
-) -> None:
-    bad = over > 0.0
-    if not bad.any():
+    if len(durations) == 0:
         return
-    k = int(bad.any(axis=1).argmax())
-    j = int(over[k].argmax())
-    raise TrajectoryRefusedError(
-        ErrorCode.INVALID_GOAL,
-        f"{robot.joint_names[j]} {verb} {value[k, j]:.6g} {unit} at {t[k]:.4f} s: the limit is "
-        f"{bound[k, j]:.6g} {unit}, "
-        f"exceeded by {excess[k, j]:.3g} {unit}",
-    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not np.isfinite(coefficients).all():
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL,
+                "points lie too close in time: the polynomial between them is not finite",
+            )
+        position, speed, change = (polynomial_extrema(coefficients, durations, k) for k in range(3))
+    starts = start + np.concatenate(([0.0], np.cumsum(durations)[:-1]))
+    names, slack = robot.joint_names, 1.0 + settings.limit_slack
+    allowed = allowed or Range.of(robot)
+    found = [
+        _position_excess(position, starts, names, allowed, settings.position_slack),
+        _excess(speed, starts, names, robot.velocity_max, slack, "rad/s"),
+        _excess(change, starts, names, robot.acceleration_max, slack, "rad/s^2"),
+    ]
+    first = next((each for each in found if each is not None), None)
+    if first is None:  # bounds of torques need motions of sensible size
+        first = _torque_excess(coefficients, durations, start, names, dynamics, slack)
+    if first is not None:
+        raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, first.sentence)
 
 
-def check_jumps(
+def _position_excess(
+    found: Extrema, starts: FloatArray, names: Sequence[str], allowed: Range, slack: float
+) -> _Excess | None:
+    low = _first(~(found.minimum >= allowed.low - slack), found.time_of_minimum, starts)
+    high = _first(~(found.maximum <= allowed.high + slack), found.time_of_maximum, starts)
+    candidates = []
+    for at, values, bounds in ((low, found.minimum, allowed.low), (high, found.maximum, allowed.high)):
+        if at is not None:
+            time, k, j = at
+            sentence = _sentence(names[j], "is at", values[k, j], float(bounds[j]), time, "rad")
+            candidates.append(_Excess(time, sentence))
+    return min(candidates, default=None)
+
+
+def _excess(
+    found: Extrema, starts: FloatArray, names: Sequence[str], limit: FloatArray, slack: float, unit: str
+) -> _Excess | None:
+    down = -found.minimum > found.maximum
+    value = np.where(down, found.minimum, found.maximum)
+    when = np.where(down, found.time_of_minimum, found.time_of_maximum)
+    at = _first(~(np.abs(value) <= limit * slack), when, starts)
+    if at is None:
+        return None
+    time, k, j = at
+    return _Excess(time, _sentence(names[j], "needs", value[k, j], float(limit[j]), time, unit))
+
+
+def _torque_excess(
     coefficients: FloatArray,
     durations: FloatArray,
     start: float,
-    robot: RobotModel,
-    settings: ExecutionSettings,
-) -> None:
-    """Velocity may jump at a point, and at the end, only by what the drives can follow at once."""
-    c, T = coefficients, durations[:, None]
-    if len(c) == 0:
-        return
-    final = c[:, :, 1] + T * (
-        2.0 * c[:, :, 2] + T * (3.0 * c[:, :, 3] + T * (4.0 * c[:, :, 4] + T * 5.0 * c[:, :, 5]))
+    names: Sequence[str],
+    dynamics: DynamicsModel,
+    slack: float,
+) -> _Excess | None:
+    bounds = dynamics.torque_bounds(coefficients, durations)
+    beyond = ~(bounds.upper <= slack)  # what cannot be decided is not allowed
+    if not beyond.any():
+        return None
+    j = int(np.where(beyond, bounds.sampled, -np.inf).argmax())
+    q, qd, qdd = Path(coefficients, durations, coefficients[0, :, 0]).motion(float(bounds.time[j]))
+    limit = float(dynamics.torque_limit(qd[None])[0, j])
+    # by the bound: it counts friction of either sign where a joint turns, and what could not be decided
+    needed = dynamics.inverse_dynamics(q[None], qd[None], qdd[None])[0, j]
+    torque = float(np.copysign(bounds.upper[j] * limit, needed))
+    time = start + float(bounds.time[j])
+    return _Excess(time, _sentence(names[j], "needs", torque, limit, time, "Nm"))
+
+
+def _first(bad: BoolArray, when: FloatArray, starts: FloatArray) -> tuple[float, int, int] | None:
+    """Time [s], segment and joint of the earliest instant `when` (S, n) [s from starts (S,)] that is bad."""
+    if not bad.any():
+        return None
+    k = int(bad.any(axis=1).argmax())
+    j = int(np.where(bad[k], when[k], np.inf).argmin())
+    return float(starts[k] + when[k, j]), k, j
+
+
+def _sentence(name: str, verb: str, value: float, bound: float, time: float, unit: str) -> str:
+    excess = abs(value) - abs(bound) if verb == "needs" else abs(value - bound)
+    sized = bound if value >= 0.0 or verb == "is at" else -bound
+    return (
+        f"{name} {verb} {value:.6g} {unit} at {time:.4f} s: the limit is {sized:.6g} {unit}, "
+        f"exceeded by {excess:.3g} {unit}"
     )
-    following = np.vstack((c[1:, :, 1], np.zeros(c.shape[1])))
-    jump = following - final
-    allowed = settings.blend_time * robot.acceleration_max
-    over = np.abs(jump) - allowed
-    if (over > 0.0).any():
-        k = int((over > 0.0).any(axis=1).argmax())
-        j = int(over[k].argmax())
-        time = start + float(durations[: k + 1].sum())
-        raise TrajectoryRefusedError(
-            ErrorCode.INVALID_GOAL,
-            f"the velocity of {robot.joint_names[j]} jumps by {jump[k, j]:+.4f} rad/s at {time:.4f} "
-            "s: at most "
-            f"{allowed[j]:.4f} rad/s; give the points velocities",
-        )

@@ -13,11 +13,11 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal
-from ir_sim_driver.motion.lead_in import Route, route_onto
-from ir_sim_driver.motion.limit_checks import check_jumps, check_limits
+from ir_sim_driver.motion.lead_in import AT_REST, Route, route_onto
+from ir_sim_driver.motion.limit_checks import Range, check_limits
 from ir_sim_driver.motion.path import Motion
+from ir_sim_driver.motion.rounding import rounded
 
-_REST = 1e-6  # rad/s that still counts as standing
 _NS = 1e-9
 
 
@@ -52,24 +52,23 @@ def check_goal(
 
 
 def check_trajectory(
-    trajectory: JointTrajectory,
-    robot: RobotModel,
-    dynamics: DynamicsModel,
-    settings: ExecutionSettings,
-    dt: float,
+    trajectory: JointTrajectory, robot: RobotModel, dynamics: DynamicsModel, settings: ExecutionSettings
 ) -> None:
     """Check every instant of a trajectory against the limits, whatever state the robot is in.
 
     May take a while for long ones. Raises TrajectoryRefusedError.
     """
     _check_points(trajectory, robot, settings)
+    executed = rounded(trajectory, settings.blend_time)
     with np.errstate(over="ignore", invalid="ignore"):
-        coefficients, durations = trajectory.coefficients()
-        if not np.isfinite(coefficients).all():
-            raise _invalid("points lie too close in time: the polynomial between them is not finite")
-    first = float(trajectory.times[0])
-    check_limits(coefficients, durations, first, robot, dynamics, settings, dt)
-    check_jumps(coefficients, durations, first, robot, settings)
+        coefficients, durations = executed.coefficients()
+    try:
+        check_limits(coefficients, durations, float(executed.times[0]), robot, dynamics, settings)
+    except TrajectoryRefusedError as error:
+        if executed is trajectory:
+            raise
+        corners = f"corners of positions alone are rounded over {settings.blend_time:g} s"
+        raise _invalid(f"{error}; {corners}: give the points velocities") from error
 
 
 def checked_route(
@@ -78,16 +77,18 @@ def checked_route(
     robot: RobotModel,
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
-    dt: float,
+    delay: float = 0.0,
 ) -> Route:
     """Path from the commanded motion `now` along a trajectory that passed check_trajectory.
 
-    Only what leads in is checked here. Raises TrajectoryRefusedError.
+    Only what leads in is checked here; from outside its range a joint may come back, and go no farther out.
+    delay [s]: until time 0 of the trajectory. Raises TrajectoryRefusedError.
     """
-    route = route_onto(trajectory, now, robot.acceleration_max, settings)
+    route = route_onto(trajectory, now, robot.acceleration_max, settings, delay)
     lead = slice(0, route.lead)
     coefficients, durations = route.path.coefficients[lead], route.path.durations[lead]
-    check_limits(coefficients, durations, -route.offset, robot, dynamics, settings, dt)
+    allowed = Range.of(robot).including(now.q)
+    check_limits(coefficients, durations, -route.offset, robot, dynamics, settings, allowed)
     return route
 
 
@@ -128,7 +129,7 @@ def _check_end(trajectory: JointTrajectory) -> None:
         return
     last = trajectory.velocities[-1]
     j = int(np.abs(last).argmax())
-    if abs(last[j]) > _REST:
+    if abs(last[j]) > AT_REST:
         raise _invalid(
             f"point {len(trajectory.times_ns) - 1} joint {j} ({trajectory.joint_names[j]}) ends with "
             f"{last[j]:g} rad/s: "
