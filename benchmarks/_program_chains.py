@@ -18,15 +18,13 @@ from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
-from ir_planner import Planner
+from ir_planner import Goal, Planner, TimingError
 from ir_planner.program.chain import layers_of
-from ir_planner.program.movements import Movements
-from ir_planner.program.request import StageError
+from ir_planner.program.node import Node
 from ir_planner.program.route import Route
-from ir_planner.program.station_graph import Node
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.request import Context, Journal, Work
-from ir_planner.service import exit_searches
+from ir_planner.service import exit_searches, timed_service
 
 CEILING = 120.0  # s: work ends a search, never the clock
 EdgeCosts = dict[tuple[bytes, ...], float]  # of edges of a cell that other instances share
@@ -147,18 +145,15 @@ class Chains:
             return float(least_travel(scene, first.outside, goals)[0])
         return float(least_cost(scene, first.outside, goals, self.options.time_value)[0])
 
-    def _movements(self, place: int) -> Movements:
-        scene = self.route.arriving(place)
-        context = Context(scene, self.options, _journal(self.planner, self.options, 1))
-        return Movements(self.route, context, self.planner.settings.searches)
-
     def _across(self, place: int, first: Node, second: Node) -> float:
+        """Cost of the regional movement that the planner answers with; inf: none."""
         key = (first.outside.tobytes(), second.outside.tobytes(), self._asked())
         if key not in self.known:
-            moved = np.abs(second.outside - first.outside).max() > 1e-9
-            found = self._movements(place).across(place, first, second) if moved else None
-            cost = cost_of(found.evaluation.report, self.options) if found is not None else np.inf
-            self.known[key] = cost if moved else 0.0
+            goal = Goal(configuration=second.outside)
+            if np.abs(second.outside - first.outside).max() < 1e-9:
+                return 0.0
+            plan = self.planner.plan_regional(first.outside, goal, self.options)
+            self.known[key] = cost_of(plan.report, self.options) if plan.status.ok else np.inf
             self.edges += 1
         return self.known[key]
 
@@ -169,11 +164,15 @@ class Chains:
         key = (node.line.points.tobytes(), self._asked(), b"in" if entry else b"out")
         if key not in self.known:
             name = self.route.name(place if entry else place - 1)
+            journal = _journal(self.planner, self.options, 1)
+            context = Context(self.route.arriving(place), self.options, journal).at(name)
             try:
-                found = self._movements(place)._service(place, node, name, entry=entry)
-                self.known[key] = cost_of(found.evaluation.report, self.options)
-            except StageError:
+                movement = timed_service(node.line, entry, context)
+            except TimingError:
                 self.known[key] = np.inf
+            else:
+                free = movement.violation is None
+                self.known[key] = cost_of(movement.report, self.options) if free else np.inf
         return self.known[key]
 
     def _asked(self) -> bytes:

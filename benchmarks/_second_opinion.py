@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio
+from _drives import Drives
 from _kernels_peers import Coal
-from _pinocchio_arm import pinocchio_arm
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
@@ -38,8 +37,7 @@ class SecondOpinion:
         self._scene = scene
         self._coal = Coal(scene.collision, [*scene.cell.robot.capsules, *loads], scene.cell.bodies())
         self._coal.precise()
-        self._arm = pinocchio_arm(scene.cell.robot, scene.loads, scene.cell.base_pose)
-        self._data = self._arm.createData()
+        self._drives = Drives(scene)
 
     def clearance_left(
         self, trajectory: JointTrajectory, margin: float, station: str = ""
@@ -68,40 +66,6 @@ class SecondOpinion:
             at.qd / robot.velocity_max,
             at.qdd / robot.acceleration_max,
             at.qddd / robot.jerk_max,
-            self.torque(at.q, at.qd, at.qdd) / self.envelope(at.qd),
+            self._drives.torque(at.q, at.qd, at.qdd) / self._drives.envelope(at.qd),
         )
         return float(max(np.abs(share).max() for share in shares))
-
-    def torque(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """Motor torque (N, n) Nm: Pinocchio's arm, rotors and friction, less the counterbalance."""
-        robot = self._scene.cell.robot
-        arm = np.array(
-            [pinocchio.rnea(self._arm, self._data, *x).copy() for x in zip(q, qd, qdd, strict=True)]
-        )
-        friction = robot.friction_viscous * qd + robot.friction_coulomb * np.sign(qd)
-        return arm + robot.reflected_inertia * qdd + friction - self._counterbalance(q)
-
-    def envelope(self, qd: FloatArray) -> FloatArray:
-        """Torque (N, n) Nm that gear and motor have at these speeds."""
-        robot, limit = self._scene.cell.robot, np.empty_like(qd)
-        for j, (speeds, torques) in enumerate(zip(robot.envelope_speed, robot.envelope_torque, strict=True)):
-            fast = np.interp(np.abs(qd[:, j]), speeds, torques[1:])
-            limit[:, j] = np.where(np.abs(qd[:, j]) < speeds[0], torques[0], fast)
-        return limit
-
-    def _counterbalance(self, q: FloatArray) -> FloatArray:
-        """Force of the gas spring times its lever about the pivot's joint, from the robot's data."""
-        torque, spring = np.zeros_like(q), self._scene.cell.robot.counterbalance
-        if spring is None:
-            return torque
-        angle = q[:, spring.joint]
-        x = np.cos(angle) * spring.rod_eye[0] + np.sin(angle) * spring.rod_eye[1]
-        z = np.cos(angle) * spring.rod_eye[1] - np.sin(angle) * spring.rod_eye[0]
-        rod = np.stack([x - spring.pivot[0], z - spring.pivot[1]])
-        length = np.linalg.norm(rod, axis=0)
-        volume = spring.gas_volume - spring.piston_area * (length - spring.rod_length_at_charge)
-        pressure = spring.charge_pressure * (spring.gas_volume / volume) ** spring.exponent
-        force = pressure * spring.piston_area * rod / length  # on the rod eye, away from the pivot
-        pull = -force
-        torque[:, spring.joint] = z * pull[0] - x * pull[1]  # about +y
-        return torque
