@@ -59,7 +59,6 @@ GENERATED = {"build", "install", "log", "__pycache__", "egg-info"}
 
 # Not rewritten yet; the list shrinks to nothing.
 PENDING: tuple[str, ...] = (
-    "src/ir_planner",
     "src/ir_msgs_py",
     "src/ir_description",
     "src/ir_kernels",

@@ -33,11 +33,11 @@ def test_base_axes_burnt_and_capacitor_sum_up(
     fast: JointTrajectory, demo_scene: PlanningScene, regeneration: Any
 ) -> None:
     energy = movement_energy(fast, replace(demo_scene, regeneration=regeneration))
-    parts = energy.base + energy.joints.sum() + energy.burnt + energy.capacitor
+    parts = energy.base + energy.joints.sum() + energy.dissipated + energy.capacitor
     assert energy.total == pytest.approx(parts, rel=1e-9)
     assert energy.total == pytest.approx(float(np.mean(energy.watts)) * fast.duration, rel=1e-9)
     assert energy.peak == pytest.approx(energy.watts.max())
-    assert energy.burnt >= 0.0
+    assert energy.dissipated >= 0.0
 
 
 def test_sharing_the_bus_costs_no_more_than_burning_and_no_less_than_feeding_back(

@@ -31,7 +31,7 @@ def test_a_law_of_levels_arrives_at_rest_and_integrates(
     s, sd, sdd = law.at(np.arange(law.total + 1))
     assert (s[0], sd[0], sdd[0]) == (0.0, 0.0, 0.0)
     assert (s[-1], sd[-1], sdd[-1]) == (1.0, 0.0, 0.0)
-    assert laws.ways[0, -1] == pytest.approx(1.0, abs=1e-12)
+    assert laws.path_parameters[0, -1] == pytest.approx(1.0, abs=1e-12)
     assert laws.speeds[0, -1] == pytest.approx(0.0, abs=1e-12)
     assert (np.diff(s) >= -1e-12).all()
     assert np.diff(sd) / GRID_S == pytest.approx(0.5 * (sdd[:-1] + sdd[1:]), abs=1e-7)

@@ -6,7 +6,7 @@ from ir_planner.checks.energy import holding_watts, movement_energy
 from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
-from ir_planner.checks.shapes import CLOSEST, WAY, ZONES, Colour, Shape, cell_shapes, movement_shapes
+from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
 from ir_planner.checks.states import end_in_collision, too_near, too_near_sentence
 from ir_planner.checks.states import StateCheck, state_check
 from ir_planner.checks.verification import TorqueProof, Verification, torque_proof, verified
@@ -14,8 +14,8 @@ from ir_planner.checks.verification import TorqueProof, Verification, torque_pro
 __all__ = [
     "AT_REST",
     "CLOSEST",
+    "PATH",
     "SLACK",
-    "WAY",
     "ZONES",
     "Colour",
     "Evaluation",

@@ -15,7 +15,7 @@ from ir_planner.scene import PlanningScene
 
 _ZOOMS = 4
 _PER_ZOOM = 9
-_DIPS = 4  # local minima that are looked at closely
+_MINIMA = 4  # local minima that are looked at closely
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +73,11 @@ def nearest_pairs(
     return tuple(_pair(scene, near, row, bool(allowed[z])) for row, z in enumerate(order))
 
 
-def _lowest_dips(distance: FloatArray) -> NDArray[np.intp]:
+def _lowest_minima(distance: FloatArray) -> NDArray[np.intp]:
     """Where sampled distances (N,) are no larger than before and after, the smallest few first."""
     around = np.concatenate([[np.inf], distance, [np.inf]])
-    dips = np.flatnonzero((distance <= around[:-2]) & (distance <= around[2:]))
-    return np.asarray(dips[np.argsort(distance[dips], kind="stable")[:_DIPS]])
+    minima = np.flatnonzero((distance <= around[:-2]) & (distance <= around[2:]))
+    return np.asarray(minima[np.argsort(distance[minima], kind="stable")[:_MINIMA]])
 
 
 def clearance_profile(
@@ -91,9 +91,9 @@ def clearance_profile(
     allowed = scene.allowed(station)
     offset = np.where(allowed, -np.inf, 0.0)
     near = scene.collision.min_distance(q, offset)
-    dips = _lowest_dips(near.distance)
-    best, row = near, int(dips[0])
-    at, centres, half = float(times[row]), times[dips], span / (count - 1)
+    minima = _lowest_minima(near.distance)
+    best, row = near, int(minima[0])
+    at, centres, half = float(times[row]), times[minima], span / (count - 1)
     for _ in range(_ZOOMS):
         zoom = np.clip(centres[:, None] + np.linspace(-half, half, _PER_ZOOM), begin, begin + span)
         closer = scene.collision.min_distance(trajectory.sample(zoom.ravel()).q, offset)

@@ -1,6 +1,6 @@
 """Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is always drawn.
 
-Energy = base + sum of the axes (signed) + burnt + change of the capacitor. The power is taken at the
+Energy = base + sum of the axes (signed) + dissipated + change of the capacitor. The power is taken at the
 middles of steps of at most 1 ms. Each movement starts with an empty capacitor; what is left in it at the
 end is not credited.
 """
@@ -20,7 +20,7 @@ _PIECE = 20_000  # samples at a time: an hour has millions
 
 @dataclass(frozen=True)
 class MovementEnergy:
-    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), burnt,
+    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), dissipated,
     capacitor.
 
     peak [W] at the mains; times (N,) s (middles of the steps) and watts (N,) at the mains: its profile.
@@ -29,7 +29,7 @@ class MovementEnergy:
     total: float
     base: float
     joints: FloatArray
-    burnt: float
+    dissipated: float
     capacitor: float
     peak: float
     times: FloatArray
@@ -56,7 +56,7 @@ def movement_energy(
         total=float(watts.sum() * dt),
         base=scene.base_watts * span,
         joints=axes.sum(axis=0) * dt,
-        burnt=float(bus.burnt.sum() * dt),
+        dissipated=float(bus.burnt.sum() * dt),
         capacitor=float(bus.stored[-1]),
         peak=float(watts.max()),
         times=times,

@@ -44,7 +44,7 @@ def measured(
         energy=energy.total,
         joint_energy=energy.joints,
         base_energy=energy.base,
-        burnt_energy=energy.burnt,
+        burnt_energy=energy.dissipated,
         peak_power=energy.peak,
         min_clearance=np.inf if clearance.smallest is None else clearance.smallest.distance,
         closest=clearance.smallest,

@@ -1,4 +1,4 @@
-"""What RViz and Foxglove see of a cell: its bodies, zones and stations, and the way of the last movement."""
+"""What RViz and Foxglove see of a cell: its bodies, zones and stations, and the path of the last movement."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ ZONES: dict[str, Colour] = {
     "SEMI_CLOSED": (0.9, 0.7, 0.1, 0.14),
     "CLOSED": (0.9, 0.2, 0.2, 0.16),
 }
-WAY: Colour = (0.1, 0.4, 0.9, 1.0)
+PATH: Colour = (0.1, 0.4, 0.9, 1.0)
 CLOSEST: Colour = (0.9, 0.1, 0.1, 1.0)
 
 
@@ -97,7 +97,7 @@ def station_shapes(name: str, pose: FloatArray) -> tuple[Shape, ...]:
     """The approach direction as a line, and the name."""
     tip = np.asarray(pose)[:3, 3]
     back = tip - 0.15 * np.asarray(pose)[:3, 0]
-    line = Shape("stations", "line", np.eye(4), np.array([0.01, 0.0, 0.0]), WAY, np.stack([back, tip]))
+    line = Shape("stations", "line", np.eye(4), np.array([0.01, 0.0, 0.0]), PATH, np.stack([back, tip]))
     label = np.eye(4)
     label[:3, 3] = tip
     label[2, 3] += 0.12
@@ -107,10 +107,10 @@ def station_shapes(name: str, pose: FloatArray) -> tuple[Shape, ...]:
 def movement_shapes(
     trajectory: JointTrajectory, scene: PlanningScene, clearance: ClearanceProfile | None = None
 ) -> tuple[Shape, ...]:
-    """The way of the tcp, and the closest pair where it is known."""
+    """The path of the tcp, and the closest pair where it is known."""
     times = np.linspace(trajectory.times[0], trajectory.times[-1], 60)
-    way = scene.chain.tcp_poses(trajectory.sample(times).q)[:, :3, 3]
-    shapes = [Shape("movement", "line", np.eye(4), np.array([0.008, 0.0, 0.0]), WAY, way)]
+    path = scene.chain.tcp_poses(trajectory.sample(times).q)[:, :3, 3]
+    shapes = [Shape("movement", "line", np.eye(4), np.array([0.008, 0.0, 0.0]), PATH, path)]
     pair = clearance.smallest if clearance is not None else None
     if pair is not None:
         ends = np.stack([pair.point_a, pair.point_b])

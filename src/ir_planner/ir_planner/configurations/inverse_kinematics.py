@@ -1,7 +1,7 @@
 """Configurations that reach a pose: the complete closed-form set, filtered by clearance, ranked by cost.
 
-Rank: W of eq. (9) from a given configuration, then clearance. What is dropped is counted by the pair in the
-way.
+Rank: W of eq. (9) from a given configuration, then clearance. What is dropped is counted by the obstructing
+pair.
 """
 
 from collections import Counter
@@ -21,7 +21,7 @@ from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
 class Configurations:
     """Free configurations q (K, n), ranked; branch (K,); and why the others were dropped.
 
-    nearest: where none is free, the pair in the way of the one that lacks least ("" where it is not known).
+    nearest: where none is free, the obstructing pair of the one that lacks least ("" where it is not known).
     """
 
     q: FloatArray

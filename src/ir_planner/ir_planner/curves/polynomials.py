@@ -1,9 +1,9 @@
 """Exact extremes of a trajectory between its points: what a limit is compared with.
 
 A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, K). Extremes are
-those of the compiled core. The way a joint goes is that between its ends, or where it turns in between, that
-between its turning points: they are bracketed between the roots of the next derivative, down to a line, so
-none is missed and no sampling takes part.
+those of the compiled core. The travel of a joint is the distance between its ends, or where it turns in
+between, that between its turning points: they are bracketed between the roots of the next derivative, down to
+a line, so none is missed and no sampling takes part.
 """
 
 from dataclasses import dataclass
@@ -96,7 +96,7 @@ def _size(found: Extrema) -> FloatArray:
 
 
 def _turning_travel(position: FloatArray) -> FloatArray:
-    """Way (P,) there and back of polynomials (P, K) over u in [0, 1]."""
+    """Travel (P,) there and back of polynomials (P, K) over u in [0, 1]."""
     chain = [position]
     for _ in range(position.shape[1] - 2):
         chain.append(derivative(chain[-1]))

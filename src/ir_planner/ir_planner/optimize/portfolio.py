@@ -1,8 +1,8 @@
 """Paths of several homotopy classes, found by several searches, each optimised to the cheapest movement near
 it.
 
-Each new free path is shortened and gets a coarse solution: a short descent on a coarse spline tells what it
-may come to, and paths whose coarse solutions are alike count once. The cheapest coarse solutions are
+Each new free path is shortened and gets a coarse solution: a short descent on a coarse spline estimates what
+it may come to, and paths whose coarse solutions are alike count once. The cheapest coarse solutions are
 refined, which is where the clearance is proved; the best refined movement is the answer, and more work makes
 it better.
 """

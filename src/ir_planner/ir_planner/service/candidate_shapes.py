@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from ir_msgs_py.candidates import ServiceCandidate
 
-from ir_planner.checks import CLOSEST, WAY, ZONES, Colour, Shape
+from ir_planner.checks import CLOSEST, PATH, ZONES, Colour, Shape
 from ir_planner.scene import PlanningScene
 
 _NONE = np.zeros((0, 3))
@@ -30,7 +30,7 @@ def service_shapes(
         times = np.linspace(candidate.trajectory.times[0], candidate.trajectory.times[-1], _SAMPLES)
         path = scene.chain.tcp_poses(candidate.trajectory.sample(times).q)[:, :3, 3]
         width = np.array([0.006 if rank else 0.014, 0.0, 0.0])
-        colour = _OTHERS if rank else WAY
+        colour = _OTHERS if rank else PATH
         shapes.append(Shape("service_candidates", "line", np.eye(4), width, colour, path))
         shapes.extend(_closest(candidate, rank == 0))
     return tuple(shapes)

@@ -36,7 +36,7 @@ class LevelLaws:
         return np.concatenate([np.zeros((len(t), 1)), np.cumsum(gains, axis=1)], axis=1)
 
     @cached_property
-    def ways(self) -> FloatArray:
+    def path_parameters(self) -> FloatArray:
         """s (K, PHASES + 1) at the ends of the phases."""
         t, a, v = self.steps * GRID_S, self.accelerations, self.speeds
         gains = t * (v[:, :-1] + t * (2.0 * a[:, :-1] + a[:, 1:]) / 6.0)
@@ -83,12 +83,12 @@ class LevelLaw:
         inside = np.clip(steps, 0, self.total)
         phase = np.clip(np.searchsorted(ends, inside, side="right") - 1, 0, PHASES - 1)
         tau = (inside - ends[phase]) * GRID_S
-        a, v, s, j = laws.accelerations[0], laws.speeds[0], laws.ways[0], laws.jerks[0]
+        a, v, s, j = laws.accelerations[0], laws.speeds[0], laws.path_parameters[0], laws.jerks[0]
         sdd = a[phase] + j[phase] * tau
         sd = v[phase] + tau * (a[phase] + j[phase] * tau / 2)
-        way = s[phase] + tau * (v[phase] + tau * (a[phase] / 2 + j[phase] * tau / 6))
+        here = s[phase] + tau * (v[phase] + tau * (a[phase] / 2 + j[phase] * tau / 6))
         over = inside >= self.total
-        return np.where(over, 1.0, way), np.where(over, 0.0, sd), np.where(over, 0.0, sdd)
+        return np.where(over, 1.0, here), np.where(over, 0.0, sd), np.where(over, 0.0, sdd)
 
 
 def level_laws(speed: FloatArray, up: FloatArray, down: FloatArray, jerk: float) -> LevelLaws:
@@ -97,12 +97,12 @@ def level_laws(speed: FloatArray, up: FloatArray, down: FloatArray, jerk: float)
     """
     rising, falling = _ramp(speed, up, jerk), _ramp(speed, down, jerk)
     levels_up, levels_down = _at_ends(up), _at_ends(down)
-    reached_up, way_up = _gains(rising, levels_up)
-    reached_down, way_down = _gains(falling, levels_down)
+    reached_up, length_up = _gains(rising, levels_up)
+    reached_down, length_down = _gains(falling, levels_down)
     scale = reached_up / reached_down
-    left = np.maximum(1.0 - way_up - scale * way_down, 0.0)
+    left = np.maximum(1.0 - length_up - scale * length_down, 0.0)
     cruise = np.ceil(left / reached_up / GRID_S - 1e-9).astype(np.int64)
-    distance = way_up + scale * way_down + reached_up * cruise * GRID_S
+    distance = length_up + scale * length_down + reached_up * cruise * GRID_S
     steps = np.concatenate([rising, cruise[:, None], falling[:, ::-1]], axis=1)
     # the last level before the cruise is 0, and so is the first after it: both ends of the cruising phase
     ends = np.concatenate([levels_up, -scale[:, None] * levels_down[:, ::-1]], axis=1)
@@ -134,9 +134,9 @@ def _at_ends(levels: FloatArray) -> FloatArray:
 
 
 def _gains(steps: IntArray, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Speed and way (K,) of a ramp from rest."""
+    """Speed and length in s (K,) of a ramp from rest."""
     t = steps * GRID_S
     gains = 0.5 * t * (ends[:, :-1] + ends[:, 1:])
     before = np.cumsum(gains, axis=1) - gains
-    way = t * (before + t * (2.0 * ends[:, :-1] + ends[:, 1:]) / 6.0)
-    return gains.sum(axis=1), way.sum(axis=1)
+    length = t * (before + t * (2.0 * ends[:, :-1] + ends[:, 1:]) / 6.0)
+    return gains.sum(axis=1), length.sum(axis=1)

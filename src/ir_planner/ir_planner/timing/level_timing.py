@@ -27,7 +27,7 @@ def fastest(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics:
     if np.abs(delta).max() < STILL:
         return plain
     bounds = path_limits(delta, limits)
-    if plain.total <= free_law(bounds).total:  # torque was in nobody's way
+    if plain.total <= free_law(bounds).total:  # torque bounds nothing
         return plain
     levels = fastest_levels(start, delta, bounds, limits.torque_share, dynamics)
     return levels if levels is not None and levels.total < plain.total else plain
@@ -76,10 +76,10 @@ def _within(laws: LevelLaws, bounds: tuple[float, float, float]) -> BoolArray:
 def _use(laws: LevelLaws, start: FloatArray, delta: FloatArray, dynamics: Dynamics) -> FloatArray:
     """Largest use of torque (K, PHASES, P) over the joints, at P instants of every phase."""
     t = (laws.steps * GRID_S)[:, :, None] * np.linspace(0.0, 1.0, _PER_PHASE)
-    a, v, s = (x[:, :-1, None] for x in (laws.accelerations, laws.speeds, laws.ways))
+    a, v, s = (x[:, :-1, None] for x in (laws.accelerations, laws.speeds, laws.path_parameters))
     j = laws.jerks[:, :, None]
-    way, sd, sdd = s + t * (v + t * (a / 2 + j * t / 6)), v + t * (a + j * t / 2), a + j * t
-    flat = [x.reshape(-1, 1) * delta for x in (way, sd, sdd)]
+    here, sd, sdd = s + t * (v + t * (a / 2 + j * t / 6)), v + t * (a + j * t / 2), a + j * t
+    flat = [x.reshape(-1, 1) * delta for x in (here, sd, sdd)]
     use = torque_use(dynamics, start + flat[0], flat[1], flat[2])
     return np.asarray(use.max(axis=1).reshape(t.shape))
 

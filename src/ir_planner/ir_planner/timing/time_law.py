@@ -40,7 +40,7 @@ def _ramp(speed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> tupl
 
 
 def reached_speed(limits: LawLimits) -> FloatArray:
-    """Largest speed (K,) 1/s that the distance 1 leaves room for, at most the limit.
+    """Largest speed (K,) 1/s that the distance 1 allows, at most the limit.
 
     The distance of both ramps grows with the speed and is convex, so Newton's steps from above stay above.
     """
