@@ -29,7 +29,7 @@ def fast(demo_scene: PlanningScene, degrees: Degrees, budget: Work) -> JointTraj
 
 
 @pytest.mark.parametrize("regeneration", REGENERATIONS)
-def test_base_axes_burnt_and_capacitor_sum_up(
+def test_base_axes_brake_resistor_and_capacitor_sum_up(
     fast: JointTrajectory, demo_scene: PlanningScene, regeneration: Any
 ) -> None:
     energy = movement_energy(fast, replace(demo_scene, regeneration=regeneration))

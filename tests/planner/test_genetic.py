@@ -55,10 +55,10 @@ def ends(scene: PlanningScene, task: str, flip: bool = False) -> tuple[FloatArra
     return both[::-1] if flip else both  # type: ignore[return-value]
 
 
-def clearance(way: FloatArray, scene: PlanningScene) -> float:
+def clearance(path: FloatArray, scene: PlanningScene) -> float:
     """Least distance over places 2 mrad apart; the judge shares no code with the proofs."""
     smallest = np.inf
-    for a, b in itertools.pairwise(way):
+    for a, b in itertools.pairwise(path):
         count = int(np.ceil(np.abs(b - a).max() / 2e-3)) + 1
         line = np.linspace(a, b, count)
         smallest = min(smallest, float(scene.collision.distances(line).min()))
@@ -76,15 +76,15 @@ def test_every_task_of_the_open_cells_is_corrected_with_every_seed(
         found = corrected(start, goal, space, SETTINGS, np.random.default_rng(seed))
         assert found.paths, f"seed {seed}: {found.shortfall} m are missing"
         assert 1 <= len(found.paths) <= SETTINGS.paths
-        costs = [path_cost(scene.weights, way) for way in found.paths]
+        costs = [path_cost(scene.weights, path) for path in found.paths]
         assert costs == sorted(costs)
         assert costs[0] >= float(movement_cost(scene.weights, start, goal)) * (1.0 - 1e-12)
-        for way in found.paths:
-            assert np.array_equal(way[[0, -1]], np.stack([start, goal]))
-            assert ((way >= space.low) & (way <= space.high)).all()
-            assert space.edges_free(way[:-1], way[1:]).all()
+        for path in found.paths:
+            assert np.array_equal(path[[0, -1]], np.stack([start, goal]))
+            assert ((path >= space.low) & (path <= space.high)).all()
+            assert space.edges_free(path[:-1], path[1:]).all()
         if seed == 0:
-            assert min(clearance(way, scene) for way in found.paths) > S_M - PROOF_TOLERANCE
+            assert min(clearance(path, scene) for path in found.paths) > S_M - PROOF_TOLERANCE
 
 
 def test_a_free_straight_movement_is_left_as_it_is(scene_of: SceneOf) -> None:
@@ -95,7 +95,7 @@ def test_a_free_straight_movement_is_left_as_it_is(scene_of: SceneOf) -> None:
     assert np.array_equal(found.paths[0], np.stack([start, goal]))
 
 
-def test_the_ways_are_different(scene_of: SceneOf) -> None:
+def test_the_paths_are_different(scene_of: SceneOf) -> None:
     scene = scene_of("open")
     start, goal = ends(scene, "p1->p2")
     found = corrected(start, goal, space_of(scene), SETTINGS, np.random.default_rng(0))
@@ -109,9 +109,9 @@ def test_only_the_stretch_that_collides_is_taken_out(scene_of: SceneOf) -> None:
     scene = scene_of("open")
     space = space_of(scene)
     start, goal = ends(scene, "p1->p2")
-    way = np.stack([start, goal])
-    proof = space.certificates(way[:1], way[1:])
-    before, after = colliding_stretch(way, proof, space, 0.0)
+    path = np.stack([start, goal])
+    proof = space.certificates(path[:1], path[1:])
+    before, after = colliding_stretch(path, proof, space, 0.0)
     assert np.array_equal(before[0], start)
     assert np.array_equal(after[-1], goal)
 
@@ -126,7 +126,7 @@ def test_only_the_stretch_that_collides_is_taken_out(scene_of: SceneOf) -> None:
     spacing = 0.02 / np.abs(goal - start).max()
     assert collides.min() - spacing <= begin < collides.min()
     assert collides.max() < end <= collides.max() + spacing
-    wider_before, wider_after = colliding_stretch(way, proof, space, 0.5)
+    wider_before, wider_after = colliding_stretch(path, proof, space, 0.5)
     length = end - begin
     assert share(wider_before[-1]) == pytest.approx(begin - 0.5 * length, abs=1.5 * spacing)
     assert share(wider_after[0]) == pytest.approx(end + 0.5 * length, abs=1.5 * spacing)
@@ -137,14 +137,14 @@ def test_what_is_free_before_and_after_stays(scene_of: SceneOf) -> None:
     space = space_of(scene)
     start, goal = ends(scene, "p1->p2")
     settings = replace(SETTINGS, margin=0.0)
-    way = np.stack([start, goal])
-    before, after = colliding_stretch(way, space.certificates(way[:1], way[1:]), space, 0.0)
+    path = np.stack([start, goal])
+    before, after = colliding_stretch(path, space.certificates(path[:1], path[1:]), space, 0.0)
     for found in corrected(start, goal, space, settings, np.random.default_rng(3)).paths:
         assert np.array_equal(found[: len(before)], before)
         assert np.array_equal(found[-len(after) :], after)
 
 
-def test_a_way_with_two_colliding_stretches_gives_the_first(scene_of: SceneOf) -> None:
+def test_a_path_with_two_colliding_stretches_gives_the_first(scene_of: SceneOf) -> None:
     scene = scene_of("open")
     space = space_of(scene)
     start, goal = ends(scene, "p1->p2")
@@ -158,7 +158,7 @@ def test_a_way_with_two_colliding_stretches_gives_the_first(scene_of: SceneOf) -
 
 @pytest.mark.parametrize("shape", ["polyline", "spline"])
 @pytest.mark.parametrize("vias", [1, 2, 3])
-def test_a_way_runs_from_start_to_end_evenly_and_through_its_vias(shape: str, vias: int) -> None:
+def test_a_path_runs_from_start_to_end_evenly_and_through_its_vias(shape: str, vias: int) -> None:
     matrix = path_matrix(shape, vias, 25)
     assert matrix.sum(axis=1) == pytest.approx(np.ones(25))
     assert matrix[0] == pytest.approx(np.eye(vias + 2)[0], abs=1e-12)
@@ -172,9 +172,9 @@ def test_the_spline_of_an_individual_is_that_of_eq_10() -> None:
     points = rng.uniform(-1.0, 1.0, (4, 6))
     times = np.linspace(0.0, 1.0, 4)
     spline = to_ppoly(spline_through(points, times, virtual_knots(times)))
-    way = path_matrix("spline", 2, 200) @ points
+    path = path_matrix("spline", 2, 200) @ points
     fine = spline(np.linspace(0.0, 1.0, 40_001))
-    nearest = [np.abs(fine - q).max(axis=1).min() for q in way]
+    nearest = [np.abs(fine - q).max(axis=1).min() for q in path]
     assert max(nearest) < 1e-3
 
 
@@ -185,8 +185,8 @@ def test_fitness_is_cost_plus_penalties_and_never_gets_worse(scene_of: SceneOf) 
     breeder = _Breeder(start, goal, space, SETTINGS, np.random.default_rng(0))
     people = breeder._first()
     k = 7
-    way = np.concatenate([start[None], people.vias[k], goal[None]])
-    points = path_matrix("polyline", SETTINGS.vias, SETTINGS.samples) @ way
+    path = np.concatenate([start[None], people.vias[k], goal[None]])
+    points = path_matrix("polyline", SETTINGS.vias, SETTINGS.samples) @ path
     lack = np.maximum(space.threshold - scene.collision.distances(points[1:-1]), 0.0).max(axis=1)
     cost = path_cost(scene.weights, points) / float(movement_cost(scene.weights, start, goal))
     expected = cost + SETTINGS.clearance_penalty * lack.mean() + (lack.max() > 0.0)
@@ -228,16 +228,16 @@ def test_the_parting_step_lessens_what_is_missing(scene_of: SceneOf) -> None:
     assert (pushed.shortfall < people.shortfall[rows]).mean() > 0.7
 
 
-def test_the_spline_of_eq_10_finds_ways_too(scene_of: SceneOf) -> None:
+def test_the_spline_of_eq_10_finds_paths_too(scene_of: SceneOf) -> None:
     scene = scene_of("table_columns")
     settings = replace(SETTINGS, shape="spline")
     start, goal = ends(scene, "tL->tR")
     space = space_of(scene)
     found = evolve(start, goal, space, settings, np.random.default_rng(0))
     assert found.paths
-    for way in found.paths:
-        assert len(way) == settings.samples
-        assert space.edges_free(way[:-1], way[1:]).all()
+    for path in found.paths:
+        assert len(path) == settings.samples
+        assert space.edges_free(path[:-1], path[1:]).all()
 
 
 def test_the_planner_genetic_answers_with_a_certified_movement_and_the_same_bytes(
@@ -273,7 +273,7 @@ def test_settings_reach_the_planner(scene_of: SceneOf, options: PlanOptions) -> 
 CAGE = """
 format: ir_cell/1
 name: cage
-description: Two walls that no way leads round.
+description: Two walls that no path leads around.
 robot: kr210_r2700_extra
 floor: true
 home_deg: [0, -90, 90, 0, 0, 0]

@@ -1,4 +1,4 @@
-"""What people type as a goal, and what they are told when it is none."""
+"""What people type as a goal, and what the answer is when it is none."""
 
 from __future__ import annotations
 

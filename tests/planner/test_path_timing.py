@@ -200,9 +200,9 @@ def toppra_seconds(path: JointTrajectory, scene: PlanningScene) -> float:
     robot, dynamics = scene.cell.robot, scene.dynamics
     times = np.linspace(0.0, path.duration, 800)
     q = path.sample(times).q
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))])
-    keep = np.concatenate([[True], np.diff(way) > 1e-4])
-    geometry = toppra.SplineInterpolator(way[keep] / way[-1], q[keep])
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))])
+    keep = np.concatenate([[True], np.diff(length) > 1e-4])
+    geometry = toppra.SplineInterpolator(length[keep] / length[-1], q[keep])
 
     def rigid(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         friction = robot.friction_viscous * qd + robot.friction_coulomb * np.sign(qd)

@@ -82,7 +82,7 @@ def test_every_configuration_reaches_the_pose_with_its_branch_and_turns(planner:
     assert len({tuple(np.round(s.q, 6)) for s in answer.solutions}) == len(answer.solutions)
 
 
-def test_an_unreachable_pose_and_an_occupied_one_are_told_apart(planner: Planner) -> None:
+def test_an_unreachable_pose_and_an_occupied_one_are_distinguished(planner: Planner) -> None:
     far = planner.compute_ik(parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "analytic", 0.02, HOME, "")
     assert far.status.code == StatusCode.NO_IK_SOLUTION
     inside = parse_goal("X 1.88 Y 0.5 Z 0.4 A 0 B 90 C 0", planner.cell)
@@ -126,7 +126,7 @@ def test_a_long_planning_time_is_capped_and_said(planner: Planner) -> None:
 
 
 @pytest.mark.parametrize("times", [None, np.array([0.0, 3.0, 4.0, 7.0])])
-def test_reference_points_are_passed_with_the_wished_proportions(planner: Planner, times: Any) -> None:
+def test_reference_points_are_passed_with_the_requested_proportions(planner: Planner, times: Any) -> None:
     points = HOME + np.radians([[0] * 6, [10, 5, 5, 0, 10, 0], [30, 0, 5, 0, 0, 10], [40, 0, 0, 0, 0, 0]])
     plan = planner.plan_trajectory(Reference(points, times), PlanOptions())
     assert plan.status.ok, plan.status.message
@@ -138,12 +138,12 @@ def test_reference_points_are_passed_with_the_wished_proportions(planner: Planne
         assert trajectory.times[passed] == pytest.approx(times, abs=0.01)
 
 
-@pytest.mark.parametrize(("wished", "taken"), [(8.0, 8.0), (0.01, None)])
+@pytest.mark.parametrize(("requested", "taken"), [(8.0, 8.0), (0.01, None)])
 def test_two_reference_points_take_their_time_or_the_shortest(
-    wished: float, taken: float | None, planner: Planner
+    requested: float, taken: float | None, planner: Planner
 ) -> None:
     points = HOME + np.radians([[0] * 6, [40, 10, 0, 0, 20, 0]])
-    plan = planner.plan_trajectory(Reference(points, np.array([0.0, wished])), PlanOptions())
+    plan = planner.plan_trajectory(Reference(points, np.array([0.0, requested])), PlanOptions())
     fastest = planner.plan_trajectory(Reference(points), PlanOptions(objective="time"))
     assert plan.status.ok, plan.status.message
     assert plan.report.duration == pytest.approx(taken or fastest.report.duration, abs=1e-5)
@@ -166,8 +166,8 @@ def test_the_bound_of_an_allowed_contact_is_its_own(planner: Planner) -> None:
     closer[:3, 3] += closer[:3, 0] * 0.0045  # towards the spindle: 0.5 mm are left where 1 mm must be
     q = scene.inverse_kinematics.solve(closer[None]).q
     space = FreeSpace.of(scene, 0.02, Work(1, 1.0, lambda: 0.0), "lathe_work")
-    told = [too_near(at, space, "start", 0.02) for at in q if not space.states_free(at[None])[0]]
-    own = [text for text in told if contact.body_a in text and contact.body_b in text]
+    sentences = [too_near(at, space, "start", 0.02) for at in q if not space.states_free(at[None])[0]]
+    own = [text for text in sentences if contact.body_a in text and contact.body_b in text]
     assert own
     assert all(text.endswith("it must be more than 1.0 mm") for text in own)
 

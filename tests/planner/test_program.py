@@ -142,18 +142,18 @@ def test_a_program_takes_no_duration_of_a_movement(demo_cell: Cell, power: Power
         planned(demo_cell, power, "home", "park", duration=5.0)
 
 
-def test_progress_tells_the_cost_of_the_chain_to_the_end(demo_cell: Cell, power: PowerData) -> None:
-    told: dict[str, list[float]] = {}
+def test_progress_gives_the_cost_of_the_chain_to_the_end(demo_cell: Cell, power: PowerData) -> None:
+    heard: dict[str, list[float]] = {}
     request = ProgramRequest(
         demo_cell, power, ("home", "gauge_measure"), np.array(demo_cell.machine_home), PlanOptions()
     )
     plan_program(
         request,
         Work(100_000, time.monotonic() + 60.0, time.monotonic),
-        lambda phase, done, total, cost: told.setdefault(phase, []).append(cost),
+        lambda phase, done, total, cost: heard.setdefault(phase, []).append(cost),
     )
-    assert told["movements"] == pytest.approx([told["station graph"][-1]] * len(told["movements"]))
-    assert told["movements"][0] > 0.0
+    assert heard["movements"] == pytest.approx([heard["station graph"][-1]] * len(heard["movements"]))
+    assert heard["movements"][0] > 0.0
 
 
 def test_a_station_that_nobody_reaches_fails_with_its_name(demo_cell: Cell, power: PowerData) -> None:
@@ -169,7 +169,7 @@ def test_an_unknown_station_lists_the_known(demo_cell: Cell, power: PowerData) -
         planned(demo_cell, power, "moon")
 
 
-def test_progress_is_told_and_a_cancel_stops(demo_cell: Cell, power: PowerData) -> None:
+def test_progress_is_reported_and_a_cancel_stops(demo_cell: Cell, power: PowerData) -> None:
     heard: list[str] = []
     request = ProgramRequest(demo_cell, power, (), np.array(demo_cell.machine_home), PlanOptions())
     budget = Work(100_000, time.monotonic() + 60.0, time.monotonic, lambda: "movements" in heard)

@@ -52,7 +52,7 @@ def test_every_task_of_the_open_cells_is_solved_and_certified(
 
 
 @pytest.mark.parametrize(("cell", "task"), [("cnc_door", "cnc->pal"), ("deep_box", "bin->pal")])
-def test_trees_find_the_way_out_where_detours_do_not(
+def test_trees_find_the_path_out_where_detours_do_not(
     cell: str, task: str, scene_of: SceneOf, budget: Work, options: PlanOptions
 ) -> None:
     scene = scene_of(cell)
@@ -66,7 +66,7 @@ def test_trees_find_the_way_out_where_detours_do_not(
     assert clearance_along(plan.trajectory, scene) > 0.02 - PROOF_TOLERANCE
 
 
-def test_a_tunnel_is_left_the_way_the_tool_points(
+def test_a_tunnel_is_left_along_the_axis_of_the_tool(
     scene_of: SceneOf, budget: Work, options: PlanOptions
 ) -> None:
     scene = scene_of("deep_box")
@@ -121,7 +121,7 @@ def test_an_end_in_collision_is_named_with_pair_and_depth(
 CAGE = """
 format: ir_cell/1
 name: cage
-description: Two walls that no way leads round.
+description: Two walls that no path leads around.
 robot: kr210_r2700_extra
 floor: true
 home_deg: [0, -90, 90, 0, 0, 0]
@@ -136,7 +136,7 @@ equipment:
 """
 
 
-def test_where_no_way_leads_the_pair_the_place_and_what_was_tried_are_named(
+def test_where_no_path_leads_the_pair_the_place_and_what_was_tried_are_named(
     degrees: Any, options: PlanOptions
 ) -> None:
     cell = cell_from_yaml(CAGE)
@@ -151,7 +151,7 @@ def test_where_no_way_leads_the_pair_the_place_and_what_was_tried_are_named(
     assert not plan.info.truncated
 
 
-def test_a_blocked_way_says_what_was_tried(demo_scene: PlanningScene, options: PlanOptions) -> None:
+def test_a_blocked_path_says_what_was_tried(demo_scene: PlanningScene, options: PlanOptions) -> None:
     cell = load_cell("open")
     scene = scene_with(cell, load_text(cell), demo_scene.power)
     task = cell.task("p1->p2")

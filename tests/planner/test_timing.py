@@ -105,7 +105,7 @@ def test_scaling_limits_what_it_says(demo_scene: PlanningScene, degrees: Degrees
     assert report.acceleration_ratio.max() <= 0.5 + 1e-9
 
 
-def test_a_wished_duration_is_met_and_too_short_a_one_refused(
+def test_a_requested_duration_is_met_and_too_short_a_one_refused(
     demo_scene: PlanningScene, degrees: Degrees, budget: Work
 ) -> None:
     path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(40, -80, 90, 0, 0, 0)])
