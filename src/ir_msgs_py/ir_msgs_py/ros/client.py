@@ -41,6 +41,7 @@ from ir_msgs_py.ros.conversions import (
 from ir_msgs_py.ros.goals import GoalSender
 from ir_msgs_py.ros.graph import Graph
 from ir_msgs_py.ros.network import apply_network
+from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.types import owner_of
 from ir_msgs_py.trajectory import JointTrajectory
 
@@ -220,7 +221,7 @@ class Client:
     def _client(self, service: str, service_type: Any) -> Any:
         key = (service, service_type)
         if key not in self._clients:
-            self._clients[key] = self.node.create_client(service_type, service)
+            self._clients[key] = self.node.create_client(service_type, service, qos_profile=SERVICE)
         return self._clients[key]
 
 

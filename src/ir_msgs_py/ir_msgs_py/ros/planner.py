@@ -11,6 +11,7 @@ from ir_msgs.srv import GetProgram, GetTrajectory
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import planned_movement_from_msg, status_from_msg, trajectory_from_msg
+from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 
@@ -23,8 +24,8 @@ class Planner:
     def __init__(self, node: Node, waiting: Waiting, name: str, timeout: float = 2.0) -> None:
         self._waiting = waiting
         self._timeout = timeout
-        self._program = node.create_client(GetProgram, f"{name}/get_program")
-        self._trajectory = node.create_client(GetTrajectory, f"{name}/get_trajectory")
+        self._program = node.create_client(GetProgram, f"{name}/get_program", qos_profile=SERVICE)
+        self._trajectory = node.create_client(GetTrajectory, f"{name}/get_trajectory", qos_profile=SERVICE)
 
     async def program(self, program_id: str) -> Fetched:
         """Fetch the steps of a planned program, with the points of its movements."""

@@ -33,16 +33,16 @@ from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
+from ir_msgs_py.ros.quality import LATCHED, SERVICE
 from ir_msgs_py.ros.running import run_node
-from ir_msgs_py.status import StatusCode
+from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionServer
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from visualization_msgs.msg import MarkerArray
@@ -52,14 +52,16 @@ from ir_kernels import compiled
 from ir_msgs_py import names
 from ir_planner.checks import cell_shapes, movement_shapes
 from ir_planner.node.markers import ShownMarkers
+from ir_planner.node.answers import fill_status
+from ir_planner.node.goal_queue import GoalQueue
 from ir_planner.node.inputs import LastState, measured_velocity
 from ir_planner.node.requests import Requests
 from ir_planner.planner import Planner
 from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
-_SHOWN = 100  # planned trajectories that late listeners still get
-_THREADS = 4
+_GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
+_THREADS = 6  # quick and long requests, loading, the goal under way, cancelling, and one to spare
 
 
 class PlannerNode(Node):
@@ -86,14 +88,13 @@ class PlannerNode(Node):
             self.get_logger().error,
             self._show_service,
         )
-        latched = QoSProfile(depth=_SHOWN, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._trajectories = self.create_publisher(JointTrajectoryMsg, names.PLANNED_TRAJECTORY, latched)
-        once = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, once)
+        self._trajectories = self.create_publisher(JointTrajectoryMsg, names.PLANNED_TRAJECTORY, LATCHED)
+        self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
         self._shown = ShownMarkers()
         self._quick = MutuallyExclusiveCallbackGroup()
         self._long = MutuallyExclusiveCallbackGroup()
+        self._goals = GoalQueue(self._execute_plan, self._refuse_plan, _GOALS_WAITING)
         self._offer()
         self._states = LatestMessage(self, JointState, names.JOINT_STATES)
         self.create_timer(1.0, self._diagnose, callback_group=self._quick)
@@ -102,8 +103,9 @@ class PlannerNode(Node):
     def _offer(self) -> None:
         """Advertise what works."""
         ask, quick, long = self._requests, self._quick, self._long
+        loading = MutuallyExclusiveCallbackGroup()  # a large cell holds up nobody else
         for kind, name, handler, group in (
-            (SetCell, names.SET_CELL, ask.set_cell, quick),
+            (SetCell, names.SET_CELL, ask.set_cell, loading),
             (GetCell, names.GET_CELL, ask.get_cell, quick),
             (SetEquipment, names.SET_EQUIPMENT, ask.set_equipment, quick),
             (CheckState, names.CHECK_STATE, ask.check_state, quick),
@@ -118,13 +120,14 @@ class PlannerNode(Node):
             (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
         ):
-            self.create_service(kind, name, ask.guarded(handler), callback_group=group)
+            self.create_service(kind, name, ask.guarded(handler), qos_profile=SERVICE, callback_group=group)
         self._action = ActionServer(
             self,
             Plan,
             names.PLAN,
-            self._execute_plan,
-            cancel_callback=lambda goal: CancelResponse.ACCEPT,
+            self._goals.execute,
+            handle_accepted_callback=self._goals.accepted,
+            cancel_callback=self._goals.cancel,
             callback_group=ReentrantCallbackGroup(),
         )
 
@@ -149,6 +152,11 @@ class PlannerNode(Node):
         else:
             goal.abort()
         return result
+
+    def _refuse_plan(self, goal: ServerGoalHandle) -> Plan.Result:
+        goal.abort()
+        sentence = f"{_GOALS_WAITING} goals of plan wait already: at most so many may"
+        return fill_status(Plan.Result(), Status(StatusCode.FAILURE, sentence), names.PLANNER)
 
     def _look(self) -> None:
         """Remember where the robot is; a message about another robot's joints is none."""

@@ -1,0 +1,103 @@
+"""Many requests at once: each is answered, quick ones at once, and what is too much is refused in words."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.action import ActionClient
+from sensor_msgs.msg import JointState
+
+from ir_msgs.action import Plan
+from ir_msgs.msg import PlanOptions, Status
+from ir_msgs.srv import CheckState
+from ir_msgs_py.ros.quality import SERVICE
+from ir_planner.node import node as planner_module
+from ir_planner.node.node import PlannerNode
+
+HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+STATE = JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=list(HOME))
+CANCELLED = 5  # action_msgs/GoalStatus.STATUS_CANCELED
+
+
+@pytest.fixture
+def send(
+    planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any
+) -> Callable[[int], list[Any]]:
+    """Send goals of the plan action; their accepted handles."""
+    client = ros_executor.run(lambda: ActionClient(ros_node, Plan, "/ir_planner/plan"))
+    wait_for(client.server_is_ready, what="plan is offered")
+
+    def goals(count: int) -> list[Any]:
+        goal = Plan.Goal(stations=["infeed_pick"], options=PlanOptions(planning_time=60.0))
+        futures = [ros_executor.run(lambda: client.send_goal_async(goal)) for _ in range(count)]
+        wait_for(lambda: all(future.done() for future in futures), timeout=30.0, what="goals are accepted")
+        return [future.result() for future in futures]
+
+    return goals
+
+
+def test_eight_plans_hold_up_no_quick_request_and_all_end(
+    send: Callable[[int], list[Any]], call: Callable[..., Any], ros_executor: Any, wait_for: Any
+) -> None:
+    results = [ros_executor.run(goal.get_result_async) for goal in send(8)]
+    assert call(CheckState, "check_state", state=STATE, timeout=30.0).valid
+    assert not all(future.done() for future in results), "the plans ended first: nothing was shown"
+    wait_for(lambda: all(future.done() for future in results), timeout=120.0, what="all plans end")
+    programs = {future.result().result.program_id for future in results}
+    assert {future.result().result.status.code for future in results} == {Status.SUCCESS}
+    assert len(programs) == 1
+
+
+def test_a_plan_that_waits_is_cancelled_at_once(
+    send: Callable[[int], list[Any]], ros_executor: Any, wait_for: Any
+) -> None:
+    first, *_, last = send(3)
+    answer = ros_executor.run(last.get_result_async)
+    ros_executor.run(last.cancel_goal_async)
+    wait_for(answer.done, timeout=30.0, what="the cancelled goal ends")
+    assert answer.result().status == CANCELLED
+    assert answer.result().result.status.code == Status.PREEMPTED
+    others = [ros_executor.run(goal.get_result_async) for goal in (first, *_)]
+    wait_for(lambda: all(future.done() for future in others), timeout=120.0, what="the others end")
+    assert {future.result().result.status.code for future in others} == {Status.SUCCESS}
+
+
+def test_more_plans_than_may_wait_are_refused_in_words(
+    send: Callable[[int], list[Any]],
+    planner_node: PlannerNode,
+    ros_executor: Any,
+    wait_for: Any,
+) -> None:
+    planner_node._goals._most = 1
+    results = [ros_executor.run(goal.get_result_async) for goal in send(4)]
+    wait_for(lambda: all(future.done() for future in results), timeout=120.0, what="all goals end")
+    statuses = [future.result().result.status for future in results]
+    assert [status.code for status in statuses].count(Status.SUCCESS) == 2
+    refused = [status.message for status in statuses if status.code != Status.SUCCESS]
+    assert all("wait already" in sentence for sentence in refused)
+    assert planner_module._GOALS_WAITING > 1
+
+
+def test_four_hundred_calls_at_once_are_all_answered(
+    planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any
+) -> None:
+    clients = [
+        ros_executor.run(
+            lambda: ros_node.create_client(CheckState, "/ir_planner/check_state", qos_profile=SERVICE)
+        )
+        for _ in range(20)
+    ]
+    for client in clients:
+        wait_for(client.service_is_ready, what="check_state is offered")
+    begin = time.monotonic()
+    futures = [
+        ros_executor.run(lambda c=client: c.call_async(CheckState.Request(state=STATE)))
+        for _ in range(20)
+        for client in clients
+    ]
+    wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+    assert all(future.result().valid for future in futures), time.monotonic() - begin
