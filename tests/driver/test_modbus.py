@@ -38,7 +38,7 @@ def serve():
 
     def serve_one(simulation):
         driver = Driver(simulation)
-        server = ModbusServer("127.0.0.1", 0, driver, WATCHDOG)
+        server = ModbusServer("127.0.0.1", 0, driver.plc, WATCHDOG)
         client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=10)
         assert client.connect()
         opened.append((client, server, driver))
@@ -156,7 +156,7 @@ def test_while_hibernating_the_controller_does_not_answer_for_itself(make, serve
 def test_a_taken_port_is_an_error_with_its_number(make, serve):
     driver, _, port = serve(make())
     with pytest.raises(OSError, match=str(port)):
-        ModbusServer("127.0.0.1", port, driver, WATCHDOG)
+        ModbusServer("127.0.0.1", port, driver.plc, WATCHDOG)
 
 
 def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, plan, start, cell):
@@ -199,7 +199,7 @@ def test_a_plc_without_a_heartbeat_is_not_watched(make, serve):
 @pytest.fixture(scope="module")
 def endangered(make):
     driver = Driver(make(load="none"))
-    server = ModbusServer("127.0.0.1", 0, driver, WATCHDOG)
+    server = ModbusServer("127.0.0.1", 0, driver.plc, WATCHDOG)
     yield driver, server.port
     server.close()
     driver.close()
@@ -230,8 +230,8 @@ def test_five_thousand_connections_don_t_bring_the_server_down(endangered, frame
 
 def survive(endangered, frames, framed):
     driver, port = endangered
-    driver.write_inputs("service", {"hib": False})  # a request may have put the controller to sleep
-    driver.wake()
+    driver.plc.write_inputs("service", {"hib": False})  # a request may have put the controller to sleep
+    driver.plc.wake()
     with socket.create_connection(("127.0.0.1", port), timeout=2.0) as link:
         for body in frames:
             link.sendall(struct.pack(">HHHB", 1, 0, len(body) + 1, 1) + body if framed else body)

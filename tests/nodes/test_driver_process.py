@@ -69,3 +69,28 @@ def test_signals_end_it_cleanly_also_two(signals, wait_for):
         process.kill()
         node.destroy_node()
         context.try_shutdown()
+
+
+FAILING = """
+import sys
+from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.node import main
+
+step = Simulation.step
+
+def fails_after_a_second(self):
+    if self.steps > 1000:
+        raise SystemError("no such body")
+    step(self)
+
+Simulation.step = fails_after_a_second
+sys.exit(main())
+"""
+
+
+def test_a_plant_that_fails_ends_the_process_with_a_sentence_and_a_code():
+    words = [sys.executable, "-c", FAILING, *command()[3:]]
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=60.0)
+    assert ended.returncode == 1
+    assert "the plant has stopped: SystemError('no such body')" in ended.stderr
+    assert "Traceback" not in ended.stderr

@@ -4,6 +4,7 @@ DriverError
 ├── SettingsError (ValueError)        a setting out of its range
 ├── TrajectoryRefusedError            not executed; code of control_msgs/FollowJointTrajectory
 ├── RequestRefusedError               a request that cannot be met; code of moveit_msgs/MoveItErrorCodes
+├── PlantStoppedError                 nobody steps the simulation any more: the process ends
 ├── LinkError                         a link to the PLC that cannot be opened
 └── BackendError                      the physics gave up: not installed, disconnected or diverged
 """
@@ -35,6 +36,10 @@ class RequestRefusedError(DriverError):
     def __init__(self, code: StatusCode, sentence: str) -> None:
         super().__init__(sentence)
         self.code = code
+
+
+class PlantStoppedError(DriverError):
+    """Nobody steps the simulation any more."""
 
 
 class LinkError(DriverError):

@@ -18,20 +18,21 @@ class Entry(NamedTuple):
     values: dict[str, object]
 
 
-def report(simulation: Simulation, worst_lag: float) -> list[Entry]:
+def report(simulation: Simulation, worst_lag: float, failure: str = "") -> list[Entry]:
     """Controller, executor and plant; the controller's entries are STALE while it is off the network.
 
-    worst_lag [s]: longest delay of the plant's thread so far.
+    worst_lag [s]: longest delay of the plant's thread so far; failure: why it has ended.
     """
     reading = simulation.mains.meter.reading()
     plant = Entry(
         "ir_sim_driver: plant",
-        Level.ERROR if simulation.fault else Level.OK,
-        simulation.fault or "running",
+        Level.ERROR if failure or simulation.fault else Level.OK,
+        failure or simulation.fault or "running",
         {
             "plant time [s]": f"{simulation.time:.3f}",
             "energy [J]": f"{reading.energy:.1f}",
             "load": simulation.load.text,
+            "emergency stop": "latched" if simulation.stopped else "reset",
             "worst delay of the plant's thread [ms]": f"{worst_lag * 1e3:.2f}",
         },
     )
@@ -49,8 +50,8 @@ def _controller(simulation: Simulation) -> Entry:
     mode = simulation.modes.mode
     last = simulation.notices.last
     level, sentence = Level.OK, mode.name
-    if mode is Mode.EMERGENCY_STOP:
-        level, sentence = Level.ERROR, "emergency stop: release it, then recover"
+    if mode is Mode.EMERGENCY_STOP or simulation.stopped:
+        level, sentence = Level.ERROR, simulation.fault or "emergency stop: release it, then recover"
     elif last is not None and last.level is not Level.OK:
         level, sentence = last
     return Entry(

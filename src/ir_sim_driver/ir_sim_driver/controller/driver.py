@@ -6,9 +6,7 @@ a thread of their own, so that a long one does not keep anybody waiting.
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ir_description import Capsule, Cell, robot_urdf
@@ -18,18 +16,17 @@ from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
+from ir_sim_driver.controller.access import Access
 from ir_sim_driver.controller.diagnostics import Entry, report
 from ir_sim_driver.controller.frames import Frame, Frames
 from ir_sim_driver.controller.goals import Goals
+from ir_sim_driver.controller.plc_side import PlcSide
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried
-from ir_sim_driver.plc import Readout
-
-_POWER_WINDOW = 0.01  # s; the mean power that a PLC reads is over at least one period of power_state
-_ALIVE_STEPS = 100  # a PLC that polls at 10 Hz or slower sees every change of the alive counter
+from ir_sim_driver.plc import STOP_BIT
 
 
 @dataclass(frozen=True)
@@ -50,20 +47,21 @@ class Bodies:
 
 
 class Driver:
-    """Runs `simulation`, `steps` of its steps per tick. It is also the controller that links talk to.
+    """Runs `simulation`, `steps` of its steps per tick.
 
-    wake_hint: what wakes the controller, for sentences.
+    plc: what links and the PLC's topic talk to. wake_hint: what wakes the controller, for sentences.
     """
 
     def __init__(
         self, simulation: Simulation, steps: int = 2, wake_hint: str = "a Wake-on-LAN packet"
     ) -> None:
-        self._simulation, self._steps, self._wake_hint = simulation, steps, wake_hint
-        self._lock = threading.Lock()
+        self._simulation, self._steps = simulation, steps
+        self._access = Access(simulation, wake_hint)
+        self._lock = self._access.lock
         self._stamp = 0
         self._goals = Goals(simulation, self._lock, lambda: self._stamp)
         self._frames = Frames(simulation, steps)
-        self._power = (0.0, 0.0, 0.0)  # mean W, and energy [J] and time [s] of its last reading
+        self.plc = PlcSide(self._access)
         self.joint_names = tuple(simulation.robot.joint_names)
 
     def close(self) -> None:
@@ -74,13 +72,26 @@ class Driver:
         """Let the steps of a tick pass, which ends at the stamp [ns]."""
         with self._lock:
             self._stamp = stamp_ns
-            for _ in range(self._steps):
-                self._simulation.step()
-            calls = self._goals.take_calls(self._simulation.take_outcomes())
-            frame = self._frames.take(stamp_ns)
+            try:
+                for _ in range(self._steps):
+                    self._simulation.step()
+                calls = self._goals.take_calls(self._simulation.take_outcomes())
+                frame = self._frames.take(stamp_ns)
+            except Exception as error:
+                self._access.failure = f"the plant has stopped: {error!r}"
+                self._simulation.notices.add(Level.ERROR, self._access.failure)
+                raise
         for ended, outcome in calls:
             ended(outcome)
         return frame
+
+    def fail(self, sentence: str) -> None:
+        """Nobody ticks any more: refuse all requests with this sentence, and end all goals."""
+        with self._lock:
+            self._access.failure = self._access.failure or sentence
+            calls = self._goals.drop(self._access.failure)
+        for ended, outcome in calls:
+            ended(outcome)
 
     # -- movements ------------------------------------------------------------------------------------------
 
@@ -118,6 +129,11 @@ class Driver:
             self._simulation.set_execution(settings)
 
     @property
+    def failure(self) -> str:
+        """Why the simulation is not stepped any more, "" while it is."""
+        return self._access.failure
+
+    @property
     def max_points(self) -> int:
         """Longest trajectory, in points."""
         return self._simulation.settings.execution.max_points
@@ -133,9 +149,10 @@ class Driver:
     def press(self, writer: str, name: str, level: bool) -> tuple[PlcInputs, str]:
         """Set one bit, or the mode switch by the name of its position.
 
-        Returns the levels and a remark: why the bit will not count.
+        Returns the levels and a remark: why the bit will not count. A pressed emergency stop is latched in
+        every mode, asleep too, and has been acted upon when this returns.
         """
-        with self._online() as simulation:
+        with self._access.online(asleep_too=name == STOP_BIT and level) as simulation:
             plc = simulation.plc
             try:
                 plc.raw.with_bit(name, level)
@@ -145,98 +162,35 @@ class Driver:
                 plc.turn_switch(writer, OperatingMode[name])
             else:
                 plc.write(writer, {name: level})
+                simulation.heed_stop()
             return plc.raw, plc.remark(name, simulation.pauses.rest is not None)
 
     def start_pause(self, seconds: float) -> PowerMode:
         """Start a PROFIenergy pause; the mode that was chosen."""
-        with self._online() as simulation:
+        with self._access.online() as simulation:
             return simulation.pauses.start(seconds, simulation.executor.active)
 
     def end_pause(self) -> float:
         """End the pause; seconds until motors are on."""
-        with self._online() as simulation:
+        with self._access.online() as simulation:
             return simulation.pauses.end()
 
     def query_modes(self) -> tuple[tuple[PowerMode, ...], Mode]:
         """All modes with the present load and posture, and the present mode."""
-        with self._online() as simulation:
+        with self._access.online() as simulation:
             return simulation.pauses.query_modes(), simulation.modes.mode
 
     def recover(self) -> str:
         """Leave the emergency stop; a remark."""
-        with self._online() as simulation:
+        with self._access.online() as simulation:
             return simulation.recover()
 
     def set_load(self, load: Callable[[Cell], Carried]) -> Carried:
         """Carry what `load` makes of the cell, from now on."""
-        with self._online() as simulation:
+        with self._access.online() as simulation:
             carried = load(simulation.cell)
             simulation.set_load(carried)
             return carried
-
-    # -- what the PLC may do: plc.Controller ----------------------------------------------------------------
-
-    def readout(self) -> Readout | None:
-        """Present outputs; None while the controller is off the network."""
-        with self._lock:
-            simulation = self._simulation
-            if not simulation.on_the_network:
-                return None
-            simulation.mains.settle()
-            reading, modes = simulation.mains.meter.reading(), simulation.modes
-            power, energy, time = self._power
-            if reading.time - time >= _POWER_WINDOW:
-                power = (reading.energy - energy) / (reading.time - time)
-                self._power = (power, reading.energy, reading.time)
-            return Readout(
-                simulation.outputs(),
-                modes.mode,
-                modes.target,
-                modes.time_to_target,
-                modes.time_to_ready(),
-                power,
-                reading.energy,
-                simulation.steps // _ALIVE_STEPS,
-            )
-
-    def inputs(self) -> PlcInputs:
-        """Levels of the PLC inputs as they were written last."""
-        with self._lock:
-            return self._simulation.plc.raw
-
-    def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
-        """Set these levels, the others stay. Raises RequestRefusedError."""
-        with self._noting() as simulation:
-            simulation.plc.write(writer, levels)
-
-    def write_all_inputs(self, writer: str, inputs: PlcInputs) -> None:
-        """Set all levels at once. Raises RequestRefusedError."""
-        with self._noting() as simulation:
-            simulation.plc.write_all(writer, inputs)
-
-    def write_operating_mode(self, writer: str, mode: OperatingMode) -> None:
-        """Turn the mode switch. Raises RequestRefusedError."""
-        with self._noting() as simulation:
-            simulation.plc.turn_switch(writer, mode)
-
-    def request_pause(self, seconds: float) -> None:
-        """Start a PROFIenergy pause, or end it with 0. Raises RequestRefusedError."""
-        with self._lock:
-            pauses, executor = self._simulation.pauses, self._simulation.executor
-            if seconds == 0.0:
-                pauses.end()
-            else:
-                pauses.start(seconds, executor.active)
-
-    def heartbeat(self, timeout: float) -> None:
-        """The PLC is alive; from the first one on it is watched, `timeout` [s] in plant time."""
-        with self._lock:
-            self._simulation.watch.beat(self._simulation.time, timeout)
-
-    def wake(self) -> None:
-        """Wake the controller from hibernation; does nothing otherwise."""
-        with self._lock:
-            self._simulation.wake()
 
     # -- what people see ------------------------------------------------------------------------------------
 
@@ -248,7 +202,9 @@ class Driver:
     def snapshot(self, worst_lag: float) -> Snapshot:
         """Notices since the last snapshot, and the state; worst_lag [s] of whoever ticks."""
         with self._lock:
-            return Snapshot(self._simulation.notices.take(), report(self._simulation, worst_lag))
+            return Snapshot(
+                self._simulation.notices.take(), report(self._simulation, worst_lag, self._access.failure)
+            )
 
     def description(self) -> str:
         """URDF of the robot with what it carries."""
@@ -263,24 +219,3 @@ class Driver:
         poses = self._simulation.tool.chain.link_poses(q[None])[0]
         of_load = tuple(capsule for item in load.loads for capsule in item.capsules)
         return Bodies(poses, tuple(self._simulation.robot.capsules), of_load)
-
-    @contextmanager
-    def _online(self) -> Iterator[Simulation]:
-        with self._lock:
-            simulation = self._simulation
-            if not simulation.on_the_network:
-                raise RequestRefusedError(
-                    StatusCode.INVALID_ROBOT_STATE,
-                    f"the controller is off the network ({simulation.modes.mode.name}): "
-                    f"only {self._wake_hint} wakes it",
-                )
-            yield simulation
-
-    @contextmanager
-    def _noting(self) -> Iterator[Simulation]:
-        with self._lock:
-            try:
-                yield self._simulation
-            except RequestRefusedError as error:
-                self._simulation.notices.add(Level.WARN, str(error))
-                raise

@@ -24,6 +24,7 @@ class Goals:
         self._simulation, self._lock, self._now = simulation, lock, now
         self._checker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="trajectory_checks")
         self._tickets = 0
+        self._dead = ""
         self._pending: set[int] = set()  # tickets of goals that are not started yet
         self._canceled: set[int] = set()  # those of them that are to be stopped at once
         self._running: dict[int, int] = {}  # ids of started goals by ticket
@@ -42,11 +43,13 @@ class Goals:
         with self._lock:
             self._tickets += 1
             ticket = self._tickets
-            full = len(self._pending) >= QUEUE_MAX
-            if not full:
+            refusal = self._dead
+            if not refusal and len(self._pending) >= QUEUE_MAX:
+                refusal = f"{QUEUE_MAX} trajectories are waiting to be checked: send fewer"
+            if not refusal:
                 self._pending.add(ticket)
-        if full:
-            ended(_refused(f"{QUEUE_MAX} trajectories are waiting to be checked: send fewer"))
+        if refusal:
+            ended(_refused(refusal))
         else:
             self._checker.submit(self._check_and_start, ticket, read, ended)
         return ticket
@@ -72,6 +75,14 @@ class Goals:
                 calls.append((ended, outcome))
         return calls
 
+    def drop(self, sentence: str) -> list[tuple[Ended, Outcome]]:
+        """End all goals that were started, and refuse those that were not. The lock is held."""
+        self._dead = sentence
+        calls = [(ended, _refused(sentence)) for _, ended in self._waiting.values()]
+        self._waiting.clear()
+        self._running.clear()
+        return calls
+
     def _check_and_start(self, ticket: int, read: Read, ended: Ended) -> None:
         refusal = None
         try:
@@ -84,7 +95,9 @@ class Goals:
             self._pending.discard(ticket)
             canceled = ticket in self._canceled
             self._canceled.discard(ticket)
-            if refusal is None:
+            if self._dead:
+                refusal = _refused(self._dead)
+            elif refusal is None:
                 try:
                     goal_id = self._simulation.execute(vetted, self._now())
                 except TrajectoryRefusedError as error:

@@ -15,14 +15,15 @@ class Latches:
 
     def react(self, plc: Plc) -> bool:
         """Take the edges of this step; returns whether motors are asked for."""
-        pressed = plc.levels.emergency_stop
         if plc.levels.drives_off:
             self.drives_off = True
         asked = plc.drives_on and not plc.levels.drives_off
         if asked:
             self.drives_off = False
-            self.recover = self.recover or (self._confirmed and not pressed)
-        if plc.confirm and not pressed:
+            if self._confirmed and not plc.pressed:
+                plc.reset_stop()
+                self.recover = True
+        if plc.confirm and not plc.pressed:
             self._confirmed = True
         self.restart = self.restart or plc.restart
         return asked

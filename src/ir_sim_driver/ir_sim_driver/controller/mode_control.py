@@ -59,6 +59,8 @@ class ModeControl:
         if self.modes.motors_on:
             self.pauses.wants_motors = False
         latches, before = self.latches, self.modes.mode
+        if emergency:
+            latches.recover = False
         self.modes.step(
             dt,
             Demand(
@@ -82,7 +84,7 @@ class ModeControl:
     def refusal(self) -> str:
         """Why no movement may start now, "" when it may."""
         mode, plc = self.modes.mode, self._plc
-        if mode is Mode.EMERGENCY_STOP or plc.levels.emergency_stop:
+        if mode is Mode.EMERGENCY_STOP or plc.stopped:
             return "emergency stop: release it and recover first"
         if mode not in DRIVES_ON:
             return f"drives not powered ({mode.name})"
@@ -105,7 +107,7 @@ class ModeControl:
             ab=mode in (Mode.BUS_POWER_OFF, Mode.TO_HIBERNATION),
             bbs=mode in (*READY, Mode.STAND_ON_BRAKES) and not self.latches.drives_off,
             drives_ready=self.modes.motors_on,
-            alarm_stop=not plc.levels.emergency_stop and mode is not Mode.EMERGENCY_STOP,
+            alarm_stop=not plc.stopped and mode is not Mode.EMERGENCY_STOP,
             in_home=in_home,
             moving=mode is Mode.MOVING,
             operating_mode=plc.operating_mode,

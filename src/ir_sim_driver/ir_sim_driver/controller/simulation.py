@@ -94,6 +94,11 @@ class Simulation:
         """Whether the controller answers; the mains meter always does."""
         return self.modes.mode not in OFF_THE_NETWORK
 
+    @property
+    def stopped(self) -> bool:
+        """Whether an emergency stop or a fault is latched: nothing moves until somebody recovers."""
+        return self.plc.stopped or bool(self.fault)
+
     # -- what may be asked ----------------------------------------------------------------------------------
 
     def vet(self, goal: TrajectoryGoal, now_ns: int) -> VettedGoal:
@@ -179,9 +184,9 @@ class Simulation:
 
         Returns a remark. Raises RequestRefusedError.
         """
-        if self.modes.mode is not Mode.EMERGENCY_STOP and not self.fault:
+        if self.modes.mode is not Mode.EMERGENCY_STOP and not self.stopped:
             return f"nothing to recover from: the mode is {self.modes.mode.name}"
-        if self.plc.raw.emergency_stop or self.plc.levels.emergency_stop:
+        if self.plc.pressed:
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE, "the emergency stop is still pressed: release it first"
             )
@@ -189,7 +194,10 @@ class Simulation:
             self.backend.reset(self.backend.q)
             self.executor.hold(self.backend.q)
             self.fault = ""
-        self.control.latches.recover = self.modes.mode is Mode.EMERGENCY_STOP
+        self.plc.reset_stop()
+        if self.modes.mode is not Mode.EMERGENCY_STOP:
+            return f"the emergency stop is reset; the mode is {self.modes.mode.name}"
+        self.control.latches.recover = True
         return "the brakes open where the robot stands; nothing resumes"
 
     def disturb(self, torque: FloatArray | None) -> None:
@@ -208,7 +216,7 @@ class Simulation:
     def step(self) -> None:
         """Let dt pass."""
         self._listen()
-        self._change_mode()
+        self._change_mode(self.settings.dt)
         try:
             self._move()
         except BackendError as error:
@@ -232,7 +240,12 @@ class Simulation:
             self.notices.add(Level.WARN, f"{self.watch.lost}; stopped on the path until it is back")
             self.abort(f"{self.watch.lost}; stopped on the path")
 
-    def _change_mode(self) -> None:
+    def heed_stop(self) -> None:
+        """Act at once on an emergency stop that was pressed between two steps."""
+        if self.stopped:
+            self._change_mode(0.0)
+
+    def _change_mode(self, dt: float) -> None:
         executor, control = self.executor, self.control
         active = executor.active
         if active:
@@ -240,10 +253,10 @@ class Simulation:
             if sentence:
                 self.abort(sentence)
         changed = control.step(
-            self.settings.dt,
+            dt,
             motion=active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
             standing=self._standing(),
-            emergency=self.plc.levels.emergency_stop or bool(self.fault),
+            emergency=self.stopped,
         )
         if changed is not None:
             self._mode_changed(*changed)
@@ -252,7 +265,7 @@ class Simulation:
         backend, executor = self.backend, self.executor
         if self.fault:
             backend.rest()
-        elif self.modes.mode is Mode.EMERGENCY_STOP:
+        elif self.modes.mode is Mode.EMERGENCY_STOP or (self.stopped and not self.modes.motors_on):
             self.emergency.step()
         elif self.modes.level is Mode.STAND_ON_MOTORS:
             backend.track(executor.advance(self._scaling(), self.modes.motors_on))

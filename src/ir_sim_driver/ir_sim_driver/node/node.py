@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -34,7 +35,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.running import run_node
 from ir_sim_driver.controller import Driver, Entry, Frame, Simulation, make_simulation
-from ir_sim_driver.errors import DriverError, LinkError
+from ir_sim_driver.errors import DriverError, LinkError, PlantStoppedError
 from ir_sim_driver.motion import ErrorCode, Outcome
 from ir_sim_driver.node.executions import Executions
 from ir_sim_driver.node.markers import robot_markers
@@ -57,6 +58,8 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STREAM = QoSProfile(depth=2000)
 _MARKERS_PERIOD, _DIAGNOSTICS_PERIOD = 0.05, 1.0  # s
 _LAG_MAX = 5.0  # s behind the clock beyond which the grid starts anew instead of catching up
+_LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
+REFUSALS = (DriverError, DescriptionError, MsgsError)
 _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
 
 
@@ -78,6 +81,7 @@ class SimDriver(Node):
         steps = round(1.0 / (options.joint_state_rate * simulation.settings.dt))
         self._driver = Driver(simulation, steps, configuration.wake_hint)
         self._frame: Frame | None = None
+        self._last_words = 0.0
         self._open_topics()
         self._open_requests()
         self._links = self._open_links()
@@ -88,7 +92,7 @@ class SimDriver(Node):
         return self._links[link].port if link in self._links else 0
 
     def destroy_node(self) -> None:
-        """Stop the plant, then the rest."""
+        """Stop the plant, then the rest. Raises PlantStoppedError when the plant had ended before."""
         self._plant.close()
         for link in self._links.values():
             link.close()
@@ -96,6 +100,8 @@ class SimDriver(Node):
         for action in self._actions:
             action.destroy()
         super().destroy_node()
+        if self._driver.failure:
+            raise PlantStoppedError(self._driver.failure)
 
     def _open_topics(self) -> None:
         self._joint_states = self.create_publisher(JointState, names.JOINT_STATES, _STREAM)
@@ -143,7 +149,7 @@ class SimDriver(Node):
         for link in self._configuration.links:
             if link.wanted:
                 try:
-                    links[link.name] = link.open(self._driver)
+                    links[link.name] = link.open(self._driver.plc)
                 except LinkError as error:
                     self.get_logger().warning(str(error))
         return links
@@ -207,8 +213,15 @@ class SimDriver(Node):
             self._in_force.publish(plc_inputs_to_msg(frame.inputs))
 
     def _plant_failed(self, error: Exception) -> None:
+        self._driver.fail(f"the plant has stopped: {error!r}")
+        self._last_words = time.monotonic() + _LAST_WORDS
         if self.context.ok():
-            self.get_logger().fatal(f"the plant has stopped: {error!r}")
+            self.get_logger().fatal(self._driver.failure)
+            self._publish_diagnostics()
+
+    def goes_on(self) -> bool:
+        """Whether the plant runs, or has stopped so recently that goals are still being answered."""
+        return not self._driver.failure or time.monotonic() < self._last_words
 
     # topics in
 
@@ -222,7 +235,7 @@ class SimDriver(Node):
 
     def _on_plc_inputs(self, msg: PlcInputsMsg) -> None:
         try:
-            self._driver.write_all_inputs(TOPIC, plc_inputs_from_msg(msg))
+            self._driver.plc.write_all_inputs(TOPIC, plc_inputs_from_msg(msg))
         except (MsgsError, DriverError) as error:
             self._driver.warn(f"plc_inputs ignored: {error}")
 
@@ -272,4 +285,4 @@ def _diagnostic(entry: Entry) -> DiagnosticStatus:
 def main() -> int:
     """Spin the driver until it is interrupted."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
-    return run_node(names.SIM_DRIVER, SimDriver, refusals=(DriverError, DescriptionError, MsgsError))
+    return run_node(names.SIM_DRIVER, SimDriver, goes_on=SimDriver.goes_on, refusals=REFUSALS)

@@ -2,7 +2,7 @@
 
 from ir_sim_driver.plc.inputs import BITS, POWER_BITS, Plc, PlcSettings
 from ir_sim_driver.plc.links import LINKS, SERVICE, TOPIC, WRITERS
-from ir_sim_driver.plc.port import Controller, Link, OpenLink, Readout
+from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
 from ir_sim_driver.plc.wake_on_lan import WakeOnLan
 from ir_sim_driver.plc.watchdog import Watchdog
 
@@ -11,6 +11,7 @@ __all__ = [
     "LINKS",
     "POWER_BITS",
     "SERVICE",
+    "STOP_BIT",
     "TOPIC",
     "WRITERS",
     "Controller",

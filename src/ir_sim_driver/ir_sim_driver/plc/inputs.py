@@ -17,9 +17,10 @@ from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plc.links import WRITERS
+from ir_sim_driver.plc.port import STOP_BIT
 
 OWNERS = ("any", *WRITERS)
-RESTART_BIT, STOP_BIT = "ks", "emergency_stop"
+RESTART_BIT = "ks"
 POWER_BITS = (*REST_OF_BIT, RESTART_BIT)
 BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
 
@@ -60,6 +61,7 @@ class Plc:
     """Levels in, requests out; `step` lets time pass.
 
     levels: what counts now (debounced, without stuck bits). rest: BUS_POWER_OFF, HIBERNATION or None.
+    stopped: the emergency stop was pressed, however shortly, and nobody has reset it since.
     drives_on, confirm, restart: rising edges seen in this step.
     """
 
@@ -71,6 +73,7 @@ class Plc:
         self.levels = PlcInputs(operating_mode=mode)
         self.operating_mode = mode
         self.rest: Mode | None = None
+        self.stopped = False
         self.drives_on = self.confirm = self.restart = False
         self._ages: dict[str, float] = {}
         self._stuck: frozenset[str] = frozenset()
@@ -168,7 +171,18 @@ class Plc:
         self._judge(pause_active)
         return True
 
+    @property
+    def pressed(self) -> bool:
+        """Whether the emergency stop is pressed now, or was within the debounce."""
+        return self.raw.emergency_stop or self.levels.emergency_stop
+
+    def reset_stop(self) -> None:
+        """Unlatch the emergency stop; only while it is not pressed."""
+        self.stopped = self.pressed
+
     def _set(self, bit: str, level: bool) -> None:
+        if bit == STOP_BIT and level:
+            self.stopped = True
         if level == getattr(self.raw, bit):
             return
         self.raw = self.raw.with_bit(bit, level)

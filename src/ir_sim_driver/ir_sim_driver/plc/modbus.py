@@ -30,12 +30,13 @@ from ir_sim_driver.plc.modbus_map import (
     discrete_inputs,
     input_registers,
 )
-from ir_sim_driver.plc.port import Controller
+from ir_sim_driver.plc.port import STOP_BIT, Controller
 
 _READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT = 1, 2, 3, 4
 _WRITE_COILS, _WRITE_HOLDING = (5, 15), (6, 16)
 _FUNCTIONS = (_READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT, *_WRITE_COILS, *_WRITE_HOLDING)
 _FUNCTION, _REFUSAL = 7, 0x80  # place of the function in a frame, mark of a refusal
+_STOP = COILS.index(STOP_BIT)
 _BITS = 16  # coils live in registers of 16
 
 
@@ -117,9 +118,9 @@ class ModbusServer:
     ) -> ExcCodes | None:
         """Bring the registers up to date before they are read, or act on what is written."""
         readout = self._controller.readout()
-        if readout is None:
-            return ExcCodes.DEVICE_FAILURE
         try:
+            if readout is None:
+                return self._answer_asleep(function, address, values)
             if function in _WRITE_COILS:
                 return self._write_coils(address, values or [])
             if function in _WRITE_HOLDING:
@@ -140,6 +141,18 @@ class ModbusServer:
         else:
             return ExcCodes.ILLEGAL_FUNCTION
         return None
+
+    def _answer_asleep(
+        self, function: int, address: int, values: Sequence[int | bool] | None
+    ) -> ExcCodes | None:
+        """Off the network nothing is heard but a pressed emergency stop, which is latched."""
+        if function in _WRITE_COILS and values is None:
+            return None  # pymodbus reads back what was written
+        values = values or []
+        pressed = function in _WRITE_COILS and 0 <= _STOP - address < len(values) and values[_STOP - address]
+        if pressed:
+            self._controller.write_inputs(MODBUS, {STOP_BIT: True})
+        return None if pressed and len(values) == 1 else ExcCodes.DEVICE_FAILURE
 
     def _levels(self) -> list[bool]:
         inputs = self._controller.inputs()

@@ -12,6 +12,9 @@ from typing import ClassVar, Protocol
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs, PlcOutputs
 
+STOP_BIT = "emergency_stop"
+"""The input that anybody may press, in every mode."""
+
 
 @dataclass(frozen=True)
 class Readout:
@@ -28,7 +31,10 @@ class Readout:
 
 
 class Controller(Protocol):
-    """What a link may do; whatever is refused raises DriverError. writer: the name of the link."""
+    """What a link may do; whatever is refused raises DriverError. writer: the name of the link.
+
+    A pressed emergency stop is never refused and latched in every mode, also while `readout` is None.
+    """
 
     def readout(self) -> Readout | None:
         """Present outputs; None while the controller is off the network."""
