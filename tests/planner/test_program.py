@@ -125,18 +125,6 @@ def test_the_same_program_has_the_same_id(demo: ProgramPlan, demo_cell: Cell, po
     assert planned(demo_cell, power, velocity_scaling=0.5).program_id != demo.program_id
 
 
-def test_a_cycle_time_is_filled_and_too_short_a_one_refused(demo_cell: Cell, power: PowerData) -> None:
-    free = planned(demo_cell, power, "home", "gauge_measure", "park")
-    longer = planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=10.0)
-    assert longer.report.duration == pytest.approx(10.0, abs=1e-4)
-    assert longer.report.certified
-    assert longer.report.peak_power < free.report.peak_power
-    with pytest.raises(RequestError, match="the shortest is"):
-        planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=1.0)
-    with pytest.raises(RequestError, match="at most 3600 s"):
-        planned(demo_cell, power, "home", "gauge_measure", "park", cycle_time=604_800.0)
-
-
 def test_a_program_takes_no_duration_of_a_movement(demo_cell: Cell, power: PowerData) -> None:
     with pytest.raises(RequestError, match="duration is 5 s: a program has a cycle_time"):
         planned(demo_cell, power, "home", "park", duration=5.0)

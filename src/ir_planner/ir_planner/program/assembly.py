@@ -1,5 +1,6 @@
 """The steps of a program as they are sent: movements with what is held, pauses with their power mode."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,11 +9,18 @@ from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.transitions import TransitionTimes
 
 from ir_planner.program.standby import pause_energy, plan_standby
+from ir_planner.program.route import Route
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
 from ir_planner.program.steps import PlacedStep, Scenes, signal_text
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
 
 AUTO = "AUTO"
+_KINDS = {
+    LEAVE: MovementKind.SERVICE_EXIT,
+    ACROSS: MovementKind.REGIONAL,
+    ENTER: MovementKind.SERVICE_ENTRY,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +32,6 @@ class Leg:
     scene: PlanningScene
     movements: tuple[tuple[MovementKind, Movement], ...]
 
-    def slower(self, factor: float) -> "Leg":
-        """The same leg with every movement stretched by `factor`, verified again."""
-        movements = tuple((kind, movement.stretched_by(factor)) for kind, movement in self.movements)
-        return Leg(self.from_name, self.to_name, self.scene, movements)
-
     def station_of(self, kind: MovementKind) -> str:
         """The station whose allowed contacts hold in a movement of this kind."""
         return {MovementKind.SERVICE_EXIT: self.from_name, MovementKind.SERVICE_ENTRY: self.to_name}.get(
@@ -36,9 +39,32 @@ class Leg:
         )
 
 
+Legs = dict[int, Leg]  # by the step they belong to
+
+
+def legs_of(route: Route, hops: list[list[Part]], movements: Mapping[Part, Movement]) -> Legs:
+    """The legs of a route from the movements of its parts, hop by hop."""
+    return {
+        step: Leg(
+            route.name(hop - 1),
+            route.name(hop),
+            route.arriving(hop),
+            tuple((_KINDS[part.kind], movements[part]) for part in hops[hop]),
+        )
+        for hop, step in enumerate(route.stops)
+    }
+
+
+def wait_at_end(
+    seconds: float, here: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+) -> PlannedMovement:
+    """The wait that fills a cycle, in the mode of least energy at q (n,)."""
+    return _pause(here, seconds, AUTO, q, scene, times)
+
+
 def assembled(
     steps: tuple[PlacedStep, ...],
-    legs: dict[int, Leg],
+    legs: Legs,
     scenes: Scenes,
     times: TransitionTimes,
     start: FloatArray,

@@ -1,52 +1,75 @@
-"""The movements of a program within a cycle time: stretched alike, or as fast as they can."""
+"""A program within a cycle time: the seconds there are go where they save most joules.
+
+The movements of the chain are known at several values of a second (time_values). From the fastest of all,
+parts are slowed down in the order of joules saved per second. Every stage of that is a program that ends
+early and waits, in the mode of least energy for the wait's length; the cheapest of them is the answer. What
+is left of the time is given to the next part in turn where that is cheaper than waiting.
+"""
 
 from collections.abc import Callable
-
-from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.status import StatusCode
-
-from ir_planner.errors import RequestError
-from ir_planner.program.assembly import Leg
-from ir_planner.request import DURATION_MAX
-
-Legs = dict[int, Leg]
-_SLACK = 1e-9  # relative: rounding of durations
+from dataclasses import dataclass
 
 
-def within_cycle(
-    cycle: float,
-    legs: Legs,
-    assemble: Callable[[Legs], tuple[PlannedMovement, ...]],
-    hurried: Callable[[], Legs],
-) -> tuple[PlannedMovement, ...]:
-    """The program in `cycle` s. assemble: steps of legs. hurried: the legs as fast as they can.
+from ir_planner.program.station_graph import Part
+from ir_planner.program.time_values import Point, SlowDown, TimeValues, slow_downs
+from ir_planner.timing import Movement
 
-    Raises RequestError for a cycle time that is too short, or that makes a movement too long.
+SHORTEST_WAIT = 0.05  # s: less is given to a movement, so that a program doesn't end with a twitch of a pause
+
+
+@dataclass(frozen=True, eq=False)
+class Timed:
+    """A movement for every part, how long to wait at the end [s], and all joules at the mains but those of
+    the pauses in the program.
     """
-    standing, moving = _seconds(assemble(legs))
-    wanted = cycle - standing
-    if wanted < moving:
-        legs = hurried()
-        standing, moving = _seconds(assemble(legs))
-    if wanted < moving * (1.0 - _SLACK):
-        raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"cycle_time is {cycle:g} s: the shortest is {moving + standing:.3f} s, "
-            f"of which {standing:.3f} s are pauses",
-        )
-    factor = wanted / moving if moving > 0.0 else 1.0
-    durations = [movement.trajectory.duration for leg in legs.values() for _, movement in leg.movements]
-    longest = factor * max(durations, default=0.0)
-    if longest > DURATION_MAX:
-        raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"cycle_time is {cycle:g} s: stretched to it, a movement would take {longest:.4g} s, at most "
-            f"{DURATION_MAX:g} s; a shorter cycle time with a pause in the program costs less",
-        )
-    return assemble({k: leg.slower(factor) for k, leg in legs.items()})
+
+    movements: dict[Part, Movement]
+    wait: float
+    energy: float
 
 
-def _seconds(planned: tuple[PlannedMovement, ...]) -> tuple[float, float]:
-    """How long a program stands and how long it moves [s]."""
-    standing = sum(movement.duration for movement in planned if movement.is_pause)
-    return standing, sum(movement.duration for movement in planned if not movement.is_pause)
+@dataclass(frozen=True, eq=False)
+class Task:
+    """seconds: for movements and the wait. waiting(seconds): joules of the wait. slower(movement, seconds):
+    the same in more seconds, None where that isn't certified.
+    """
+
+    seconds: float
+    waiting: Callable[[float], float]
+    slower: Callable[[Movement, float], Movement | None]
+
+
+def shared_out(values: TimeValues, task: Task) -> Timed | None:
+    """The cheapest distribution of the time over movements and wait; None where it is too short."""
+    fronts = values.fronts()
+    chosen = {part: front[0] for part, front in fronts.items()}
+    steps = slow_downs(fronts)
+    best: Timed | None = None
+    for count in range(len(steps) + 1):
+        left = task.seconds - sum(point.seconds for point in chosen.values())
+        if left < 0.0:
+            break
+        for timed in _filled(chosen, left, steps[count:], task):
+            if best is None or timed.energy < best.energy:
+                best = timed
+        if count < len(steps):
+            step = steps[count]
+            chosen = {**chosen, step.part: fronts[step.part][step.to]}
+    return best
+
+
+def _filled(chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task) -> list[Timed]:
+    """Programs of these points: one that waits at the end, and one in which a part takes the time left."""
+    movements = {part: point.movement for part, point in chosen.items()}
+    energy = sum(movement.report.energy for movement in movements.values())
+    found = [Timed(movements, left, energy + task.waiting(left))] if left >= SHORTEST_WAIT else []
+    last = bool(open_steps) and left <= open_steps[0].seconds
+    if not (last or not open_steps or left < SHORTEST_WAIT):
+        return found  # a whole step fits: that program comes next
+    part = open_steps[0].part if open_steps else max(chosen, key=lambda part: chosen[part].seconds)
+    before = movements[part]
+    after = task.slower(before, before.trajectory.duration + left)
+    if after is not None:
+        more = after.report.energy - before.report.energy
+        found.append(Timed({**movements, part: after}, 0.0, energy + more))
+    return found

@@ -8,27 +8,24 @@ with what is held at that moment.
 import hashlib
 
 import numpy as np
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
-from ir_msgs_py.report import MovementKind, PlannedMovement
+from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status
 
 from ir_planner.checks import total_report
-from ir_planner.program.assembly import Leg, assembled
+from ir_planner.program.assembly import Legs, assembled, legs_of, wait_at_end
 from ir_planner.program.chain import cheapest_chain, layers_of, parts_of
-from ir_planner.program.cycle_time import Legs, within_cycle
+from ir_planner.program.cycle_plan import Cycle, timed_chain
 from ir_planner.program.movements import Failure, Movements
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError
 from ir_planner.program.route import Route
-from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Chain
+from ir_planner.program.station_graph import ACROSS, Chain, Part
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.request import Context, Journal, Work
 from ir_planner.service import exit_searches
+from ir_planner.timing import Movement
 
-_KINDS = {
-    LEAVE: MovementKind.SERVICE_EXIT,
-    ACROSS: MovementKind.REGIONAL,
-    ENTER: MovementKind.SERVICE_ENTRY,
-}
 _CHOOSING = 8_000  # work of a movement while configurations are chosen; more of it improves the chosen ones
 
 
@@ -72,19 +69,40 @@ def _planned(
     movements = Movements(route, layers, context, request.settings.searches)
     improvement = min(context.work.improvement, _CHOOSING)
     chain = cheapest_chain(movements, improvement, progress)
-    _improve(movements, chain, improvement)
-    legs = _legs(movements, chain, improvement, progress)
-
-    def assemble(legs: Legs) -> tuple[PlannedMovement, ...]:
-        return assembled(route.steps, legs, route.scenes, request.settings.transitions, request.start)
-
-    def hurried() -> Legs:
-        faster = Movements(route, layers, context.asking("time"), request.settings.searches)
-        return _legs(faster, chain, improvement, progress)
-
     if request.cycle_time > 0.0:
-        return within_cycle(request.cycle_time, legs, assemble, hurried)
-    return assemble(legs)
+        return _within_cycle(request, movements, chain, improvement, progress)
+    _improve(movements, chain, improvement)
+    found = _movements_of(movements, chain, improvement, progress)
+    return _assembled(request, route, legs_of(route, parts_of(chain, movements), found))
+
+
+def _assembled(request: ProgramRequest, route: Route, legs: Legs) -> tuple[PlannedMovement, ...]:
+    return assembled(route.steps, legs, route.scenes, request.settings.transitions, request.start)
+
+
+def _within_cycle(
+    request: ProgramRequest, movements: Movements, chain: Chain, improvement: int, progress: Progress
+) -> tuple[PlannedMovement, ...]:
+    """The program in its cycle time, with a wait at the end where that costs least."""
+    route, times = movements.route, request.settings.transitions
+    last, end = route.name(len(route) - 1), route.scenes.of(route.steps[-1].after)
+
+    def waiting_place(chain: Chain) -> FloatArray:
+        return movements.layers[-1][chain.chosen[-1]].interaction
+
+    def waiting(chain: Chain, seconds: float) -> float:
+        return wait_at_end(seconds, last, waiting_place(chain), end, times).report.energy
+
+    free = _movements_of(movements, chain, improvement, progress)
+    planned = _assembled(request, route, legs_of(route, parts_of(chain, movements), free))
+    standing = sum(movement.duration for movement in planned if movement.is_pause)
+    cycle = Cycle(request.cycle_time, standing, waiting)
+    chain, timed = timed_chain(cycle, movements, chain, improvement, progress)
+    planned = _assembled(request, route, legs_of(route, parts_of(chain, movements), timed.movements))
+    if timed.wait <= 0.0:
+        return planned
+    wait = request.cycle_time - sum(movement.duration for movement in planned)
+    return (*planned, wait_at_end(wait, last, waiting_place(chain), end, times))
 
 
 def _improve(movements: Movements, chain: Chain, improvement: int) -> None:
@@ -98,18 +116,17 @@ def _improve(movements: Movements, chain: Chain, improvement: int) -> None:
             movements.better(across, more)
 
 
-def _legs(movements: Movements, chain: Chain, improvement: int, progress: Progress) -> Legs:
-    """Movements to every stop along a chain of configurations, by the step they belong to."""
-    route, legs, context = movements.route, {}, movements.context
-    parts = parts_of(chain, movements)
-    with context.journal.stage("movements") as notes:
-        for place, step in enumerate(route.stops):
-            progress("movements", place, len(route), chain.cost)
-            found = []
-            for part, movement in zip(parts[place], movements.plan(parts[place], improvement), strict=True):
-                if isinstance(movement, Failure):
-                    raise StageError(movement.status)
-                found.append((_KINDS[part.kind], movement))
-            legs[step] = Leg(route.name(place - 1), route.name(place), route.arriving(place), tuple(found))
-        notes.append(f"{sum(len(leg.movements) for leg in legs.values())} movements")
-    return legs
+def _movements_of(
+    movements: Movements, chain: Chain, improvement: int, progress: Progress
+) -> dict[Part, Movement]:
+    """Movements of all parts along a chain. Raises StageError where one of them isn't found."""
+    result: dict[Part, Movement] = {}
+    with movements.context.journal.stage("movements") as notes:
+        for hop, parts in enumerate(parts_of(chain, movements)):
+            progress("movements", hop, len(movements.route), chain.cost)
+            for part, found in zip(parts, movements.plan(parts, improvement), strict=True):
+                if isinstance(found, Failure):
+                    raise StageError(found.status)
+                result[part] = found
+        notes.append(f"{len(result)} movements")
+    return result

@@ -1,0 +1,165 @@
+"""A cycle time is a constraint: seconds go where they save most, judged by enumeration and by laws."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.transitions import TransitionTimes
+from ir_planner.errors import RequestError
+from ir_planner.program.cycle_time import Task, shared_out
+from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.standby import plan_standby
+from ir_planner.program.station_graph import Part
+from ir_planner.program.time_values import Point, TimeValues, convex_front
+from ir_planner.request.work import Work
+from ir_planner.scene.planning_scene import load_text, scene_with
+from ir_planner.timing import Movement
+
+from ir_description import Cell, PowerData
+
+BASE = 600.0  # W, while a program moves
+
+
+class Invented:
+    """What the distribution of time looks at, with invented seconds and joules."""
+
+    def __init__(self, seconds: float, joules: float) -> None:
+        self.seconds, self.joules = seconds, joules
+        self.trajectory = self.evaluation = self.report = self
+        self.duration, self.energy, self.base_energy = seconds, joules + BASE * seconds, BASE * seconds
+
+
+def invented(seconds: float, joules: float) -> Movement:
+    return cast(Movement, Invented(seconds, joules))
+
+
+class Values:
+    """Fronts of invented parts, in the place of TimeValues."""
+
+    def __init__(self, fronts: list[list[tuple[float, float]]]) -> None:
+        self.points = {
+            Part(k, "across", 0, 0): [Point.of(invented(*point)) for point in front]
+            for k, front in enumerate(fronts)
+        }
+
+    def fronts(self) -> dict[Part, list[Point]]:
+        """Convex ones."""
+        return {part: convex_front(points) for part, points in self.points.items()}
+
+    def slower(self, movement: Movement, seconds: float) -> Movement | None:
+        """On the front between its points, flat beyond the slowest."""
+        front = next(front for front in self.fronts().values() if any(p.movement is movement for p in front))
+        joules = np.interp(seconds, [p.seconds for p in front], [p.joules for p in front])
+        return invented(seconds, float(joules))
+
+
+@st.composite
+def invented_fronts(draw: st.DrawFn) -> list[list[tuple[float, float]]]:
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    fronts = []
+    for _ in range(draw(st.integers(1, 4))):
+        count = int(rng.integers(1, 5))
+        seconds = 1.0 + np.cumsum(rng.uniform(0.05, 0.5, count))
+        fronts.append(list(zip(seconds, rng.uniform(500.0, 3000.0, count), strict=True)))
+    return fronts
+
+
+@given(invented_fronts(), st.floats(0.0, 3.0), st.floats(50.0, 900.0))
+@settings(deadline=None)
+def test_no_choice_of_points_with_a_wait_costs_less(
+    fronts: list[list[tuple[float, float]]], more: float, watts: float
+) -> None:
+    values = Values(fronts)
+    seconds = sum(min(t for t, _ in front) for front in fronts) + more
+    task = Task(seconds, lambda left: watts * left, values.slower)
+    found = shared_out(cast(TimeValues, values), task)
+    assert found is not None
+    used = sum(cast(Any, movement).seconds for movement in found.movements.values())
+    assert used + found.wait == pytest.approx(seconds)
+    energy = sum(cast(Any, movement).energy for movement in found.movements.values())
+    assert found.energy == pytest.approx(energy + watts * found.wait)
+    for choice in itertools.product(*fronts):
+        total = sum(t for t, _ in choice)
+        if total <= seconds:
+            cost = sum(e + BASE * t for t, e in choice) + watts * (seconds - total)
+            assert found.energy <= cost + 1e-6 or (found.wait == 0.0 and seconds - total < 0.05)
+
+
+@given(invented_fronts())
+@settings(deadline=None)
+def test_a_front_is_convex_and_nothing_lies_below_it(fronts: list[list[tuple[float, float]]]) -> None:
+    for points in fronts:
+        front = convex_front([Point.of(invented(*point)) for point in points])
+        t, e = np.array([p.seconds for p in front]), np.array([p.joules for p in front])
+        assert (np.diff(t) > 0.0).all()
+        assert (np.diff(e) < 0.0).all()
+        assert (np.diff(np.diff(e) / np.diff(t)) >= -1e-9).all()
+        for seconds, joules in points:
+            assert joules >= np.interp(seconds, t, e) - 1e-9
+
+
+def test_too_short_a_time_has_no_answer() -> None:
+    values = Values([[(1.0, 100.0)], [(2.0, 100.0)]])
+    assert shared_out(cast(TimeValues, values), Task(2.9, lambda left: 0.0, values.slower)) is None
+
+
+STATIONS = ("home", "gauge_measure", "park")
+
+
+@pytest.fixture(scope="module")
+def planned(demo_cell: Cell, power: PowerData) -> Callable[[float], ProgramPlan]:
+    """The program in a cycle time [s], 0: free."""
+    known: dict[float, ProgramPlan] = {}
+
+    def plan(cycle_time: float) -> ProgramPlan:
+        if cycle_time not in known:
+            start, options = np.array(demo_cell.machine_home), PlanOptions(planning_time=60.0)
+            request = ProgramRequest(demo_cell, power, STATIONS, start, options, cycle_time)
+            work = Work(1_200_000, time.monotonic() + 180.0, time.monotonic)
+            known[cycle_time] = plan_program(request, work, lambda phase, done, total, cost: None)
+        return known[cycle_time]
+
+    return plan
+
+
+def test_a_little_less_time_costs_little_more(planned: Callable[[float], ProgramPlan]) -> None:
+    free = planned(0.0).report
+    shorter = planned(0.97 * free.duration).report
+    assert shorter.certified
+    assert shorter.duration == pytest.approx(0.97 * free.duration, abs=1e-4)
+    assert shorter.energy < 1.02 * free.energy
+
+
+def test_energy_over_cycle_time_keeps_the_law_of_waiting(
+    planned: Callable[[float], ProgramPlan], demo_cell: Cell, power: PowerData
+) -> None:
+    """E(T + d) <= E(T) + the cheapest wait of d; E of the drives never rises while nothing waits."""
+    free = planned(0.0).report.duration
+    scene, park = scene_with(demo_cell, load_text(demo_cell), power), np.array(demo_cell.park)
+    times = [0.97 * free, free, 1.1 * free, 1.3 * free, 2.0 * free, 40.0 * free]
+    energies = []
+    for cycle_time in times:
+        plan = planned(cycle_time)
+        assert plan.status.ok, plan.status.message
+        assert plan.report.certified
+        assert plan.report.duration == pytest.approx(cycle_time, abs=1e-4)
+        energies.append(plan.report.energy)
+    for (t0, e0), (t1, e1) in itertools.combinations(zip(times, energies, strict=True), 2):
+        wait = plan_standby(t1 - t0, park, scene, TransitionTimes()).energy
+        assert e1 <= 1.005 * (e0 + wait), (t0, t1)
+    assert planned(40.0 * free).movements[-1].power_mode == "BUS_POWER_OFF"
+
+
+def test_too_short_a_cycle_names_the_shortest(planned: Callable[[float], ProgramPlan]) -> None:
+    with pytest.raises(RequestError, match="the shortest is") as refused:
+        planned(1.0)
+    shortest = float(str(refused.value).split("the shortest is ")[1].split(" s")[0])
+    assert planned(shortest + 1e-3).status.ok
