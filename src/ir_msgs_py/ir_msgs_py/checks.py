@@ -83,3 +83,14 @@ def _spaced(unit: str) -> str:
 
 def _shape_text(shape: tuple[int | None, ...]) -> str:
     return "(" + ", ".join("any" if want is None else str(want) for want in shape) + ")"
+
+
+SENTENCE_MAX = 4000  # characters: the longest sentence of the project's own has about 1,500
+
+
+def one_line(text: str, limit: int = SENTENCE_MAX) -> str:
+    """The text as it may stand in answers, logs and diagnostics: one line, bounded, every control character
+    and lone surrogate escaped.
+    """
+    safe = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text[: limit + 1])
+    return safe if len(safe) <= limit else f"{safe[: limit - 3]}..."

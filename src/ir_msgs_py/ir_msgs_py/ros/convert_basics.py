@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 
 from ir_msgs.msg import Status as StatusMsg
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.checks import read_only
+from ir_msgs_py.checks import one_line, read_only
 from ir_msgs_py.errors import InvalidValueError, JointNamesError
 from ir_msgs_py.status import Status
 
@@ -46,8 +46,8 @@ def point_from_msg(msg: Point) -> FloatArray:
 
 
 def status_to_msg(status: Status) -> StatusMsg:
-    """Outcome of a request."""
-    return StatusMsg(code=int(status.code), message=status.message, source=status.source)
+    """Outcome of a request; its sentence bounded and without control characters."""
+    return StatusMsg(code=int(status.code), message=one_line(status.message), source=status.source)
 
 
 def status_from_msg(msg: StatusMsg) -> Status:

@@ -92,4 +92,4 @@ def improve(
 def _seed(seed: int, turn: int, name: str) -> int:
     """Another seed for every search of a request."""
     words = [seed % 2**63, turn, *name.encode()]
-    return int(np.random.SeedSequence(words).generate_state(1, np.uint64)[0] >> 1)
+    return int(np.random.SeedSequence(words).generate_state(1, np.uint64)[0]) >> 1
