@@ -53,15 +53,17 @@ WORDS = (
 )
 
 SUFFIXES = {".py", ".cpp", ".hpp", ".js", ".html", ".css", ".sh", ".md", ".yaml", ".msg", ".srv", ".action"}
-TREES = ("src", "benchmarks", "tools", "examples", "ros_ws", "docs", "docker")
+TREES = ("src", "tests", "benchmarks", "tools", "examples", "ros_ws", "docs", "docker")
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "Makefile")
 GENERATED = {"build", "install", "log", "__pycache__", "egg-info"}
 
 # Not rewritten yet; the list shrinks to nothing.
 PENDING: tuple[str, ...] = (
-    "src/ir_msgs_py",
     "src/ir_description",
     "src/ir_kernels",
+    "tests/kernels",
+    "tests/planner/test_optimization.py",
+    "tests/packaging/test_language.py",
 )
 
 GAP = r"[\s#/*_-]+"  # between two words: also the end of a commented line, or an underscore

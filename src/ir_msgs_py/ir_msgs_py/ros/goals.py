@@ -39,8 +39,8 @@ class GoalSender:
             raise ServiceUnavailableError(
                 f"nobody offers the action {action} (waited {response_timeout:g} s)"
             )
-        told = None if feedback is None else lambda message: feedback(message.feedback)
-        sent: Future = self._executor.run(lambda: client.send_goal_async(goal, feedback_callback=told))
+        on_feedback = None if feedback is None else lambda message: feedback(message.feedback)
+        sent: Future = self._executor.run(lambda: client.send_goal_async(goal, feedback_callback=on_feedback))
         if not self._executor.wait(sent, response_timeout):
             raise CallTimedOutError(f"{action} did not take the goal within {response_timeout:g} s")
         handle = sent.result()

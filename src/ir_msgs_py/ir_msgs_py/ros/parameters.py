@@ -125,7 +125,7 @@ def _default(each: Setting) -> Any:
         return array("d", each.default)
     if isinstance(each.default, tuple):
         if not each.default:
-            raise ParameterError(f"{each.name} is an empty list of texts: ROS can't tell its type")
+            raise ParameterError(f"{each.name} is an empty list of texts: ROS can't infer its type")
         return list(each.default)
     return each.default
 

@@ -102,16 +102,16 @@ def run_node(
 
 def _on_signals(act: Callable[[], None]) -> None:
     """Call `act` in a thread of its own at each SIGINT or SIGTERM, also while the main thread is in C."""
-    heard, told = os.pipe()
-    os.set_blocking(told, False)
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
 
     def listen() -> None:
-        while os.read(heard, 1):
+        while os.read(reading, 1):
             act()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _ignore)
-    signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     threading.Thread(target=listen, name="signals", daemon=True).start()
 
 
