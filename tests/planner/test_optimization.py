@@ -164,7 +164,7 @@ def test_where_pushing_fails_a_way_round_is_found_and_said(scene_of: SceneOf) ->
     plan = optimized(quintic(ends, 6.0, scene), scene, replace(OPTIONS, max_iterations=400_000))
     assert plan.status.ok, plan.status.message
     check_movement(plan.trajectory, ends, scene)
-    assert "ways round" in next(stage for stage in plan.info.stages if stage.name == "repair").note
+    assert "new paths" in next(stage for stage in plan.info.stages if stage.name == "repair").note
 
 
 @pytest.mark.usefixtures("no_descent")

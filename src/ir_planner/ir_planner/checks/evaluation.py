@@ -11,7 +11,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy
 from ir_planner.checks.verification import Verification, verify
-from ir_planner.scene import PlanningScene
+from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +29,15 @@ def evaluate_trajectory(
 ) -> Evaluation:
     """Verify and measure a trajectory with the loads of the scene."""
     verification = verify(trajectory, scene, safety_distance, station)
-    return measured(trajectory, scene, station, verification)
+    return measured(trajectory, scene, safety_distance, station, verification)
 
 
 def measured(
-    trajectory: JointTrajectory, scene: PlanningScene, station: str, verification: Verification
+    trajectory: JointTrajectory,
+    scene: PlanningScene,
+    safety_distance: float,
+    station: str,
+    verification: Verification,
 ) -> Evaluation:
     """The evaluation of a trajectory that has been verified."""
     energy = movement_energy(trajectory, scene)
@@ -46,7 +50,7 @@ def measured(
         base_energy=energy.base,
         burnt_energy=energy.dissipated,
         peak_power=energy.peak,
-        min_clearance=np.inf if clearance.smallest is None else clearance.smallest.distance,
+        min_clearance=_least_clearance(clearance, verification, safety_distance),
         closest=clearance.smallest,
         closest_time=clearance.smallest_time,
         velocity_ratio=verification.velocity,
@@ -58,6 +62,16 @@ def measured(
         contacts=clearance.contacts,
     )
     return Evaluation(report, verification, clearance, energy)
+
+
+def _least_clearance(
+    clearance: ClearanceProfile, verification: Verification, safety_distance: float
+) -> float:
+    """What is proved of the smallest distance [m]; where S_m is proved, that too. inf: no pair."""
+    if clearance.smallest is None:
+        return np.inf
+    proved = safety_distance - PROOF_TOLERANCE if verification.keeps_clear else -np.inf
+    return max(clearance.bound, proved)
 
 
 def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ...]) -> TrajectoryReport:

@@ -49,10 +49,14 @@ class FreeSpace:
         return self.scene.collision.certify_edges(q0, q1, self.threshold)
 
     def edges_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
-        """Which of the straight movements are proved free."""
-        if len(q0) == 0:
-            return np.zeros(0, dtype=bool)
-        return np.asarray(self.certificates(q0, q1).verdict == FREE)
+        """Which of the straight movements (N, n) to (N, n) are proved free; those are not for which no work
+        is left.
+        """
+        result = np.zeros(len(q0), dtype=bool)
+        count = min(len(q0), self.work.left)
+        if count:
+            result[:count] = self.certificates(q0[:count], q1[:count]).verdict == FREE
+        return result
 
     def paths_free(self, paths: list[FloatArray]) -> BoolArray:
         """Which paths (M_k, n) are free in all their steps; configurations are asked first, they are

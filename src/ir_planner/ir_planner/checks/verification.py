@@ -44,6 +44,12 @@ class Verification:
         return self.violation is None
 
     @property
+    def keeps_clear(self) -> bool:
+        """Every pair proved to keep its distance at every instant, whatever the limits."""
+        found = (self.violation, *self.others)
+        return all(violation is None or violation.what != "clearance" for violation in found)
+
+    @property
     def status(self) -> Status:
         """SUCCESS, or INVALID_MOTION_PLAN with the first violation and, after "also:", the other kinds: a
         small one at the start hides no collision.

@@ -151,12 +151,15 @@ class Refinement:
     def _optimised(self, solution: Solution, path: FloatArray, evaluations: int) -> Solution:
         work, robot, spline = self.context.work, self.context.scene.cell.robot, solution.spline
         work.check()
+        affordable = int(work.left / (EDGES_PER_INTERVAL * spline.intervals))
+        if affordable < 1:
+            return solution
         found = self._cost(solution, path).descend(
             spline.control,
             spline.interval,
             self._rows(spline),
             fixed_interval=self.context.options.duration > 0.0,
-            evaluations=evaluations,
+            evaluations=min(evaluations, affordable),
         )
         work.spend(int(np.ceil(found.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
         # a spline stays within the range of its control points

@@ -40,6 +40,11 @@ class Work:
             raise CancelledError("stopped on request")
 
     @property
+    def left(self) -> int:
+        """Edges that may still be certified."""
+        return max(self.max_iterations - self.iterations, 0)
+
+    @property
     def exhausted(self) -> bool:
         """Whether searches must end: by work, or cut by time (then `truncated`)."""
         if self.clock() >= self.deadline:

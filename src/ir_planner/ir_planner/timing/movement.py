@@ -67,7 +67,9 @@ class Movement:
     def evaluation(self) -> Evaluation:
         """Everything that is known about it."""
         context = self.context
-        return measured(self.trajectory, context.scene, context.station, self.verification)
+        return measured(
+            self.trajectory, context.scene, context.safety_distance, context.station, self.verification
+        )
 
     @property
     def report(self) -> TrajectoryReport:

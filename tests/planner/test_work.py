@@ -1,0 +1,28 @@
+"""A request costs no more work than it allows."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from asking import planned
+from ir_msgs_py.options import PlanOptions
+from ir_planner.request.work import Work
+from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.search import SEARCHES
+
+SceneOf = Callable[[str], PlanningScene]
+
+
+@pytest.mark.parametrize("planner_id", ["", *SEARCHES])
+@pytest.mark.parametrize("allowed", [1, 40, 700, 1500])
+def test_max_iterations_is_never_exceeded(planner_id: str, allowed: int, scene_of: SceneOf) -> None:
+    scene = scene_of("table_columns")
+    task = scene.cell.tasks[0]
+    work = Work(allowed, time.monotonic() + 600.0, time.monotonic, improvement=allowed)
+    options = PlanOptions(planner_id=planner_id)
+    plan = planned(np.array(task.start), np.array(task.goal), scene, options, work)
+    assert plan.info.iterations <= allowed
+    assert not plan.info.truncated
