@@ -32,7 +32,7 @@ from ir_description import PowerData
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]
 TASK = "conv->p1"
-OPTIONS = PlanOptions(planning_time=600.0, max_iterations=4000)  # a main descent and little more
+OPTIONS = PlanOptions(planning_time=600.0, max_iterations=16_000)  # a main descent and little more
 ROUNDING = 1e-6  # s
 
 
@@ -233,7 +233,7 @@ def test_a_duration_that_is_too_short_is_refused_with_the_shortest(
     detour: JointTrajectory, scene: PlanningScene
 ) -> None:
     with pytest.raises(RequestError, match=r"duration is 0.5 s: the shortest .* is 0\.\d+ s"):
-        optimized(detour, scene, replace(OPTIONS, duration=0.5))
+        optimized(detour, scene, replace(OPTIONS, duration=0.5, max_iterations=100_000))
 
 
 def test_scalings_bound_the_answer(detour: JointTrajectory, scene: PlanningScene) -> None:

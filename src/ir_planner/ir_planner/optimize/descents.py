@@ -5,7 +5,16 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_planner.curves import UniformSpline, along_motion, along_path, evenly_spaced, fewest_seconds
-from ir_planner.optimize.refinement import FEWEST, MOST, SLOWER, SPACING, THOROUGH, Refinement, Solution
+from ir_planner.optimize.refinement import (
+    EDGES_PER_INTERVAL,
+    FEWEST,
+    MOST,
+    SLOWER,
+    SPACING,
+    THOROUGH,
+    Refinement,
+    Solution,
+)
 from ir_planner.request import Context
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
@@ -91,9 +100,11 @@ class Descents:
         """
         work = self.context.work
         coarse: list[Solution] = []
-        for start in starts:
+        for k, start in enumerate(starts):
             if not coarse or not work.exhausted:
-                coarse.append(self._refinement.coarse_from(start, path, THOROUGH.coarse))
+                share = work.left / (EDGES_PER_INTERVAL * start.intervals * (len(starts) - k + _REFINED))
+                evaluations = max(min(THOROUGH.coarse, int(share)), 1)
+                coarse.append(self._refinement.coarse_from(start, path, evaluations))
         found: list[Movement] = []
         for solution in sorted(coarse, key=lambda solution: solution.cost)[:_REFINED]:
             if found and work.exhausted:

@@ -45,6 +45,7 @@ _ROUNDING = 1e-9  # relative
 _STIFFER = 10.0  # penalties where a duration is requested: a second may be worth much more than usual
 _ZONE_SAMPLES = 4  # per interval
 _WITHIN_REACH = 1.06  # of a requested duration: from there more effort may get to it
+_SHARE_OF_WORK = 0.4  # of what is left, that one descent may take: finer ones and repairs come after it
 EDGES_PER_INTERVAL = 0.25  # work of one evaluation, in certified edges: about what it takes beside one
 
 
@@ -151,7 +152,7 @@ class Refinement:
     def _optimised(self, solution: Solution, path: FloatArray, evaluations: int) -> Solution:
         work, robot, spline = self.context.work, self.context.scene.cell.robot, solution.spline
         work.check()
-        affordable = int(work.left / (EDGES_PER_INTERVAL * spline.intervals))
+        affordable = int(_SHARE_OF_WORK * work.left / (EDGES_PER_INTERVAL * spline.intervals))
         if affordable < 1:
             return solution
         found = self._cost(solution, path).descend(
