@@ -17,8 +17,8 @@ MODULES = {
     names.PLANNER: ["ir_planner.node"],
     names.SIM_DRIVER: ["ir_sim_driver.node", "--ros-args", "-p", "cell:=open", "-p", "wake_port:=0"],
     names.PROGRAM_RUNNER: ["ir_program_runner.node"],
-    names.RECORDER: ["ir_recorder.node", "FILE"],
-    "ir_play": ["ir_recorder.play.node", "FILE", "--loop", "--delay", "60"],
+    names.RECORDER: ["ir_recorder.node", "FILE", "--root", "/"],
+    "ir_play": ["ir_recorder.play.node", "FILE", "--root", "/", "--loop", "--delay", "60"],
 }
 INT, TERM = signal.SIGINT, signal.SIGTERM
 

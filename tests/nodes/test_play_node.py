@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+from mcap.writer import Writer
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
@@ -66,3 +69,83 @@ def test_a_loop_ends_when_it_is_asked_to(
     player.stop()
     assert not player.playing
     assert player.published > 0
+
+
+def with_commands(path: Path) -> Any:
+    session = RecordingSession(RecordingWriter(path), {}, START)
+    for topic in ("/ir_sim_driver/speed_scaling", "/value"):
+        session.open_topic(topic, "std_msgs/msg/Float64", [QosOffer()])
+        for k in range(5):
+            session.message(topic, serialize_message(Float64(data=float(k))), START + k * 1_000_000)
+    return read_raw(session.finish().path)
+
+
+def test_commands_are_left_out_unless_they_are_named(
+    ros_context: Any, ros_executor: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    recording = with_commands(tmp_path / "a.mcap")
+    for topics, count in (((), 5), (("/ir_sim_driver/*",), 0), (("/ir_sim_driver/speed_scaling",), 5)):
+        player = PlayNode(recording, PlaySettings(topics=topics), delay=0.0, context=ros_context)
+        player.start()
+        wait_for(lambda player=player: not player.playing)
+        assert player.published == count
+        assert player.failure == ""
+        player.destroy_node()
+
+
+def test_no_command_is_played_beside_a_driver(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    topic = "/ir_sim_driver/speed_scaling"
+    moved: list[float] = []
+    ros_node.create_subscription(Float64, topic, lambda m: moved.append(m.data), 100)
+    settings = PlaySettings(topics=(topic,))
+    player = PlayNode(with_commands(tmp_path / "a.mcap"), settings, delay=0.3, context=ros_context)
+    ros_executor.add_node(player)
+    wait_for(lambda: player.count_subscribers(topic))
+    player.start()
+    wait_for(lambda: not player.playing)
+    assert "is not played to a live robot" in player.failure
+    assert ros_node.get_name() in player.failure
+    assert moved == []
+
+
+def test_a_driver_that_comes_later_ends_playback(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    topic = "/ir_sim_driver/speed_scaling"
+    settings = PlaySettings(rate=0.05, loop=True, topics=(topic,))
+    player = PlayNode(with_commands(tmp_path / "a.mcap"), settings, delay=0.0, context=ros_context)
+    ros_executor.add_node(player)
+    player.start()
+    wait_for(lambda: player.playing)
+    ros_node.create_subscription(Float64, topic, lambda m: None, 100)
+    wait_for(lambda: not player.playing)
+    assert "would command" in player.failure
+
+
+def test_a_type_name_from_a_file_imports_nothing(
+    ros_context: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "stranger").mkdir()
+    (tmp_path / "stranger" / "__init__.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
+    (tmp_path / "stranger" / "msg.py").write_text("class Thing: pass")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "stranger")
+        for name in (
+            "stranger/msg/Thing",
+            "stranger.msg/msg/Thing",
+            "../stranger/msg/Thing",
+            "os/msg/system",
+        ):
+            schema = writer.register_schema(name, "ros2msg", b"int8 x")
+            channel = writer.register_channel(f"/t{schema}", "cdr", schema)
+            writer.add_message(channel, 1, b"\0\1\0\0\1", 1)
+        writer.finish()
+    player = PlayNode(read_raw(path), PlaySettings(), delay=0.0, context=ros_context)
+    player.destroy_node()
+    assert not (tmp_path / "ran").exists()
+    assert "stranger" not in sys.modules

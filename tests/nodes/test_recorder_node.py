@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
@@ -26,12 +28,16 @@ from ir_recorder.write.writer import RecordingWriter
 LATCHED = QoSProfile(
     depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
-FAST = {"discovery_period": 0.01}
 
 
 @pytest.fixture
-def recorder(ros_context: Any, ros_executor: Any) -> RecorderNode:
-    return ros_executor.add_node(RecorderNode(RecorderSettings(**FAST), context=ros_context))
+def settings(tmp_path: Path) -> RecorderSettings:
+    return RecorderSettings(discovery_period=0.01, roots=(str(tmp_path),))
+
+
+@pytest.fixture
+def recorder(ros_context: Any, ros_executor: Any, settings: RecorderSettings) -> RecorderNode:
+    return ros_executor.add_node(RecorderNode(settings, context=ros_context))
 
 
 @pytest.fixture
@@ -133,13 +139,48 @@ def test_a_missing_directory_is_named_and_not_made(recorder: RecorderNode, call:
 def test_a_taken_path_is_refused_and_the_node_lives_on(
     recorder: RecorderNode, call: Any, tmp_path: Path
 ) -> None:
-    taken = tmp_path / "taken.mcap"
-    taken.write_text("mine")
+    taken = RecordingWriter(tmp_path / "taken.mcap").finish().path
+    before = taken.read_bytes()
     refused = start(call, taken)
     assert refused.status.code == StatusCode.FAILURE
     assert "taken.mcap is there already" in refused.status.message
-    assert taken.read_text() == "mine"
+    assert taken.read_bytes() == before
     assert start(call, taken, overwrite=True).status.code == StatusCode.SUCCESS
+
+
+def test_a_request_writes_only_below_the_roots_and_replaces_only_recordings(
+    recorder: RecorderNode, call: Any, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    outside = tmp_path_factory.mktemp("outside")
+    (tmp_path / "link").symlink_to(outside)
+    notes = tmp_path / "notes.mcap"
+    notes.write_text("my only copy")
+    for path, sentence in (
+        (outside / "a.mcap", "lies outside of the folders"),
+        (tmp_path / "link" / "a.mcap", "lies outside of the folders"),
+        (notes, "another kind"),
+    ):
+        refused = start(call, path, overwrite=True)
+        assert refused.status.code == StatusCode.FAILURE
+        assert sentence in refused.status.message
+    assert list(outside.iterdir()) == []
+    assert notes.read_text() == "my only copy"
+
+
+def test_parameters_of_the_nodes_are_attached(
+    recorder: RecorderNode, ros_context: Any, ros_executor: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    planner = Node("ir_planner", context=ros_context)
+    planner.declare_parameter("safety_distance", 0.031)
+    planner.declare_parameter("names", ["a", "b"])
+    ros_executor.add_node(planner)
+    start(call, tmp_path / "p.mcap", topics=["/nothing"])
+    wait_for(lambda: recorder.attached("ir_planner.parameters.yaml"))
+    stop(call)
+    text = read_raw(tmp_path / "p.mcap").attachment("ir_planner.parameters.yaml")
+    values = yaml.safe_load(text)["/ir_planner"]["ros__parameters"]
+    assert values["safety_distance"] == 0.031
+    assert values["names"] == ["a", "b"]
 
 
 def test_a_second_start_names_the_running_recording(
@@ -159,15 +200,21 @@ def test_stop_without_a_recording_says_so(recorder: RecorderNode, call: Any) -> 
 
 
 def test_a_full_disk_ends_the_recording_and_nothing_else(
-    ros_context: Any, ros_executor: Any, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+    ros_context: Any,
+    ros_executor: Any,
+    ros_node: Any,
+    call: Any,
+    wait_for: Any,
+    tmp_path: Path,
+    settings: RecorderSettings,
 ) -> None:
     class FullWriter(RecordingWriter):
         def write(self, *arguments: Any, **others: Any) -> None:
             raise WriteError("No space left on device")
 
     node = RecorderNode(
-        RecorderSettings(**FAST),
-        lambda path, overwrite: FullWriter(path, overwrite=overwrite),
+        settings,
+        lambda path, overwrite, roots: FullWriter(path, overwrite=overwrite, roots=roots),
         context=ros_context,
     )
     ros_executor.add_node(node)
@@ -196,6 +243,7 @@ def test_the_planners_cell_is_attached(
     raw = read_raw(tmp_path / "cell.mcap")
     assert raw.attachment("cell.yaml") == b"name: here"
     assert raw.attachment("robot.urdf") == b"<robot/>"
+    assert "ir_planner" in raw.fact("packages")
 
 
 def test_an_unknown_cell_is_refused_before_a_file_is_made(recorder: RecorderNode, tmp_path: Path) -> None:
@@ -208,7 +256,16 @@ def test_an_unknown_cell_is_refused_before_a_file_is_made(recorder: RecorderNode
 def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wait_for: Any) -> None:
     path = tmp_path / "signals.mcap"
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
-    command = [sys.executable, "-m", "ir_recorder.node", str(path), "--topics", "/rosout"]
+    command = [
+        sys.executable,
+        "-m",
+        "ir_recorder.node",
+        str(path),
+        "--root",
+        str(tmp_path),
+        "--topics",
+        "/rosout",
+    ]
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE)
     try:
         wait_for(lambda: (path.exists() and path.stat().st_size) or process.poll() is not None, timeout=20.0)

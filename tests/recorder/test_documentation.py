@@ -27,4 +27,4 @@ def test_every_parameter_is_in_the_table() -> None:
 
 
 def test_the_table_of_bounds_is_that_of_the_settings() -> None:
-    assert settings_table(Tolerances).replace("Parameter", "Bound") in PAGE
+    assert settings_table(Tolerances()).replace("Parameter", "Bound") in PAGE

@@ -16,16 +16,21 @@ READING = {"errors", "format", "read"}
 KNOWS = {
     "errors": set(),
     "format": {"errors"},
+    "arguments": set(),
+    "diagnose": set(),
     "settings": {"errors"},
     "parameters": {"settings"},
     "write": {"errors", "format"},
     "read": {"errors", "format"},
     "listen": {"errors", "format"},
-    "play": READING,
+    "gather": {"format", "write"},
+    "play": READING | {"arguments"},
     "analysis": READING,
     "report": READING | {"analysis"},
-    "report_main": READING | {"analysis", "report"},
-    "node": {"errors", "format", "listen", "parameters", "settings", "write"},
+    "report_main": READING | {"analysis", "arguments", "report"},
+    "node": {
+        *("arguments", "diagnose", "errors", "format", "gather", "listen", "parameters", "settings", "write")
+    },
     "__init__": READING | {"analysis"},
 }
 FACE = {

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 import yaml
@@ -12,6 +14,7 @@ from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 
+from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.errors import PathError, WriteError
 from ir_recorder.read.raw import read_raw
 from ir_recorder.write.writer import RecordingWriter
@@ -42,7 +45,12 @@ def test_chunks_messages_and_attachments_are_indexed(demo_file: Path) -> None:
         summary = reader.get_summary()
     assert len(summary.chunk_indexes) > 1
     assert all(index.message_index_offsets for index in summary.chunk_indexes)
-    assert {index.name for index in summary.attachment_indexes} == {"cell.yaml", "robot.urdf"}
+    assert {index.name for index in summary.attachment_indexes} == {
+        "cell.yaml",
+        "power.yaml",
+        "robot.urdf",
+        "robot.yaml",
+    }
     assert sum(summary.statistics.channel_message_counts.values()) == summary.statistics.message_count
 
 
@@ -79,14 +87,41 @@ def test_times_never_run_back_but_for_a_clock_that_was_set_back(tmp_path: Path) 
     assert times == [5_000_000_000, 5_000_000_000, 6_000_000_000, 1_000_000_000, 1_100_000_000]
 
 
-def test_an_existing_file_is_kept_unless_it_may_be_replaced(tmp_path: Path) -> None:
-    path = tmp_path / "mine.mcap"
-    path.write_text("mine")
+def test_an_existing_recording_is_kept_unless_it_may_be_replaced(tmp_path: Path) -> None:
+    path = RecordingWriter(tmp_path / "mine.mcap").finish().path
+    before = path.read_bytes()
     with pytest.raises(PathError, match="is there already"):
         RecordingWriter(path)
-    assert path.read_text() == "mine"
+    assert path.read_bytes() == before
     RecordingWriter(path, overwrite=True).finish()
     assert path.read_bytes()[:5] == b"\x89MCAP"
+
+
+def test_overwrite_never_touches_what_is_no_recording(tmp_path: Path) -> None:
+    path = tmp_path / "notes.mcap"
+    path.write_text("my only copy")
+    with pytest.raises(PathError, match="file of another kind: it is not replaced"):
+        RecordingWriter(path, overwrite=True)
+    assert path.read_text() == "my only copy"
+
+
+def test_a_recording_stays_below_its_roots(tmp_path: Path) -> None:
+    inside, outside = tmp_path / "inside", tmp_path / "outside"
+    inside.mkdir()
+    outside.mkdir()
+    (inside / "link").symlink_to(outside)
+    roots = FileRoots.of([inside])
+    for path in (outside / "a.mcap", inside / ".." / "outside" / "a.mcap", inside / "link" / "a.mcap"):
+        with pytest.raises(PathError, match="lies outside of the folders"):
+            RecordingWriter(path, roots=roots)
+    assert list(outside.iterdir()) == []
+    RecordingWriter(inside / "a.mcap", roots=roots).finish()
+
+
+def test_a_fifo_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.mcap")
+    with pytest.raises(PathError, match="not a regular file"):
+        RecordingWriter(tmp_path / "pipe.mcap", overwrite=True)
 
 
 @pytest.mark.parametrize(
@@ -105,11 +140,13 @@ def test_paths_that_cannot_become_recordings_are_refused(name: str, sentence: st
         RecordingWriter(name)
 
 
-def test_a_full_disk_is_a_sentence_and_stays_one(tmp_path: Path) -> None:
-    path = tmp_path / "full.mcap"
-    path.symlink_to("/dev/full")
+def test_a_full_disk_is_a_sentence_and_stays_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: FileRoots, path: Path, replaces: bytes | None = None) -> BinaryIO:
+        return open("/dev/full", "wb")
+
+    monkeypatch.setattr(FileRoots, "open_to_write", full)
     with pytest.raises(WriteError, match=r"full\.mcap: No space left on device after 0 messages"):
-        RecordingWriter(path, overwrite=True)
+        RecordingWriter(tmp_path / "full.mcap")
 
 
 def test_a_writer_that_failed_refuses_further_messages(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ MsgsError
 │   │   └── JointNamesError           unknown, missing or double joint
 │   └── PoseError                     a pose that means nothing; knows the status code of the answer
 ├── MessageTextError (ValueError)     YAML text that is not the message it is said to be
+├── FileRefusedError                  a file outside of the allowed folders, or of another kind
 ├── UnknownTypeError                  no such message, service or action type
 ├── ParameterError (ValueError)       a parameter out of range or a settings class without its descriptions
 └── ClientError
@@ -49,6 +50,10 @@ class PoseError(InvalidValueError):
 
 class MessageTextError(MsgsError, ValueError):
     """YAML text that does not describe the message it is meant for."""
+
+
+class FileRefusedError(MsgsError):
+    """A file that may not be read or written; the sentence names the path and the allowed folders."""
 
 
 class UnknownTypeError(MsgsError):

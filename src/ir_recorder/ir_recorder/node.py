@@ -12,18 +12,21 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
-from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from ir_msgs.srv import GetCell, StartRecording, StopRecording
+from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import StatusCode
+from ir_recorder.arguments import add_roots
+from ir_recorder.diagnose.node import RecorderDiagnostics
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
+from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
+from ir_recorder.gather.node import CellRequest, ParameterRequests
 from ir_recorder.listen.node import Listener
 from ir_recorder.listen.topics import TopicSelection, single_type
 from ir_recorder.parameters import declared_settings
@@ -33,12 +36,12 @@ from ir_recorder.write.session import CellFiles, RecordingSession
 from ir_recorder.write.writer import RecordingSummary, RecordingWriter
 
 POLL_PERIOD = 0.02  # s: 10 joint states at a time; waking for each takes a third of a core
-OpenWriter = Callable[[str, bool], RecordingWriter]
+OpenWriter = Callable[[str, bool, FileRoots], RecordingWriter]
 
 
-def open_writer(path: str, overwrite: bool) -> RecordingWriter:
-    """The writer of a file; a test may hand in another."""
-    return RecordingWriter(path, overwrite=overwrite)
+def open_writer(path: str, overwrite: bool, roots: FileRoots) -> RecordingWriter:
+    """The writer of a file below `roots`; a test may hand in another."""
+    return RecordingWriter(path, overwrite=overwrite, roots=roots)
 
 
 class RecorderNode(Node):
@@ -55,9 +58,11 @@ class RecorderNode(Node):
         self._listener = Listener(self, self._settings.depth)
         self._passed_over: set[str] = set()
         self._failure = ""
-        self._cell_answer: Future | None = None
-        self._get_cell = self.create_client(GetCell, names.GET_CELL)
-        self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+        self._cell = CellRequest(self, self._attach)
+        self._parameters = ParameterRequests(
+            self, lambda name, text: self._write(lambda session: session.attach(name, text, self._now()))
+        )
+        self._diagnostics = RecorderDiagnostics(self)
         self.create_service(StartRecording, "~/start", self._on_start)
         self.create_service(StopRecording, "~/stop", self._on_stop)
         self.create_timer(self._settings.discovery_period, self._discover)
@@ -74,7 +79,11 @@ class RecorderNode(Node):
     @property
     def cell_attached(self) -> bool:
         """Whether the running recording holds the cell."""
-        return self._session is not None and self._session.cell_attached
+        return self.attached(contents.CELL)
+
+    def attached(self, name: str) -> bool:
+        """Whether the running recording holds an attachment of that name."""
+        return self._session is not None and self._session.holds(name)
 
     @property
     def unmet(self) -> tuple[str, ...]:
@@ -88,13 +97,23 @@ class RecorderNode(Node):
         """Why the last recording ended on its own, "" when it didn't."""
         return self._failure
 
-    def start(self, path: str, overwrite: bool = False, topics: Sequence[str] = (), cell: str = "") -> str:
-        """Opens a recording and returns its absolute path; PathError or WriteError when it can't."""
+    def start(
+        self,
+        path: str,
+        overwrite: bool = False,
+        topics: Sequence[str] = (),
+        cell: str = "",
+        roots: FileRoots | None = None,
+    ) -> str:
+        """Opens a recording below `roots` (None: those of the settings) and returns its absolute path.
+
+        PathError or WriteError when it can't.
+        """
         if self._session is not None:
             raise PathError(f"already recording into {self._session.path}; stop first")
         name = cell or self._settings.cell
         files = files_of_cell(name) if name else None
-        writer = self._open_writer(path, overwrite)
+        writer = self._open_writer(path, overwrite, roots or self._settings.file_roots)
         self._session = RecordingSession(writer, self._settings.named_facts, self._now())
         self._selection = TopicSelection(
             tuple(t for t in topics if t) or self._settings.wanted_topics, self.get_namespace()
@@ -103,6 +122,8 @@ class RecorderNode(Node):
         self._listener.lost, self._failure = 0, ""
         if files is not None:
             self._attach(files)
+        self._cell.begin()
+        self._parameters.begin()
         self._discover()
         self.get_logger().info(f"recording into {writer.path}{_without_publisher(self.unmet, 'is seen yet')}")
         return str(writer.path)
@@ -193,53 +214,38 @@ class RecorderNode(Node):
 
     def _collect(self) -> None:
         """Writes what has arrived since the last time."""
+        self._write(self._write_arrivals)
+
+    def _write_arrivals(self, session: RecordingSession) -> None:
+        for arrival in self._listener.take():
+            session.message(arrival.topic, arrival.data, arrival.time)
+
+    def _each_second(self) -> None:
+        self._ask()
+        path = self._session.path if self._session is not None else ""
+        self._diagnostics.publish(
+            self._failure, path, self.messages, len(self._listener), self._listener.lost
+        )
+
+    def _ask(self) -> None:
+        """Asks the planner for its cell and the nodes for their parameters, until they have answered."""
+        if self._session is None:
+            return
+        self._parameters.each()
+        if not self.cell_attached:
+            self._cell.each()
+
+    def _attach(self, files: CellFiles) -> None:
+        self._write(lambda session: session.attach_cell(files, self._now()))
+
+    def _write(self, act: Callable[[RecordingSession], None]) -> None:
+        """Acts on the running recording, if there is one; a storage that refuses ends it."""
         if self._session is None:
             return
         try:
-            for arrival in self._listener.take():
-                self._session.message(arrival.topic, arrival.data, arrival.time)
+            act(self._session)
         except WriteError as error:
             self._abandon(error)
-
-    def _each_second(self) -> None:
-        self._ask_for_cell()
-        status = DiagnosticStatus(name=self.get_name(), hardware_id="")
-        status.level = DiagnosticStatus.ERROR if self._failure else DiagnosticStatus.OK
-        if self._listener.lost and not self._failure:
-            status.level = DiagnosticStatus.WARN
-        session = self._session
-        status.message = self._failure or ("recording" if session is not None else "idle")
-        status.values = [
-            KeyValue(key="path", value=session.path if session else ""),
-            KeyValue(key="messages", value=str(session.messages if session else 0)),
-            KeyValue(key="topics", value=str(len(self._listener))),
-            KeyValue(key="lost", value=str(self._listener.lost)),
-        ]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
-
-    def _ask_for_cell(self) -> None:
-        """Asks the planner for its cell, until it has one, so that the recording can be read on its own."""
-        if self._session is None or self._session.cell_attached:
-            return
-        if self._cell_answer is not None and not self._cell_answer.done():
-            return
-        if self._get_cell.service_is_ready():
-            self._cell_answer = self._get_cell.call_async(GetCell.Request())
-            self._cell_answer.add_done_callback(self._on_cell)
-
-    def _on_cell(self, future: Future) -> None:
-        answer = future.result()
-        if answer is not None and answer.status.code == StatusCode.SUCCESS and answer.cell_yaml:
-            self._attach(CellFiles(answer.cell_yaml, answer.robot_description))
-
-    def _attach(self, files: CellFiles) -> None:
-        if self._session is not None:
-            try:
-                self._session.attach_cell(files, self._now())
-            except WriteError as error:
-                self._abandon(error)
 
     def _abandon(self, error: WriteError) -> None:
         self._failure = str(error)
@@ -268,13 +274,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--overwrite", action="store_true", help="replace the file")
     parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
     parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
+    add_roots(parser)
     options = parser.parse_args(remove_ros_args(["ir-record", *everything])[1:])
 
     def start() -> RecorderNode:
         node = RecorderNode()
         try:
             if options.path:
-                node.start(options.path, options.overwrite, options.topics, options.cell)
+                roots = FileRoots.of(options.roots) if options.roots else None
+                node.start(options.path, options.overwrite, options.topics, options.cell, roots)
         except BaseException:
             node.destroy_node()
             raise

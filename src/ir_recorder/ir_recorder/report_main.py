@@ -6,7 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.analysis import analyse, findings
+from ir_recorder.arguments import add_roots
 from ir_recorder.errors import RecorderError
 from ir_recorder.read.reader import read_recording
 from ir_recorder.report import write_report
@@ -17,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds what `run` reads."""
     parser.add_argument("file", help="recording (.mcap)")
     parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
+    add_roots(parser)
     parser.add_argument("--picture", default="", help="picture to write as well (.png)")
 
 
@@ -24,12 +28,13 @@ def run(options: argparse.Namespace) -> int:
     """Writes the page and prints its path; RecorderError when the file can't be read or the page not be
     written.
     """
-    analysis = analyse(read_recording(options.file))
+    roots = FileRoots.of(options.roots)
+    analysis = analyse(read_recording(options.file, roots))
     for problem in analysis.problems:
         sys.stderr.write(f"{options.file}: {problem}\n")
-    sys.stdout.write(f"{write_report(analysis, findings(analysis), options.output)}\n")
+    sys.stdout.write(f"{write_report(analysis, findings(analysis), options.output, roots=roots)}\n")
     if options.picture:
-        sys.stdout.write(f"{write_picture(analysis, options.picture)}\n")
+        sys.stdout.write(f"{write_picture(analysis, options.picture, roots)}\n")
     return 0
 
 
@@ -39,6 +44,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add_arguments(parser)
     try:
         return run(parser.parse_args(arguments))
-    except RecorderError as error:
+    except (RecorderError, MsgsError) as error:
         sys.stderr.write(f"ir-report: {error}\n")
         return 1

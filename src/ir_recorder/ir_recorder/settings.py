@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.settings import check_settings, setting
 from ir_recorder.errors import RecorderError
 
@@ -16,6 +17,11 @@ class RecorderSettings:
     overwrite: bool = setting(False, "Replace an existing file.", read_only=True)
     topics: tuple[str, ...] = setting(
         ("",), "Names or patterns of topics; empty: all topics of the cell.", read_only=True
+    )
+    roots: tuple[str, ...] = setting(
+        ("",),
+        "Folders below which recordings may be written; empty: IR_FILE_ROOTS, else the working folder.",
+        read_only=True,
     )
     cell: str = setting("", "Name or file of the cell to attach; empty: ask the planner.", read_only=True)
     facts: tuple[str, ...] = setting(
@@ -38,6 +44,11 @@ class RecorderSettings:
     def wanted_topics(self) -> tuple[str, ...]:
         """The names and patterns, empty for all topics of the cell."""
         return tuple(topic for topic in self.topics if topic)
+
+    @property
+    def file_roots(self) -> FileRoots:
+        """The folders below which recordings may be written."""
+        return FileRoots.of(self.roots)
 
     @property
     def named_facts(self) -> dict[str, str]:

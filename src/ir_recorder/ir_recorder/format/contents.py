@@ -6,10 +6,14 @@ from typing import Final
 
 CELL: Final = "cell.yaml"
 URDF: Final = "robot.urdf"
+ROBOT: Final = "robot.yaml"  # data of the robot that the cell names
+POWER: Final = "power.yaml"  # data of its controller
+PARAMETERS: Final = "{node}.parameters.yaml"
 FACTS: Final = "ir_recorder"  # metadata record
 VERSION: Final = "version"
 STARTED: Final = "started_ns"  # node clock at the start [ns]
-OWN_FACTS: Final = (VERSION, STARTED)  # written by the recorder itself; all others come from its parameter
+PACKAGES: Final = "packages"  # fact: versions of the project's packages and of those that decide numbers
+OWN_FACTS: Final = (VERSION, STARTED, PACKAGES)  # all others come from the recorder's parameter
 
 # facts with a meaning for the analysis; all others are only shown
 SAFETY_DISTANCE: Final = "safety_distance"  # S_m [m] that movements are planned with: "0.02 m"

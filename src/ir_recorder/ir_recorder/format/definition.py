@@ -9,8 +9,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from ir_recorder.errors import ReadError
+
 _NUMBERS = ("float32", "float64", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
-PRIMITIVES = frozenset(("bool", "byte", "char", "string", "wstring", *_NUMBERS))
+TEXTS = ("string", "wstring")
+PRIMITIVES = frozenset(("bool", "byte", "char", *TEXTS, *_NUMBERS))
+MOST_DEPTH = 32  # types inside types; those of ROS 2 reach 6
+MOST_FIELDS = 100_000  # of one message without its sequences; those of ROS 2 reach some hundreds
 SEPARATOR = "=" * 80
 _FIELD = re.compile(
     r"^(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[[^\]]*\])?\s+"
@@ -61,7 +66,36 @@ def definitions_of(name: str, text: str) -> dict[str, tuple[Field, ...]]:
         title, _, body = section.lstrip("\n").partition("\n")
         own = short_name(title.removeprefix("MSG:").strip())
         definitions[own] = fields_of(body, own.split("/", 1)[0])
+    _check_size(short_name(name), definitions, {}, ())
     return definitions
+
+
+def _check_size(
+    name: str, definitions: dict[str, tuple[Field, ...]], sizes: dict[str, int], above: tuple[str, ...]
+) -> int:
+    """Fields of one message of the type, arrays of fixed length counted out and at least one.
+
+    ReadError for a type that contains itself, is built too deep, or has too many fields: a reader that
+    walks it would not come to an end.
+    """
+    if name in sizes:
+        return sizes[name]
+    if name in above:
+        raise ReadError(f"the definition of {name[:80]} contains itself")
+    if len(above) >= MOST_DEPTH:
+        raise ReadError(f"the definition of {above[0][:80]} is built deeper than {MOST_DEPTH} types")
+    total = 1
+    for field in definitions.get(name, ()):
+        count = 1 if field.count is None or field.count < 0 else field.count
+        inner = 1 if field.primitive else _check_size(field.type, definitions, sizes, (*above, name))
+        values = 1 if field.primitive and field.type not in TEXTS else count
+        if count == 0:
+            raise ReadError(f"the definition of {name[:80]} has an array of no elements: {field.name[:80]}")
+        total += inner * values
+        if total > MOST_FIELDS:
+            raise ReadError(f"the definition of {name[:80]} has more than {MOST_FIELDS} fields")
+    sizes[name] = total
+    return total
 
 
 def short_name(name: str) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import yaml
 
+MOST_TEXT = 100_000  # characters of a channel's offers: one publisher takes 400
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}  # RMW_DURATION_INFINITE
 
 
@@ -62,9 +63,11 @@ def offers_to_yaml(offers: Sequence[QosOffer]) -> str:
 
 def offers_from_yaml(text: str) -> tuple[QosOffer, ...]:
     """Offers of a channel; names (version 9) and numbers (before) are understood, nonsense is no offer."""
+    if len(text) > MOST_TEXT:
+        return ()
     try:
         profiles = yaml.safe_load(text) if text else []
-    except yaml.YAMLError:
+    except (yaml.YAMLError, RecursionError):
         return ()
     if not isinstance(profiles, list):
         return ()

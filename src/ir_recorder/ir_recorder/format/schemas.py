@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,10 @@ from pathlib import Path
 
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.definition import SEPARATOR, fields_of
+
+# names of packages and types as ROS 2 has them: no path, no dot, nothing to import but an interface package
+_PACKAGE = re.compile(r"[a-z][a-z0-9_]{0,250}")
+_TYPE = re.compile(r"[A-Z][A-Za-z0-9_]{0,250}")
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,11 @@ def installed_prefixes() -> tuple[Path, ...]:
 
 def _split(name: str) -> tuple[str, str]:
     parts = name.split("/")
-    if len(parts) != 3 or not all(parts) or parts[1] != "msg":
+    if (
+        len(parts) != 3
+        or parts[1] != "msg"
+        or not (_PACKAGE.fullmatch(parts[0]) and _TYPE.fullmatch(parts[2]))
+    ):
         raise SchemaError(
             f"{name[:200]!r} is not a message type that recordings take: expected package/msg/Type"
         )

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from operator import attrgetter
 from typing import Any
 
@@ -17,6 +16,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from ir_msgs_py.errors import UnknownTypeError
+from ir_msgs_py.ros.types import interface_type
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.qos import QosOffer, request_for
 
@@ -140,8 +141,8 @@ def _offer(publisher: TopicEndpointInfo) -> QosOffer:
 
 
 def _message_type(name: str) -> Any:
-    package, kind, own = name.split("/")
+    """The class of an installed type; the session has looked its definition up before."""
     try:
-        return getattr(import_module(f"{package}.{kind}"), own)
-    except (ImportError, AttributeError) as error:
+        return interface_type(name, "msg")
+    except UnknownTypeError as error:
         raise SchemaError(f"type {name[:200]} isn't installed for Python: {error}") from error

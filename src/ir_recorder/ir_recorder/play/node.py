@@ -1,6 +1,7 @@
 """`ir-play`: publishes a recording's messages again, byte by byte, with their timing.
 
-The qualities of service are those that were offered; what was latched is latched again.
+The qualities of service are those that were offered; what was latched is latched again. Topics that command
+a robot or a machine are left out unless asked for by their full name, and then not beside a driver.
 """
 
 from __future__ import annotations
@@ -10,22 +11,30 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any
 
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 
+from ir_msgs_py import names
+from ir_msgs_py.errors import MsgsError, UnknownTypeError
+from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.running import run_node
-from ir_recorder.errors import RecorderError
+from ir_msgs_py.ros.types import interface_type
+from ir_recorder.arguments import add_roots
+from ir_recorder.errors import RecorderError, SchemaError
 from ir_recorder.format.qos import offers_from_yaml
+from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.play.commands import is_command
 from ir_recorder.play.player import Player
 from ir_recorder.play.schedule import DueMessage, PlaySettings
-from ir_recorder.read.raw import RawRecording, read_raw
+from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 
+LOOK_PERIOD = 0.1  # s between two looks for a driver: less than discovery takes
 DEPTH = 1000  # messages per topic: 2 s of joint states while a subscriber is busy
 
 
@@ -47,13 +56,13 @@ class PlayNode(Node):
         self._clock = self.create_publisher(Clock, "/clock", 10) if clock else None
         self._delay = delay
         self.published = 0
+        self._schemas = SchemaLibrary()
+        self._commands: list[str] = []
+        self._next_look = 0.0
+        self.failure = ""
         self._messages: list[tuple[int, str, bytes]] = []
         for channel in recording.channels:
-            if channel.message_encoding == "cdr" and channel.messages and settings.plays(channel.topic):
-                self._open(channel.topic, channel.type, channel.qos)
-            if channel.topic in self._feeds:
-                times = channel.log_time.tolist()
-                self._messages += zip(times, [channel.topic] * len(times), channel.messages, strict=True)
+            self._add(channel)
         self._thread = threading.Thread(target=self._play, name="ir_play", daemon=True)
 
     def start(self) -> None:
@@ -76,14 +85,27 @@ class PlayNode(Node):
         """Whether messages are still to come."""
         return self._thread.is_alive()
 
+    def _add(self, channel: RawChannel) -> None:
+        """Opens a channel's topic and takes its messages, where it can and may be played."""
+        if channel.message_encoding != "cdr" or not channel.messages:
+            return
+        if not self._settings.plays(channel.topic, channel.type):
+            if is_command(channel.topic, channel.type):
+                self.get_logger().info(f"{channel.topic[:200]} is a command: it is played only by its name")
+            return
+        self._open(channel.topic, channel.type, channel.qos)
+        if channel.topic in self._feeds:
+            times = channel.log_time.tolist()
+            self._messages += zip(times, [channel.topic] * len(times), channel.messages, strict=True)
+
     def _open(self, topic: str, type_name: str, qos: str) -> None:
         if topic in self._feeds:
             return
         try:
-            package, kind, own = type_name.split("/")
-            message_type = getattr(import_module(f"{package}.{kind}"), own)
-        except (ValueError, ImportError, AttributeError):
-            self.get_logger().warning(f"{topic} isn't played: type {type_name[:200]} isn't installed")
+            self._schemas.schema(type_name)  # an installed type: a name from a file imports nothing else
+            message_type = interface_type(type_name, "msg")
+        except (SchemaError, UnknownTypeError):
+            self.get_logger().warning(f"{topic[:200]} isn't played: type {type_name[:200]} isn't installed")
             return
         offers = offers_from_yaml(qos)
         reliable = all(offer.reliable for offer in offers)
@@ -93,16 +115,40 @@ class PlayNode(Node):
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )
-        self._feeds[topic] = self.create_publisher(message_type, topic, profile)
+        try:
+            self._feeds[topic] = self.create_publisher(message_type, topic, profile)
+        except (InvalidTopicNameException, ValueError) as error:
+            self.get_logger().warning(f"{topic[:200]!r} isn't played: {error}")
+            return
+        if is_command(topic, type_name):
+            self._commands.append(topic)
 
     def _play(self) -> None:
-        if self._stop.wait(self._delay):
+        if self._stop.wait(self._delay) or self._refused():
             return
         tick = self._tick if self._clock is not None else None
         player = Player(time.monotonic, self._stop.wait, self._publish, tick)
         self.published = player.play(self._messages, self._settings)
 
+    def _refused(self) -> bool:
+        """Whether playback ends because a driver would follow its commands; looks every LOOK_PERIOD."""
+        now = time.monotonic()
+        if not self._commands or now < self._next_look:
+            return bool(self.failure)
+        self._next_look = now + LOOK_PERIOD
+        followers = {
+            end.node_name for topic in self._commands for end in self.get_subscriptions_info_by_topic(topic)
+        }
+        followers |= {name for name in self.get_node_names() if name == names.SIM_DRIVER}
+        if followers:
+            who, what = ", ".join(sorted(followers)), ", ".join(self._commands)
+            self.failure = f"{what} would command {who}: a recording is not played to a live robot"
+            self._stop.set()
+        return bool(self.failure)
+
     def _publish(self, message: DueMessage) -> None:
+        if message.topic in self._commands and self._refused():
+            return
         self._feeds[message.topic].publish(message.data)
 
     def _tick(self, recorded_ns: int) -> None:
@@ -119,25 +165,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("file")
     parser.add_argument("--rate", type=float, default=1.0, help="2 plays twice as fast")
     parser.add_argument("--loop", action="store_true", help="start again at the end")
-    parser.add_argument("--topics", nargs="+", default=[], help="names or patterns; none: all visible topics")
+    which = "names or patterns; none: all visible topics; commands only by full name, never beside a driver"
+    parser.add_argument("--topics", nargs="+", default=[], help=which)
     parser.add_argument("--clock", action="store_true", help="publish recorded time on /clock")
     parser.add_argument("--delay", type=float, default=0.5, help="s before the first message")
+    add_roots(parser)
     options = parser.parse_args(remove_ros_args(["ir-play", *everything])[1:])
     try:
         settings = PlaySettings(options.rate, options.loop, tuple(options.topics))
-        recording = read_raw(options.file)
-    except RecorderError as error:
+        recording = read_raw(options.file, FileRoots.of(options.roots))
+    except (RecorderError, MsgsError) as error:
         sys.stderr.write(f"ir-play: {error}\n")
         return 1
     for problem in recording.problems:
         sys.stderr.write(f"ir-play: {problem}\n")
 
+    players: list[PlayNode] = []
+
     def start() -> PlayNode:
         node = PlayNode(recording, settings, options.clock, options.delay)
+        players.append(node)
         node.start()
         return node
 
-    return run_node("ir-play", start, everything, goes_on=lambda node: node.playing)
+    code = run_node("ir-play", start, everything, goes_on=lambda node: node.playing)
+    for player in players:
+        if player.failure:
+            sys.stderr.write(f"ir-play: {player.failure}\n")
+            return 1
+    return code
 
 
 if __name__ == "__main__":

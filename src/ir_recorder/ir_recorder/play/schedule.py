@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from ir_recorder.errors import RecorderError
+from ir_recorder.play.commands import is_command
 
 
 @dataclass(frozen=True)
 class PlaySettings:
-    """How to play: rate (2 = twice as fast), loop, names or patterns of topics (empty: all but the
-    actions').
+    """How to play: rate (2 = twice as fast), loop, names or patterns of topics (empty: all visible ones).
+
+    Topics that command a robot or a machine are played only by their full name.
     """
 
     rate: float = 1.0
@@ -26,8 +28,10 @@ class PlaySettings:
         if not 0.001 <= self.rate <= 1000.0:
             raise RecorderError(f"rate is {self.rate:g}, must be 0.001 to 1000")
 
-    def plays(self, topic: str) -> bool:
-        """Whether a topic is played; hidden ones only by name."""
+    def plays(self, topic: str, type_name: str = "") -> bool:
+        """Whether a topic is played; hidden ones and commands only by name, commands by the full one."""
+        if is_command(topic, type_name):
+            return topic in self.topics
         if self.topics:
             return any(fnmatchcase(topic, pattern) for pattern in self.topics)
         return not any(part.startswith("_") for part in topic.split("/"))

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_recorder.errors import ReadError
-from ir_recorder.format.definition import Field, definitions_of, short_name
+from ir_recorder.format.definition import TEXTS, Field, definitions_of, short_name
 
 _DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"} | {
     f"{kind}{bits}": f"<{kind[0]}{bits // 8}" for kind in ("int", "uint", "float") for bits in (16, 32, 64)
 }
 _HEADER = 4  # bytes: encapsulation kind and options
 _LITTLE_ENDIAN = 1  # kind CDR_LE
+MOST_LAYOUTS = 2000  # each costs a pass over the messages left; a topic at a fixed rate has a few
 _LENGTH = struct.Struct("<I")
 
 
@@ -57,6 +58,8 @@ class Columns:
                 -1, size
             )
             while len(open_rows):
+                if len(self._groups) == MOST_LAYOUTS:
+                    raise ReadError(f"its messages have more than {MOST_LAYOUTS} different layouts")
                 layout = _layout(bytes(block[0]), definitions, short_name(type_name))
                 words = [o + k for o in layout.lengths for k in range(4)]
                 same = (block[:, words] == block[0, words]).all(axis=1)
@@ -141,7 +144,7 @@ class _Walker:
             count = 1 if field.count is None else field.count
             if count < 0:
                 count = self._length()
-            if field.primitive and field.type not in ("string", "wstring"):
+            if field.primitive and field.type not in TEXTS:
                 self._numbers(path, _DTYPES[field.type], count)
             else:
                 for index in range(count):

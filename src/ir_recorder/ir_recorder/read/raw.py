@@ -6,6 +6,7 @@ chunk whose check sum fails. All that can be read is given, with a sentence for 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +15,13 @@ from typing import BinaryIO
 import numpy as np
 from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 
 from ir_msgs_py.arrays import IntArray
+from ir_msgs_py.errors import FileRefusedError
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.errors import ReadError
+from ir_recorder.read.chunks import ChunkReader, ReadLimits, TooLargeError
 
 
 @dataclass(frozen=True)
@@ -117,12 +121,17 @@ class _Collector:
             )
 
 
-def read_raw(path: str | Path) -> RawRecording:
-    """Everything readable in an MCAP file; ReadError when there is nothing, or it isn't one."""
+def read_raw(path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits | None = None) -> RawRecording:
+    """Everything readable in an MCAP file; ReadError when there is nothing, or it isn't one.
+
+    The file is a regular one below `roots`; what it holds takes no more memory than `limits`.
+    """
     path = Path(path)
     try:
-        with path.open("rb") as stream:
-            found = _collect(stream)
+        with roots.open_to_read(path) as stream:
+            found = _collect(stream, limits or ReadLimits())
+    except FileRefusedError as error:
+        raise ReadError(str(error)) from error
     except OSError as error:
         raise ReadError(f"{path} can't be read: {error.strerror}") from error
     except InvalidMagic as error:
@@ -139,9 +148,10 @@ def read_raw(path: str | Path) -> RawRecording:
     )
 
 
-def _collect(stream: BinaryIO) -> _Collector:
-    found = _Collector()
-    records = StreamReader(stream, emit_chunks=True).records
+def _collect(stream: BinaryIO, limits: ReadLimits) -> _Collector:
+    found, chunks = _Collector(), ChunkReader(limits)
+    size = os.fstat(stream.fileno()).st_size  # no record is longer than its file
+    records = StreamReader(stream, emit_chunks=True, record_size_limit=size).records
     while True:
         offset = stream.tell()
         try:
@@ -159,20 +169,32 @@ def _collect(stream: BinaryIO) -> _Collector:
                 f"unreadable record at byte {offset}: {type(error).__name__} {error}".rstrip()
             )
             return found
-        if isinstance(record, Chunk):
-            _open_chunk(record, offset, found)
-        else:
-            found.add(record)
+        try:
+            if isinstance(record, Chunk):
+                _open_chunk(record, offset, found, chunks)
+            else:
+                chunks.count(_size(record))
+                found.add(record)
+        except TooLargeError as error:
+            found.problems.append(str(error))
+            return found
 
 
-def _open_chunk(chunk: Chunk, offset: int, found: _Collector) -> None:
+def _size(record: McapRecord) -> int:
+    return len(record.data) if isinstance(record, Message | Attachment) else 0
+
+
+def _open_chunk(chunk: Chunk, offset: int, found: _Collector, chunks: ChunkReader) -> None:
+    lost = f"{(chunk.message_end_time - chunk.message_start_time) * 1e-9:.2f} s of messages are lost"
     try:
-        records = breakup_chunk(chunk, validate_crc=True)
+        records = chunks.records(chunk)
+    except TooLargeError:
+        raise
+    except ReadError as error:
+        found.problems.append(f"chunk at byte {offset} is left out, {error}: {lost}")
+        return
     except Exception as error:  # the decompressors raise errors of their own; a lost chunk isn't the end
-        found.problems.append(
-            f"chunk at byte {offset} is damaged ({type(error).__name__}): "
-            f"{(chunk.message_end_time - chunk.message_start_time) * 1e-9:.2f} s of messages are lost"
-        )
+        found.problems.append(f"chunk at byte {offset} is damaged ({type(error).__name__}): {lost}")
         return
     for record in records:
         found.add(record)

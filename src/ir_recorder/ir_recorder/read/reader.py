@@ -16,10 +16,13 @@ from mcap_ros2.decoder import DecoderFactory
 from ir_msgs_py import names
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
+from ir_recorder.format.definition import definitions_of
 from ir_recorder.read.cdr import Columns
+from ir_recorder.read.chunks import ReadLimits
 from ir_recorder.read.decoded import movement_from
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
@@ -42,9 +45,11 @@ _IN_BITS = tuple(bit.name for bit in fields(PlcInputs) if bit.type == "bool")
 _OUT_BITS = tuple(bit.name for bit in fields(PlcOutputs) if bit.type == "bool")
 
 
-def read_recording(path: str | Path) -> Recording:
-    """The recording in a file; ReadError when the file is no MCAP or holds nothing."""
-    return _Reader(read_raw(path)).recording()
+def read_recording(
+    path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits | None = None
+) -> Recording:
+    """The recording in a file below `roots`, read within `limits`; ReadError when it is none."""
+    return _Reader(read_raw(path, roots, limits)).recording()
 
 
 class _Reader:
@@ -240,6 +245,7 @@ class _Reader:
         """Messages one by one with their log time [s]; undecodable ones are counted."""
         schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
         try:
+            definitions_of(channel.type, channel.schema_text)
             decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
         except Exception as error:  # a damaged schema makes the parser raise nearly anything
             self._problems.append(f"{channel.topic}: definition of {channel.type} can't be read ({error})")

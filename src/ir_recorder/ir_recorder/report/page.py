@@ -9,15 +9,17 @@ from importlib.resources import files
 from pathlib import Path
 
 from ir_description import load_power_data
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis, Finding, Tolerances
-from ir_recorder.errors import PathError
 from ir_recorder.report.charts import CHARTS
 from ir_recorder.report.data import page_data
+from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import notes, source, subtitle, tiles, verdict
 from ir_recorder.report.tables import check_table
 from ir_recorder.report.words import joules, text
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
+PAGE_START = b"<!doctype html>"
 SCRIPTS = ("charts.js", "renderer.js", "motion.js", "app.js")
 
 
@@ -26,15 +28,14 @@ def write_report(
     checks: Sequence[Finding],
     path: str | Path,
     tolerances: Tolerances | None = None,
+    roots: FileRoots = ANYWHERE,
 ) -> Path:
-    """Writes the page and returns its absolute path; PathError when it can't be written."""
-    target = Path(path).absolute()
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(report_html(analysis, checks, tolerances), encoding="utf-8")
-    except OSError as error:
-        raise PathError(f"{target} can't be written: {error.strerror}") from error
-    return target
+    """Writes the page below `roots`, in place of another page but of no other file; its absolute path.
+
+    PathError when it can't be written.
+    """
+    page = report_html(analysis, checks, tolerances).encode()
+    return write_output(path, page, PAGE_START, roots)
 
 
 def report_html(analysis: Analysis, checks: Sequence[Finding], tolerances: Tolerances | None = None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,10 +10,12 @@ import numpy as np
 
 from ir_kernels import Chain
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.shares import mode_name
-from ir_recorder.errors import PathError, RecorderError
+from ir_recorder.errors import RecorderError
 from ir_recorder.read.recording import PowerSeries
+from ir_recorder.report.files import write_output
 from ir_recorder.report.series import envelope
 from ir_recorder.report.words import joules, mode_words
 
@@ -28,14 +31,15 @@ MODE_COLOURS = {
     "EMERGENCY_STOP": "#e03131",
 }
 TRANSITION = "#c3ccd6"
+PICTURE_START = b"\x89PNG\r\n\x1a\n"
 MOST_POINTS = 4000  # more than twice the picture's pixels
 
 
-def write_picture(analysis: Analysis, path: str | Path) -> Path:
-    """Power with the modes marked, joules per movement, and the tool's path from above; returns the
-    absolute path.
+def write_picture(analysis: Analysis, path: str | Path, roots: FileRoots = ANYWHERE) -> Path:
+    """Power with the modes marked, joules per movement, and the tool's path from above, as PNG below `roots`.
 
-    RecorderError where matplotlib isn't installed, PathError where the file can't be written.
+    Returns the absolute path. RecorderError where matplotlib isn't installed, PathError where the file
+    can't be written.
     """
     try:
         from matplotlib.figure import Figure
@@ -46,13 +50,9 @@ def write_picture(analysis: Analysis, path: str | Path) -> Path:
     _power(figure.add_subplot(grid[0, :]), analysis)
     _joules(figure.add_subplot(grid[1, 0]), analysis)
     _path(figure.add_subplot(grid[1, 1]), analysis)
-    target = Path(path).absolute()
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(target)
-    except OSError as error:
-        raise PathError(f"{target} can't be written: {error.strerror}") from error
-    return target
+    picture = BytesIO()
+    figure.savefig(picture, format="png")
+    return write_output(path, picture.getvalue(), PICTURE_START, roots)
 
 
 def _power(axes: Axes, analysis: Analysis) -> None:

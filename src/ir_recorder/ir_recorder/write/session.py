@@ -8,7 +8,14 @@ from importlib.metadata import PackageNotFoundError, version
 
 from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
+from ir_recorder.write.data_files import data_of_cell
 from ir_recorder.write.writer import RecordingSummary, RecordingWriter
+
+# those whose numbers a recording holds, and whose versions decide them
+PACKAGES = (
+    *("ir_planner", "ir_sim_driver", "ir_program_runner", "ir_kernels", "ir_description", "ir_msgs_py"),
+    *("ir_msgs", "numpy", "scipy", "pybullet", "rclpy"),
+)
 
 
 @dataclass(frozen=True)
@@ -25,8 +32,12 @@ class RecordingSession:
     def __init__(self, writer: RecordingWriter, facts: Mapping[str, str], time: int) -> None:
         self._writer = writer
         self._channels: dict[str, int] = {}
-        self._attached = False
-        own = {contents.VERSION: project_version(), contents.STARTED: str(time)}
+        self._attached: set[str] = set()
+        own = {
+            contents.VERSION: installed_version("ir_recorder"),
+            contents.STARTED: str(time),
+            contents.PACKAGES: ", ".join(f"{name} {installed_version(name)}" for name in PACKAGES),
+        }
         writer.facts(contents.FACTS, {**own, **facts})
 
     @property
@@ -39,10 +50,9 @@ class RecordingSession:
         """How many messages were written."""
         return self._writer.messages
 
-    @property
-    def cell_attached(self) -> bool:
-        """Whether the cell's files are in."""
-        return self._attached
+    def holds(self, name: str) -> bool:
+        """Whether an attachment of that name is in."""
+        return name in self._attached
 
     def open_topic(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
         """Opens the channel of a topic; SchemaError when its type isn't installed."""
@@ -54,21 +64,30 @@ class RecordingSession:
         self._writer.write(self._channels[topic], time, data)
 
     def attach_cell(self, files: CellFiles, time: int) -> None:
-        """Puts cell and URDF beside the messages, once."""
-        if not self._attached:
-            self._writer.attach(contents.CELL, "application/yaml", files.cell_yaml.encode(), time)
-            if files.urdf:
-                self._writer.attach(contents.URDF, "application/xml", files.urdf.encode(), time)
-            self._attached = True
+        """Puts cell, URDF and the data of robot and controller beside the messages, once."""
+        if self.holds(contents.CELL):
+            return
+        self.attach(contents.CELL, files.cell_yaml, time)
+        if files.urdf:
+            self.attach(contents.URDF, files.urdf, time)
+        for name, text in data_of_cell(files.cell_yaml).items():
+            self.attach(name, text, time)
+
+    def attach(self, name: str, text: str, time: int) -> None:
+        """Puts a text beside the messages; the first of a name stays."""
+        if name not in self._attached:
+            media = "application/xml" if name == contents.URDF else "application/yaml"
+            self._writer.attach(name, media, text.encode(), time)
+            self._attached.add(name)
 
     def finish(self) -> RecordingSummary:
         """Closes the file with its indexes."""
         return self._writer.finish()
 
 
-def project_version() -> str:
-    """The version that is installed."""
+def installed_version(package: str) -> str:
+    """The version of a package, "unknown" where it isn't installed."""
     try:
-        return version("ir_recorder")
+        return version(package)
     except PackageNotFoundError:
         return "unknown"

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.writer import CompressionType, Writer
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
+from ir_msgs_py.errors import FileRefusedError
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.errors import PathError, WriteError
 from ir_recorder.format.qos import QosOffer, offers_to_yaml
 from ir_recorder.format.schemas import SchemaLibrary
@@ -42,11 +44,15 @@ class RecordingWriter:
     """
 
     def __init__(
-        self, path: str | Path, schemas: SchemaLibrary | None = None, overwrite: bool = False
+        self,
+        path: str | Path,
+        schemas: SchemaLibrary | None = None,
+        overwrite: bool = False,
+        roots: FileRoots = ANYWHERE,
     ) -> None:
         self.path = checked_path(path)
         self._schemas = schemas or SchemaLibrary()
-        self._file = _open(self.path, overwrite)
+        self._file = _open(self.path, overwrite, roots)
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         self._schema_ids: dict[str, int] = {}
         self._sequence: dict[int, int] = {}
@@ -168,11 +174,18 @@ def checked_path(path: str | Path) -> Path:
     return Path(text).expanduser().absolute()
 
 
-def _open(path: Path, overwrite: bool) -> BinaryIO:
+def _open(path: Path, overwrite: bool, roots: FileRoots) -> BinaryIO:
+    """The file, below `roots`; with `overwrite` in place of a recording, never of anything else."""
+    try:
+        roots.inside(path)
+    except FileRefusedError as error:
+        raise PathError(str(error)) from error
     if not path.parent.is_dir():
         raise PathError(f"{path} can't be written: there is no directory {path.parent}; make it first")
     try:
-        return open(path, "wb" if overwrite else "xb")
+        return roots.open_to_write(path, MCAP0_MAGIC if overwrite else None)
+    except FileRefusedError as error:
+        raise PathError(str(error)) from error
     except FileExistsError as error:
         raise PathError(f"{path} is there already; choose another path or set overwrite") from error
     except OSError as error:

@@ -1,0 +1,3 @@
+"""The recorder's state on /diagnostics."""
+
+__all__: list[str] = []

@@ -1,0 +1,3 @@
+"""What a recording asks other nodes for: the planner's cell, and the parameters of all nodes."""
+
+__all__: list[str] = []

@@ -1,0 +1,87 @@
+"""Chunks of a recording opened within bounds: a small file may claim, or hold, gigabytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from io import BytesIO
+
+import lz4.frame
+import zstandard
+from mcap.records import Chunk, McapRecord
+from mcap.stream_reader import breakup_chunk
+
+from ir_recorder.errors import ReadError
+
+_STEP = 1 << 20  # bytes that are decompressed at a time
+_OVERHEAD = 120  # bytes of memory that a message takes beside its own
+
+
+@dataclass(frozen=True)
+class ReadLimits:
+    """Most bytes of memory for one chunk and for a whole recording.
+
+    chunk: writers close chunks at 0.25 to 4 MB, a single large message may exceed that. total: five hours
+    of a cell.
+    """
+
+    chunk: int = 64 * 2**20
+    total: int = 2 * 2**30
+
+
+class ChunkReader:
+    """Opens chunks one after another; ReadError for one that is too large, or once all are."""
+
+    def __init__(self, limits: ReadLimits) -> None:
+        self._limits = limits
+        self._used = 0
+
+    def records(self, chunk: Chunk) -> list[McapRecord]:
+        """What is in the chunk; its check sum is compared."""
+        if chunk.uncompressed_size > self._limits.chunk:
+            claimed, most = _mib(chunk.uncompressed_size), _mib(self._limits.chunk)
+            raise ReadError(f"it claims {claimed} uncompressed, at most {most} are read")
+        data = _decompressed(chunk)
+        self.count(len(data))
+        records = breakup_chunk(replace(chunk, compression="", data=data), validate_crc=True)
+        self.count(_OVERHEAD * len(records))
+        return records
+
+    def count(self, size: int) -> None:
+        """Adds to the memory in use."""
+        self._used += size
+        if self._used > self._limits.total:
+            raise TooLargeError(f"more than {_mib(self._limits.total)} uncompressed: the rest is left out")
+
+
+class TooLargeError(ReadError):
+    """The recording as a whole exceeds its bound; what was read so far stays."""
+
+
+def _decompressed(chunk: Chunk) -> bytes:
+    """The chunk's bytes, never more than it claims and one."""
+    wanted = chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        data = _read_at_most(zstandard.ZstdDecompressor().stream_reader(chunk.data).read, wanted + 1)
+    elif chunk.compression == "lz4":
+        with lz4.frame.open(BytesIO(chunk.data)) as stream:
+            data = _read_at_most(stream.read, wanted + 1)
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise ReadError(f"compression {chunk.compression[:20]!r} is unknown: known are zstd, lz4")
+    if len(data) != wanted:
+        raise ReadError(f"it claims {wanted} bytes uncompressed and has others")
+    return data
+
+
+def _read_at_most(read: Callable[[int], bytes], most: int) -> bytes:
+    parts, size = [], 0
+    while size < most and (part := read(min(_STEP, most - size))):
+        parts.append(part)
+        size += len(part)
+    return b"".join(parts)
+
+
+def _mib(size: int) -> str:
+    return f"{size / 2**20:,.0f} MiB"

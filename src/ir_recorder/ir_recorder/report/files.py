@@ -1,0 +1,26 @@
+"""Files that the report writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ir_msgs_py.errors import FileRefusedError
+from ir_msgs_py.file_roots import FileRoots
+from ir_recorder.errors import PathError
+
+
+def write_output(path: str | Path, content: bytes, replaces: bytes, roots: FileRoots) -> Path:
+    """Writes a file below `roots` and makes its folder; returns its absolute path.
+
+    A file that is there is replaced only where it starts with `replaces`. PathError when it can't be written.
+    """
+    target = Path(path).absolute()
+    try:
+        roots.inside(target).parent.mkdir(parents=True, exist_ok=True)
+        with roots.open_to_write(target, replaces) as stream:
+            stream.write(content)
+    except FileRefusedError as error:
+        raise PathError(str(error)) from error
+    except OSError as error:
+        raise PathError(f"{target} can't be written: {error.strerror}") from error
+    return target
