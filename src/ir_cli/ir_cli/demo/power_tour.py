@@ -26,6 +26,7 @@ class PowerWatch:
     def __init__(self, client: Client) -> None:
         self._changed = threading.Condition()
         self._state: PowerState | None = None
+        self._clock = client.node.get_clock()
         client.subscribe("/" + names.POWER_STATE, PowerState, self._take)
 
     def wait_for_mode(self, mode: int) -> None:
@@ -33,9 +34,12 @@ class PowerWatch:
         self._wait(lambda state: state.mode == mode, f"power mode {mode}")
 
     def stay(self, seconds: float) -> None:
-        """Wait until the meter's stamps have gone on by this."""
+        """Wait until the meter has measured for this long from now on.
+
+        Its readings may arrive late: the node's clock is ahead of the last one then.
+        """
         self._wait(lambda state: True, "the mains meter")
-        began = _seconds(self._last())
+        began = max(_seconds(self._last()), self._now())
         self._wait(lambda state: _seconds(state) >= began + seconds, f"{seconds:g} s on the mains meter")
 
     def _wait(self, condition: Callable[[PowerState], bool], what: str) -> None:
@@ -45,6 +49,9 @@ class PowerWatch:
             ):
                 mode = "nothing" if self._state is None else f"mode {self._state.mode}"
                 raise DemonstrationError(f"waited {MODE_SECONDS:g} s for {what}; the mains meter says {mode}")
+
+    def _now(self) -> float:
+        return float(self._clock.now().nanoseconds) * 1e-9
 
     def _last(self) -> PowerState:
         with self._changed:
@@ -72,7 +79,7 @@ def tour(
     """Visit the four modes with each load (load texts), staying `stay` seconds in each; ends on motors."""
     for load in loads:
         progress(f"load {load}: on motors")
-        watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
+        motors_on(client, watch)
         client.ask("/" + names.SET_LOAD, SetLoad.Request(load=load))
         watch.stay(stay)
         progress(f"load {load}: on brakes")
@@ -80,9 +87,7 @@ def tour(
         watch.wait_for_mode(PowerMode.STAND_ON_BRAKES)
         watch.stay(stay)
         set_bit(client, "drives_off", False)
-        set_bit(client, "drives_on", True)
-        watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
-        set_bit(client, "drives_on", False)
+        motors_on(client, watch)
         progress(f"load {load}: drive bus off")
         set_bit(client, "ab", True)
         watch.wait_for_mode(PowerMode.BUS_POWER_OFF)
@@ -96,6 +101,13 @@ def tour(
         wake()
         watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
         set_bit(client, "hib", False)
+
+
+def motors_on(client: Client, watch: PowerWatch) -> None:
+    """Release the brakes: they close by themselves after a while, as during planning."""
+    set_bit(client, "drives_on", True)
+    watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
+    set_bit(client, "drives_on", False)
 
 
 def set_bit(client: Client, name: str, value: bool) -> PlcInputs:

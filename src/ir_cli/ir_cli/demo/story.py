@@ -73,7 +73,7 @@ class Demonstration:
                     planner=transitions,
                     driver={**transitions, "wake_port": self._link.wake_port},
                     runner={"wake_port": self._link.wake_port},
-                    recorder={"facts": self._facts()},
+                    recorder={"facts": self._facts(), "roots": [str(self._out.resolve())]},
                 )
             )
             self._start_recording(client, recording)
