@@ -34,8 +34,7 @@ from ir_description import (
     load_robot,
 )
 from ir_description.arrays import solid_box_inertia
-from ir_description.body import KINDS
-from ir_description.equipment import ZONE_KINDS, station_at, zone_around
+from ir_description.cell import ZONE_KINDS, station_at, zone_around
 from ir_description.poses import (
     abc_from_rotation,
     pose_of,
@@ -43,6 +42,7 @@ from ir_description.poses import (
     rotation_from_matrix,
     rotation_from_quaternion,
 )
+from ir_description.shapes import KINDS
 from ir_msgs_py.arrays import FloatArray
 
 ROBOT = load_robot()

@@ -21,10 +21,9 @@ from ir_description import (
     load_cell,
 )
 from ir_description.arrays import solid_box_inertia
-from ir_description.body import BodyKind
-from ir_description.convex_distance import capsule_distance
-from ir_description.equipment import zone_around
+from ir_description.cell import zone_around
 from ir_description.poses import composed, inverse, pose_of, rotation_from_abc
+from ir_description.shapes import BodyKind, capsule_distance
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray
 

@@ -12,9 +12,8 @@ import pytest
 import yaml
 
 from ir_description import body_reader, cell_from_yaml, cell_reader, cell_to_yaml, check_cell, program_reader
-from ir_description.body import KINDS
-from ir_description.equipment import ZONE_KINDS
-from ir_description.program import PAUSE_POWER_MODES
+from ir_description.cell import PAUSE_POWER_MODES, ZONE_KINDS
+from ir_description.shapes import KINDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 DATA = files("ir_description") / "data"

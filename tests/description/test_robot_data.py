@@ -18,7 +18,7 @@ from ir_description import (
     load_power_data,
     load_robot,
 )
-from ir_description.robot_file import robot_from_yaml
+from ir_description.files import robot_from_yaml
 
 GRAVITY = 9.80665
 ROUNDING = 0.05  # W: copper losses are given to four digits

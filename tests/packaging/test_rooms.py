@@ -17,6 +17,9 @@ ROOMS = {
         "regional", "trajectories", "service", "settings", "program", "store", "current_cell",
         "planner", "node",
     ),
+    "ir_description": (
+        "errors", "arrays", "poses", "shapes", "robot", "cell", "files", "library", "cell_review",
+    ),
     "ir_sim_driver": ("errors", "notices", "plant", "power", "motion", "plc", "controller", "node"),
 }  # fmt: skip
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ir_description import bundled_cells, load_cell
-from ir_description.cell_review import check_cell
-from ir_description.errors import DescriptionError
+from ir_description import DescriptionError, bundled_cells, check_cell, load_cell
 
 from .errors import CommandError
 from .terminal import table

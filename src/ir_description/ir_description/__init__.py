@@ -1,11 +1,19 @@
 """The robot and the cells as data: limits, drives, power modes, cells, and their typed, validated loading."""
 
-from ir_description.body import Body
-from ir_description.capsule import Capsule
-from ir_description.cell import Cell, Task
+from ir_description.cell import (
+    AllowedContact,
+    Cell,
+    CellSignal,
+    Equipment,
+    EquipmentState,
+    Part,
+    PartPlaces,
+    ProgramStep,
+    Station,
+    Task,
+    Zone,
+)
 from ir_description.cell_review import Finding, check_cell
-from ir_description.cell_writer import cell_to_yaml
-from ir_description.equipment import AllowedContact, Equipment, EquipmentState, Station, Zone
 from ir_description.errors import (
     CellFileError,
     DescriptionError,
@@ -13,6 +21,7 @@ from ir_description.errors import (
     RobotFileError,
     UnknownNameError,
 )
+from ir_description.files import cell_to_yaml, robot_urdf
 from ir_description.library import (
     bundled_cells,
     bundled_robots,
@@ -21,12 +30,8 @@ from ir_description.library import (
     load_power_data,
     load_robot,
 )
-from ir_description.load import Load
-from ir_description.part import Part
-from ir_description.power import PowerData
-from ir_description.program import CellSignal, PartPlaces, ProgramStep
-from ir_description.robot import Counterbalance, RobotModel
-from ir_description.urdf import robot_urdf
+from ir_description.robot import Counterbalance, Load, PowerData, RobotModel
+from ir_description.shapes import Body, Capsule
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
 

@@ -12,12 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from ir_description.cell import Cell
-from ir_description.convex_distance import capsule_distance, point_distance
-from ir_description.equipment import Zone
+from ir_description.cell import AUTO, Cell, Zone
 from ir_description.library import load_power_data
-from ir_description.power import PowerData
-from ir_description.program import AUTO
+from ir_description.robot import PowerData
+from ir_description.shapes import capsule_distance, point_distance
 from ir_msgs_py.arrays import FloatArray
 
 PAIRS_MAX = 200_000

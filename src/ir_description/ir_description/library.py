@@ -8,13 +8,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from ir_description.cell import Cell
-from ir_description.cell_reader import read_cell
 from ir_description.errors import CellFileError, UnknownNameError, shown
-from ir_description.mesh import read_regular_file
-from ir_description.power import PowerData
-from ir_description.power_file import power_from_yaml
-from ir_description.robot import RobotModel
-from ir_description.robot_file import robot_from_yaml
+from ir_description.files import power_from_yaml, read_cell, read_regular_file, robot_from_yaml
+from ir_description.robot import PowerData, RobotModel
 from ir_msgs_py.errors import InvalidValueError
 
 _DATA = files("ir_description") / "data"

@@ -1,4 +1,100 @@
-"""The shared vocabulary in Python: names, values, conversions, a client for scripts and test fixtures.
+"""The shared vocabulary in Python: array types, names, values, settings; no ROS is needed to import it.
 
-Nothing here but the `ros` folder knows rclpy.
+Conversions to and from messages, the client for scripts and the test fixtures are in `ir_msgs_py.ros`:
+nothing else here knows rclpy.
 """
+
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_msgs_py.candidates import IkSolution, ServiceCandidate
+from ir_msgs_py.errors import (
+    CallTimedOutError,
+    ClientError,
+    InvalidValueError,
+    JointNamesError,
+    MessageTextError,
+    MsgsError,
+    ParameterError,
+    PoseError,
+    RequestRefusedError,
+    ServiceUnavailableError,
+    TrajectoryError,
+    UnknownTypeError,
+)
+from ir_msgs_py.modes import MODES, REST_MODES, Mode, ModeRow
+from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.options import OBJECTIVES, TIMINGS, PlanOptions
+from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs, PlcOutputs, Signal
+from ir_msgs_py.power import PowerMode, PowerState
+from ir_msgs_py.program import Event, ProgramState
+from ir_msgs_py.report import (
+    DistancePair,
+    MovementKind,
+    PairKind,
+    PlannedMovement,
+    PlanningInfo,
+    PlanningStage,
+    Rejection,
+    TrajectoryReport,
+)
+from ir_msgs_py.settings import Setting, check_settings, describe, setting, settings_table
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.wake_on_lan import magic_packet, send_packet
+
+__all__ = [
+    "JOINT_NAMES",
+    "MODES",
+    "OBJECTIVES",
+    "PLC_INPUT_NAMES",
+    "REST_MODES",
+    "TIMINGS",
+    "BoolArray",
+    "CallTimedOutError",
+    "ClientError",
+    "DistancePair",
+    "Event",
+    "FloatArray",
+    "IkSolution",
+    "IntArray",
+    "InvalidValueError",
+    "JointNamesError",
+    "JointTrajectory",
+    "MessageTextError",
+    "Mode",
+    "ModeRow",
+    "MovementKind",
+    "MsgsError",
+    "OperatingMode",
+    "PairKind",
+    "ParameterError",
+    "PlanOptions",
+    "PlannedMovement",
+    "PlanningInfo",
+    "PlanningStage",
+    "PlcInputs",
+    "PlcOutputs",
+    "PoseError",
+    "PowerMode",
+    "PowerState",
+    "ProgramState",
+    "Rejection",
+    "RequestRefusedError",
+    "Samples",
+    "ServiceCandidate",
+    "ServiceUnavailableError",
+    "Setting",
+    "Signal",
+    "Status",
+    "StatusCode",
+    "TrajectoryError",
+    "TrajectoryReport",
+    "TransitionTimes",
+    "UnknownTypeError",
+    "check_settings",
+    "describe",
+    "magic_packet",
+    "send_packet",
+    "setting",
+    "settings_table",
+]

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell
-from ir_description.program import PartPlaces
+from ir_description import Cell, PartPlaces
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR

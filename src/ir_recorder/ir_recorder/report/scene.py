@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description import Cell
-from ir_description.program import PartPlaces
+from ir_description import Cell, PartPlaces
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import places_after

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ir_description import Capsule
-from ir_description.body import Body
+from ir_description import Body, Capsule
 from ir_msgs_py.arrays import FloatArray, IntArray
 
 SEGMENTS = 28  # around an axis: looks round, and volumes are right to 1 %

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell, RobotModel
-from ir_description.load import Load
+from ir_description import Cell, Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode

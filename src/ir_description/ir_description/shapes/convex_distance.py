@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 from scipy.spatial import ConvexHull
 
-from ir_description.body import Body
-from ir_description.capsule import Capsule
+from ir_description.shapes.body import Body
+from ir_description.shapes.capsule import Capsule
 from ir_msgs_py.arrays import FloatArray
 
 

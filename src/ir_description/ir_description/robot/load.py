@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range, transformed
-from ir_description.capsule import Capsule
+from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 

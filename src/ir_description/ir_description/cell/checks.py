@@ -8,14 +8,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from typing import Protocol
 
-from ir_description.body import Body
-from ir_description.capsule import Capsule
-from ir_description.equipment import AllowedContact, Equipment, Station
+from ir_description.cell.equipment import AllowedContact, Equipment, Station
+from ir_description.cell.part import Part
+from ir_description.cell.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.errors import UnknownNameError
-from ir_description.load import Load, total_mass
-from ir_description.part import Part
-from ir_description.program import CellSignal, PartPlaces, ProgramStep
-from ir_description.robot import RobotModel
+from ir_description.robot import Load, RobotModel, total_mass
+from ir_description.shapes import Body, Capsule
 from ir_msgs_py.errors import InvalidValueError
 
 BODIES_MAX = 20_000

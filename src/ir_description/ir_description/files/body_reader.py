@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description.body import KINDS, SIZE_MAX, Body
-from ir_description.cell_checks import BODIES_MAX, NameRegister
-from ir_description.items import Item, Table
-from ir_description.mesh import HULL_VERTICES_MAX, convex_vertices, hull_vertices, mesh_path, read_stl
+from ir_description.cell import BODIES_MAX, NameRegister
+from ir_description.files.items import Item, Table
+from ir_description.files.mesh import HULL_VERTICES_MAX, convex_vertices, hull_vertices, mesh_path, read_stl
 from ir_description.poses import pose_of, rotation_from_abc, rotation_from_matrix, rotation_from_quaternion
+from ir_description.shapes import KINDS, SIZE_MAX, Body
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 

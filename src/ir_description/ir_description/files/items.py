@@ -15,7 +15,7 @@ from typing import NoReturn
 import numpy as np
 
 from ir_description.errors import DescriptionFileError, UnknownNameError, listed, shown
-from ir_description.yaml_tree import Node, Scalar, parse_yaml
+from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 

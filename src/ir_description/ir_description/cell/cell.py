@@ -12,21 +12,19 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from ir_description.arrays import frozen, frozen_pose
-from ir_description.body import Body, floor_body
-from ir_description.capsule import Capsule
-from ir_description.cell_checks import (
+from ir_description.cell.checks import (
     check_contacts,
     check_names,
     check_payload,
     check_program,
     check_single_places,
 )
-from ir_description.equipment import Equipment, Station, station_at
+from ir_description.cell.equipment import Equipment, Station, station_at
+from ir_description.cell.part import Part
+from ir_description.cell.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.errors import UnknownNameError
-from ir_description.load import Load
-from ir_description.part import Part
-from ir_description.program import CellSignal, PartPlaces, ProgramStep
-from ir_description.robot import RobotModel
+from ir_description.robot import Load, RobotModel
+from ir_description.shapes import Body, Capsule, floor_body
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 

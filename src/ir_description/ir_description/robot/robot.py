@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range
-from ir_description.capsule import Capsule
+from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ir_description.items import Item, Table
-from ir_description.program import PAUSE_MAX, PAUSE_POWER_MODES, POSTURES, CellSignal, ProgramStep
+from ir_description.cell import PAUSE_MAX, PAUSE_POWER_MODES, POSTURES, CellSignal, ProgramStep
+from ir_description.files.items import Item, Table
 from ir_msgs_py.plc import Signal
 
 _COMMON = ("wait_for", "set_signals")

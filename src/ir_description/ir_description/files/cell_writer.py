@@ -11,15 +11,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ir_description.body import Body
-from ir_description.capsule import Capsule
-from ir_description.cell import Cell
-from ir_description.cell_reader import FORMAT
-from ir_description.equipment import Equipment, Station, zone_around
-from ir_description.load import Load
-from ir_description.part import Part
+from ir_description.cell import Cell, CellSignal, Equipment, Part, ProgramStep, Station, zone_around
+from ir_description.files.cell_reader import FORMAT
 from ir_description.poses import abc_from_rotation, rotation_from_abc
-from ir_description.program import CellSignal, ProgramStep
+from ir_description.robot import Load
+from ir_description.shapes import Body, Capsule
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import Signal
 

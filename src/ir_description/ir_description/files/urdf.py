@@ -13,10 +13,9 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ir_description.capsule import Capsule
-from ir_description.load import Load
 from ir_description.poses import abc_from_rotation
-from ir_description.robot import RobotModel
+from ir_description.robot import Load, RobotModel
+from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
 
 FRAME_MASS = 1e-9

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ir_description.capsule import Capsule
 from ir_description.errors import RobotFileError
-from ir_description.items import Item, Table, read_items
+from ir_description.files.items import Item, Table, read_items
 from ir_description.robot import Counterbalance, RobotModel
+from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
 
 FORMAT = "ir_description/robot/1"

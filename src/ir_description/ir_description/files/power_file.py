@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ir_description.errors import RobotFileError
-from ir_description.items import Item, Table, read_items
-from ir_description.power import ControllerMode, DcLink, EnergyShare, MeasuredPower, PlcBit, PowerData
-from ir_description.robot_file import figure
+from ir_description.files.items import Item, Table, read_items
+from ir_description.files.robot_file import figure
+from ir_description.robot import ControllerMode, DcLink, EnergyShare, MeasuredPower, PlcBit, PowerData
 
 FORMAT = "ir_description/power/1"
 

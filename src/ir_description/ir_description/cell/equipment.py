@@ -9,9 +9,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from ir_description.arrays import frozen, frozen_pose, in_range
-from ir_description.body import SIZE_MAX, Body
 from ir_description.errors import UnknownNameError
 from ir_description.poses import composed, pose_of
+from ir_description.shapes import SIZE_MAX, Body
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 

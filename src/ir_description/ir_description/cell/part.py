@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ir_description.arrays import frozen_pose
-from ir_description.body import Body
-from ir_description.load import Load
 from ir_description.poses import composed
+from ir_description.robot import Load
+from ir_description.shapes import Body
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 

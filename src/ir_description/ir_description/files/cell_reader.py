@@ -13,27 +13,31 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_description.body_reader import BodyReader, read_pose
-from ir_description.cell import Cell, Task, check_posture
-from ir_description.cell_checks import (
+from ir_description.cell import (
+    Cell,
+    CellSignal,
+    Equipment,
     NameRegister,
+    Part,
+    PartPlaces,
+    ProgramStep,
+    Station,
+    Task,
     check_base_contact,
     check_contact,
     check_follows,
     check_part_mass,
+    check_posture,
     check_step,
     shape_register,
 )
-from ir_description.equipment import Equipment, Station
-from ir_description.equipment_reader import read_equipment
 from ir_description.errors import CellFileError, UnknownNameError
-from ir_description.items import Item, Table, read_items
-from ir_description.load import Load
-from ir_description.load_reader import read_part, read_tool
-from ir_description.part import Part
-from ir_description.program import CellSignal, PartPlaces, ProgramStep
-from ir_description.program_reader import read_signal, read_step
-from ir_description.robot import RobotModel
+from ir_description.files.body_reader import BodyReader, read_pose
+from ir_description.files.equipment_reader import read_equipment
+from ir_description.files.items import Item, Table, read_items
+from ir_description.files.load_reader import read_part, read_tool
+from ir_description.files.program_reader import read_signal, read_step
+from ir_description.robot import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
 
 FORMAT = "ir_cell/1"

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description.body import Body
-from ir_description.body_reader import POSE_KEYS, BodyReader, pose_in, read_pose
-from ir_description.equipment import (
+from ir_description.cell import (
     APPROACH_MAX,
     ZONE_KINDS,
     ZONE_MAX,
@@ -18,7 +16,9 @@ from ir_description.equipment import (
     station_at,
     zone_around,
 )
-from ir_description.items import Item, Table
+from ir_description.files.body_reader import POSE_KEYS, BodyReader, pose_in, read_pose
+from ir_description.files.items import Item, Table
+from ir_description.shapes import Body
 from ir_msgs_py.arrays import FloatArray
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ir_description.arrays import solid_box_inertia
-from ir_description.body_reader import FAR, BodyReader, read_pose
-from ir_description.capsule import Capsule
-from ir_description.cell_checks import NameRegister
-from ir_description.items import Item, Table
-from ir_description.load import MASS_MAX, Load
-from ir_description.part import Part
-from ir_description.robot_file import inertia_matrix
+from ir_description.cell import NameRegister, Part
+from ir_description.files.body_reader import FAR, BodyReader, read_pose
+from ir_description.files.items import Item, Table
+from ir_description.files.robot_file import inertia_matrix
+from ir_description.robot import MASS_MAX, Load
+from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
 
 _MASS_KEYS = ("inertia", "inertia_box", "capsules")
