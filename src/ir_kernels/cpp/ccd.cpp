@@ -4,72 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics_lanes.hpp"
+#include "ccd_vectors.hpp"
 
 namespace ir::inverse {
 namespace {
 
-using dynamics::Doubles;
-using dynamics::Integers;
-using dynamics::splat;
-
 constexpr double kDampingStart = 1e-4, kDampingDown = 0.1, kDampingUp = 10.0;
 constexpr double kDampingLeast = 1e-12, kDampingMost = 1e6;
 constexpr double kTurn = 2.0 * M_PI;
-
-struct V3 {
-  Doubles x, y, z;
-};
-V3 operator+(const V3& a, const V3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-V3 operator-(const V3& a, const V3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-V3 operator*(const V3& a, Doubles s) { return {a.x * s, a.y * s, a.z * s}; }
-Doubles dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-V3 cross(const V3& a, const V3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-V3 constant(const double v[3]) { return {splat<Doubles>(v[0]), splat<Doubles>(v[1]), splat<Doubles>(v[2])}; }
-
-// Orientation by columns.
-struct M3 {
-  V3 column[3];
-};
-V3 times(const M3& m, const double v[3]) {
-  return {m.column[0].x * v[0] + m.column[1].x * v[1] + m.column[2].x * v[2],
-          m.column[0].y * v[0] + m.column[1].y * v[1] + m.column[2].y * v[2],
-          m.column[0].z * v[0] + m.column[1].z * v[1] + m.column[2].z * v[2]};
-}
-M3 times(const M3& m, const double R[3][3]) {
-  M3 product;
-  for (int j = 0; j < 3; ++j) {
-    const double column[3] = {R[0][j], R[1][j], R[2][j]};
-    product.column[j] = times(m, column);
-  }
-  return product;
-}
-M3 constant(const double R[3][3]) {
-  M3 m;
-  for (int j = 0; j < 3; ++j) m.column[j] = {splat<Doubles>(R[0][j]), splat<Doubles>(R[1][j]), splat<Doubles>(R[2][j])};
-  return m;
-}
-
-// Arc tangent of y / x in all four quadrants (Cephes), atan2(0, 0) = 0.
-Doubles arctan2(Doubles y, Doubles x) {
-  const Doubles ax = dynamics::abs(x), ay = dynamics::abs(y);
-  const Doubles large = dynamics::max(ax, ay), small = dynamics::min(ax, ay);
-  Doubles t = small / dynamics::max(large, splat<Doubles>(1e-300));
-  const Integers upper = t > 0.66;
-  t = upper ? (t - 1.0) / (t + 1.0) : t;
-  const Doubles z = t * t;
-  const Doubles p = (((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z -
-                1.228866684490136173410e2) * z - 6.485021904942025371773e1;
-  const Doubles q = ((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z +
-                4.853903996359136964868e2) * z + 1.945506571482613964425e2;
-  Doubles angle = t * (z * p / q) + t;
-  angle = upper ? angle + 3.061616997868382943065e-17 + 0.78539816339744830962 : angle;
-  angle = ay > ax ? 1.57079632679489661923 - angle : angle;
-  angle = x < 0.0 ? 3.14159265358979323846 - angle : angle;
-  return dynamics::copysign(angle, y);
-}
 
 struct Pose {
   M3 R;
@@ -250,68 +192,7 @@ void run_lanes(const CcdProblem& c, Doubles* q, Doubles& psi, Doubles& distance,
   angle = turn_to_target(c, pose).angle;
 }
 
-// Plain 3 x 3 products for the set-up.
-void multiply(const double A[3][3], const double B[3][3], double C[3][3]) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) C[i][j] = A[i][0] * B[0][j] + A[i][1] * B[1][j] + A[i][2] * B[2][j];
-}
-void multiply_transposed(const double A[3][3], const double B[3][3], double C[3][3]) {  // A' B
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) C[i][j] = A[0][i] * B[0][j] + A[1][i] * B[1][j] + A[2][i] * B[2][j];
-}
-void split(const double* pose, double R[3][3], double p[3]) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) R[i][j] = pose[4 * i + j];
-    p[i] = pose[4 * i + 3];
-  }
-}
-// A rotation whose third column is `axis`.
-void frame_about(const double* axis, double Q[3][3]) {
-  const int least = std::abs(axis[0]) <= std::abs(axis[1]) && std::abs(axis[0]) <= std::abs(axis[2]) ? 0
-                    : std::abs(axis[1]) <= std::abs(axis[2])                                         ? 1
-                                                                                                     : 2;
-  double x[3] = {0, 0, 0}, size = 0.0;
-  x[least] = 1.0;
-  for (int i = 0; i < 3; ++i) x[i] -= axis[least] * axis[i];
-  for (double v : x) size += v * v;
-  size = std::sqrt(size);
-  for (int i = 0; i < 3; ++i) {
-    Q[i][0] = x[i] / size;
-    Q[i][2] = axis[i];
-  }
-  for (int i = 0; i < 3; ++i) Q[i][1] = Q[(i + 1) % 3][2] * Q[(i + 2) % 3][0] - Q[(i + 2) % 3][2] * Q[(i + 1) % 3][0];
-}
-
 }  // namespace
-
-CcdProblem::CcdProblem(int joints, const double* origin, const double* axis, const double* base, const double* tcp,
-                       const double* pose, const double* lower, const double* upper, double weight)
-    : n(joints), rotation_length(weight) {
-  double before[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};  // the frame before, in its link's own frame
-  for (int i = 0; i < n; ++i) {
-    double E[3][3], p[3], Q[3][3], EQ[3][3];
-    split(origin + 16 * i, E, p);
-    frame_about(axis + 3 * i, Q);
-    multiply(E, Q, EQ);
-    multiply_transposed(before, EQ, turn[i]);
-    for (int k = 0; k < 3; ++k) offset[i][k] = before[0][k] * p[0] + before[1][k] * p[1] + before[2][k] * p[2];
-    std::copy(&Q[0][0], &Q[0][0] + 9, &before[0][0]);
-    low[i] = lower[i];
-    high[i] = upper[i];
-  }
-  double T[3][3], p[3], B[3][3], b[3], first[3][3];
-  split(tcp, T, p);
-  multiply_transposed(before, T, tool_turn);
-  for (int k = 0; k < 3; ++k) tool_offset[k] = before[0][k] * p[0] + before[1][k] * p[1] + before[2][k] * p[2];
-  split(base, B, b);
-  multiply(B, turn[0], first);
-  double shifted[3];
-  for (int k = 0; k < 3; ++k)
-    shifted[k] = b[k] + B[k][0] * offset[0][0] + B[k][1] * offset[0][1] + B[k][2] * offset[0][2];
-  std::copy(&first[0][0], &first[0][0] + 9, &turn[0][0][0]);
-  std::copy(shifted, shifted + 3, offset[0]);
-  split(pose, target_turn, target);
-}
 
 void run(const CcdProblem& c, const double* starts, long P, const CcdArrays& out) {
   for (long first = 0; first < P; first += dynamics::kLanes) {

@@ -1,9 +1,9 @@
 // Binds the dynamics: the model is built once from arrays, its methods read and write NumPy buffers without the GIL.
-#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <stdexcept>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynamics_bounds.hpp"
 #include "dynamics_extrema.hpp"
@@ -15,12 +15,7 @@ namespace {
 
 namespace core = ir::dynamics;
 
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
-
-std::vector<double> flat(const py::object& data, const char* name) {
-  const Array array = data.attr(name).cast<Array>();
-  return {array.data(), array.data() + array.size()};
-}
+using ir::Array, ir::flat;
 
 core::ChainInput input_of(const py::object& data) {
   core::ChainInput in;

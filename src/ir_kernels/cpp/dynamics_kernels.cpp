@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics_composite.hpp"
 #include "dynamics_numbers.hpp"
 #include "dynamics_recursion.hpp"
 
@@ -53,74 +54,6 @@ bool inverse_dynamics_of(const Model<T>& m, const double* q, const double* qd, c
     store_columns(t, N, n, first, tau);
   }
   return finite.all();
-}
-
-// Symmetric inertia about the origin of a frame with its first moment; no mass is left in base parameters.
-struct Composite {
-  Vector<Doubles> h;
-  Doubles xx, xy, xz, yy, yz, zz;
-};
-
-// The composite of frame i seen in frame i-1.
-Composite out_of_link(const Joint<double>& j, Doubles s, Doubles c, const Composite& b) {
-  const Vector<Doubles> x = out_of_link(j, s, c, {b.xx, b.xy, b.xz});
-  const Vector<Doubles> y = out_of_link(j, s, c, {b.xy, b.yy, b.yz});
-  const Vector<Doubles> z = out_of_link(j, s, c, {b.xz, b.yz, b.zz});
-  const Vector<Doubles> row0 = out_of_link(j, s, c, {x.x, y.x, z.x});
-  const Vector<Doubles> row1 = out_of_link(j, s, c, {x.y, y.y, z.y});
-  const Vector<Doubles> row2 = out_of_link(j, s, c, {x.z, y.z, z.z});
-  Composite a;
-  a.h = out_of_link(j, s, c, b.h);
-  const auto [r0, r1, r2] = j.r;
-  const Doubles spread = 2.0 * (a.h.x * r0 + a.h.y * r1 + a.h.z * r2);
-  a.xx = row0.x + spread - 2.0 * r0 * a.h.x;
-  a.yy = row1.y + spread - 2.0 * r1 * a.h.y;
-  a.zz = row2.z + spread - 2.0 * r2 * a.h.z;
-  a.xy = row0.y - r0 * a.h.y - r1 * a.h.x;
-  a.xz = row0.z - r0 * a.h.z - r2 * a.h.x;
-  a.yz = row1.z - r1 * a.h.z - r2 * a.h.y;
-  return a;
-}
-
-// H as columns H[i * n + k]
-void composite_bodies(const Model<double>& m, const Doubles* s, const Doubles* c, Doubles* H) {
-  const int n = m.n;
-  Composite body{};
-  for (int i = n - 1; i >= 0; --i) {
-    const Joint<double>& j = m.joint[i];
-    Composite own{{splat<Doubles>(j.hx), splat<Doubles>(j.hy), Doubles{}}, splat<Doubles>(j.xx), splat<Doubles>(j.xy), splat<Doubles>(j.xz),
-                  Doubles{},        splat<Doubles>(j.yz), splat<Doubles>(j.zz)};
-    if (i + 1 < n) {
-      const Composite outer = out_of_link(m.joint[i + 1], s[i + 1], c[i + 1], body);
-      own = {own.h + outer.h, own.xx + outer.xx, own.xy + outer.xy, own.xz + outer.xz,
-             own.yy + outer.yy, own.yz + outer.yz, own.zz + outer.zz};
-    }
-    body = own;
-    H[i * n + i] = body.zz;
-    Vector<Doubles> force{-body.h.y, body.h.x, Doubles{}}, moment{body.xz, body.yz, body.zz};
-    for (int k = i; k > 0; --k) {
-      force = out_of_link(m.joint[k], s[k], c[k], force);
-      moment = add_moment(m.joint[k], out_of_link(m.joint[k], s[k], c[k], moment), force);
-      H[i * n + k - 1] = H[(k - 1) * n + i] = moment.z;
-    }
-  }
-}
-
-// Solves the symmetric positive definite A x = b in place (L D L'); A is destroyed.
-void solve_symmetric(int n, Doubles* A, Doubles* b) {
-  for (int j = 0; j < n; ++j) {
-    const Doubles inverse = 1.0 / A[j * n + j];
-    for (int i = j + 1; i < n; ++i) {
-      const Doubles factor = A[i * n + j] * inverse;
-      for (int k = j + 1; k <= i; ++k) A[i * n + k] -= factor * A[k * n + j];
-      b[i] -= factor * b[j];
-    }
-  }
-  for (int j = n - 1; j >= 0; --j) {
-    Doubles x = b[j];
-    for (int i = j + 1; i < n; ++i) x -= A[i * n + j] * b[i];
-    b[j] = x / A[j * n + j];
-  }
 }
 
 }  // namespace
@@ -250,74 +183,6 @@ bool torque_gradients(const Model<double>& m, const double* q, const double* qd,
     store_columns(H, N, n * n, first, of_qdd);
   }
   return finite.all();
-}
-
-bool axis_power(const Model<double>& m, const double* qd, const double* tau, long N, double* power) {
-  bool finite = true;
-  for (long k = 0; k < N; ++k)
-    for (int i = 0; i < m.n; ++i) {
-      const double t = tau[k * m.n + i], w = qd[k * m.n + i];
-      const double p = t * w + m.drive[i].copper_at_joint * t * t;
-      power[k * m.n + i] = p;
-      finite &= p - p == 0.0;
-    }
-  return finite;
-}
-
-double Envelope::limit(int joint, double speed) const {
-  const double* v = &speed_[joint * knots_];
-  const double* t = &torque_[joint * (knots_ + 1)];
-  if (speed < v[0]) return t[0];
-  for (int k = 1; k < knots_; ++k)
-    if (speed < v[k]) return t[k] + (t[k + 1] - t[k]) * (speed - v[k - 1]) / (v[k] - v[k - 1]);
-  return t[knots_];
-}
-
-double Envelope::least(int joint, double slowest, double fastest) const {
-  const double* v = &speed_[joint * knots_];
-  const double* t = &torque_[joint * (knots_ + 1)];
-  double least = std::min(limit(joint, slowest), limit(joint, fastest));
-  for (int k = 0; k < knots_; ++k)
-    if (slowest <= v[k] && v[k] <= fastest) least = std::min(least, t[k + 1]);
-  return least;
-}
-
-bool Envelope::limits(const double* qd, long N, double* limit) const {
-  bool finite = true;
-  for (long k = 0; k < N * n_; ++k) {
-    limit[k] = this->limit(static_cast<int>(k % n_), std::abs(qd[k]));
-    finite &= qd[k] - qd[k] == 0.0;
-  }
-  return finite;
-}
-
-void dc_bus(const double* power, const double* dt, long N, int n, double capacity, Regeneration regeneration,
-            double stored, double* mains, double* burnt, double* level) {
-  for (long k = 0; k < N; ++k) {
-    double wanted = 0.0, returned = 0.0, net = 0.0;
-    for (int i = 0; i < n; ++i) {
-      const double p = power[k * n + i];
-      wanted += std::max(p, 0.0);
-      returned += std::max(-p, 0.0);
-      net += p;
-    }
-    burnt[k] = 0.0;
-    if (regeneration == Regeneration::kNone) {
-      mains[k] = wanted;
-      burnt[k] = returned;
-    } else {
-      net *= dt[k];  // J that the axes want in this step
-      const double moved = net > 0.0 ? std::min(net, stored) : -std::min(-net, capacity - stored);
-      stored -= moved;
-      double rest = net - moved;  // J that the capacitor could not give or take
-      if (rest < 0.0 && regeneration == Regeneration::kShared) {
-        burnt[k] = -rest / dt[k];
-        rest = 0.0;
-      }
-      mains[k] = rest / dt[k];
-    }
-    level[k] = stored;
-  }
 }
 
 }  // namespace ir::dynamics

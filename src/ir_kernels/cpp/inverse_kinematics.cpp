@@ -1,9 +1,8 @@
 // Binds inverse kinematics: closed form of spherical wrists, cyclic coordinate descent of any chain.
-#include <pybind11/numpy.h>
-
 #include <memory>
 #include <stdexcept>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "ccd.hpp"
 #include "inverse_kinematics_spherical.hpp"
@@ -13,7 +12,7 @@ namespace core = ir::inverse;
 
 namespace {
 
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using ir::Array;
 
 // Hands the memory of a vector to NumPy.
 template <class T>

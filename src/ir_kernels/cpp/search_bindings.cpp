@@ -1,21 +1,16 @@
 // The bidirectional search as Python sees it: an object that is grown in slices, the GIL released meanwhile.
-#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <mutex>
-#include <stdexcept>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "search.hpp"
 
 namespace py = pybind11;
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using ir::Array, ir::expect;
 
 namespace {
-
-void expect(bool holds, const char* what) {
-  if (!holds) throw std::invalid_argument(what);
-}
 
 ir::BidirectionalSearch search_of(const ir::Model& model, const Array& start, const Array& goals,
                                   const Array& threshold, const Array& low, const Array& high, const Array& scale,

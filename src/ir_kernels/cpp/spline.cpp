@@ -1,10 +1,9 @@
 // Binds the refinement of a motion along a uniform cubic B-spline: see ir_kernels/spline.py.
-#include <pybind11/numpy.h>
-
 #include <memory>
 #include <mutex>
 #include <stdexcept>
 
+#include "arrays.hpp"
 #include "bending_metric.hpp"
 #include "bindings.hpp"
 #include "descent.hpp"
@@ -14,14 +13,9 @@ namespace py = pybind11;
 
 namespace {
 
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using ir::Array, ir::flat;
 using Rows = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 namespace dynamics = ir::dynamics;
-
-std::vector<double> flat(const py::object& data, const char* name) {
-  const Array array = data.attr(name).cast<Array>();
-  return {array.data(), array.data() + array.size()};
-}
 
 ir::SplineTerms terms_of(const py::object& data) {
   ir::SplineTerms t;

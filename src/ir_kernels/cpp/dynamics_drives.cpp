@@ -1,0 +1,77 @@
+// The drives: power of the axes, torque that is available at a speed, and the common DC bus.
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics_kernels.hpp"
+
+namespace ir::dynamics {
+
+bool axis_power(const Model<double>& m, const double* qd, const double* tau, long N, double* power) {
+  bool finite = true;
+  for (long k = 0; k < N; ++k)
+    for (int i = 0; i < m.n; ++i) {
+      const double t = tau[k * m.n + i], w = qd[k * m.n + i];
+      const double p = t * w + m.drive[i].copper_at_joint * t * t;
+      power[k * m.n + i] = p;
+      finite &= p - p == 0.0;
+    }
+  return finite;
+}
+
+double Envelope::limit(int joint, double speed) const {
+  const double* v = &speed_[joint * knots_];
+  const double* t = &torque_[joint * (knots_ + 1)];
+  if (speed < v[0]) return t[0];
+  for (int k = 1; k < knots_; ++k)
+    if (speed < v[k]) return t[k] + (t[k + 1] - t[k]) * (speed - v[k - 1]) / (v[k] - v[k - 1]);
+  return t[knots_];
+}
+
+double Envelope::least(int joint, double slowest, double fastest) const {
+  const double* v = &speed_[joint * knots_];
+  const double* t = &torque_[joint * (knots_ + 1)];
+  double least = std::min(limit(joint, slowest), limit(joint, fastest));
+  for (int k = 0; k < knots_; ++k)
+    if (slowest <= v[k] && v[k] <= fastest) least = std::min(least, t[k + 1]);
+  return least;
+}
+
+bool Envelope::limits(const double* qd, long N, double* limit) const {
+  bool finite = true;
+  for (long k = 0; k < N * n_; ++k) {
+    limit[k] = this->limit(static_cast<int>(k % n_), std::abs(qd[k]));
+    finite &= qd[k] - qd[k] == 0.0;
+  }
+  return finite;
+}
+
+void dc_bus(const double* power, const double* dt, long N, int n, double capacity, Regeneration regeneration,
+            double stored, double* mains, double* burnt, double* level) {
+  for (long k = 0; k < N; ++k) {
+    double wanted = 0.0, returned = 0.0, net = 0.0;
+    for (int i = 0; i < n; ++i) {
+      const double p = power[k * n + i];
+      wanted += std::max(p, 0.0);
+      returned += std::max(-p, 0.0);
+      net += p;
+    }
+    burnt[k] = 0.0;
+    if (regeneration == Regeneration::kNone) {
+      mains[k] = wanted;
+      burnt[k] = returned;
+    } else {
+      net *= dt[k];  // J that the axes want in this step
+      const double moved = net > 0.0 ? std::min(net, stored) : -std::min(-net, capacity - stored);
+      stored -= moved;
+      double rest = net - moved;  // J that the capacitor could not give or take
+      if (rest < 0.0 && regeneration == Regeneration::kShared) {
+        burnt[k] = -rest / dt[k];
+        rest = 0.0;
+      }
+      mains[k] = rest / dt[k];
+    }
+    level[k] = stored;
+  }
+}
+
+}  // namespace ir::dynamics

@@ -1,0 +1,152 @@
+// The drives' share of the cost of a spline: torques, speeds and powers of the samples, and the energy over the DC bus.
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics_numbers.hpp"
+#include "spline_cost.hpp"
+
+namespace ir {
+namespace {
+
+constexpr double still = 0.02;  // [rad/s] friction and |qd| are smoothed below
+
+double sum(const Double8& v) {
+  double s = 0.0;
+  for (int k = 0; k < 8; ++k) s += v[k];
+  return s;
+}
+
+}  // namespace
+
+// Torques, their penalties and those of speed; the powers.
+double SplineCost::drives(double step) {
+  const auto& arm = core_.model;
+  Lane cost{}, of_step{};
+  for (Group& g : groups_) {
+    Lane theta[dynamics::kMaxJoints];
+    for (int j = 0; j < n_; ++j) theta[j] = g.q[j] + arm.joint[j].theta0;
+    sincos(n_, theta, g.s, g.c);
+    dynamics::newton_euler(arm, g.s, g.c, g.qd, g.qdd, g.tau, true, dynamics::Trace<Lane>{g.link});
+    if (arm.balance.joint >= 0) {
+      const int b = arm.balance.joint;
+      g.tau[b] -= dynamics::balance_torque(arm.balance, g.s[b], g.c[b]);
+    }
+    for (int j = 0; j < n_; ++j) {
+      const auto& d = arm.drive[j];
+      const Lane v = g.qd[j], speed = abs(v), root = sqrt(v * v + still * still);
+      g.tau[j] += g.qdd[j] * d.rotor + v * d.viscous + d.coulomb * v / root;
+      g.power[j] = g.tau[j] * v + d.copper_at_joint * g.tau[j] * g.tau[j];
+      Lane limit = splat<Lane>(standing_[j]), falls{};
+      for (int k = 0; k < bends_; ++k) {
+        const double at = bend_at_[j * bends_ + k], by = bend_[j * bends_ + k];
+        const Lane over = speed - at;
+        limit += over > 0.0 ? by * over : Lane{};
+        falls += over > 0.0 ? splat<Lane>(by) : Lane{};
+      }
+      const Lane torque = abs(g.tau[j]), inverse = 1.0 / (limit * terms_.torque_share);
+      const Lane use = max(torque * inverse - 1.0, Lane{}) * g.counts;
+      const double fastest = 1.0 / terms_.velocity[j];
+      const Lane over = max(speed * fastest - 1.0, Lane{}) * g.counts;
+      const Lane penalty = terms_.penalty * (use * use + over * over);
+      cost += penalty * step;
+      of_step += penalty;
+      const Lane weight = 2.0 * step * terms_.penalty * use;
+      const Lane sign_v = v > 0.0 ? splat<Lane>(1.0) : splat<Lane>(-1.0);
+      g.of_tau[j] = weight * inverse * (g.tau[j] > 0.0 ? splat<Lane>(1.0) : splat<Lane>(-1.0));
+      g.of_qd[j] = sign_v * (2.0 * step * terms_.penalty * fastest * over - weight * torque * inverse / limit * falls);
+      if (terms_.travel[j] > 0.0) {
+        const Lane way = terms_.travel[j] * (root - still) * g.counts;
+        cost += way * step;
+        of_step += way;
+        g.of_qd[j] += (step * terms_.travel[j]) * g.counts * v / root;
+      }
+    }
+  }
+  of_step_ += sum(of_step);
+  return sum(cost);
+}
+
+// Energy at the mains over the common bus, sample after sample; and the derivative by each sample's power.
+double SplineCost::bus(double step) {
+  using dynamics::Regeneration;
+  power_.assign(count_, 0.0);
+  of_power_.assign(count_, 0.0);
+  for (int k = 0; k < count_; ++k)
+    for (int j = 0; j < n_; ++j) {
+      const double p = groups_[k / 8].power[j][k % 8];
+      power_[k] += terms_.regeneration == Regeneration::kNone ? std::max(p, 0.0) : p;
+    }
+  energy = 0.0;
+  if (terms_.regeneration == Regeneration::kNone) {
+    for (int k = 0; k < count_; ++k) energy += power_[k] * step;
+    std::fill(of_power_.begin(), of_power_.end(), 1.0);
+  } else {
+    // of_power_ first says where a joule of this sample comes from: 1 the mains (or goes back there), 2 the capacitor, 0
+    // nowhere, as one is burnt less
+    double stored = 0.0;
+    for (int k = 0; k < count_; ++k) {
+      const double wanted = power_[k] * step, full = stored - terms_.capacity;
+      if (wanted > stored) {
+        energy += wanted - stored;
+        stored = 0.0;
+        of_power_[k] = 1.0;
+      } else if (wanted < full) {
+        const bool returns = terms_.regeneration == Regeneration::kFedBack;
+        if (returns) energy += wanted - full;
+        stored = terms_.capacity;
+        of_power_[k] = returns ? 1.0 : 0.0;
+      } else {
+        stored -= wanted;
+        of_power_[k] = 2.0;
+      }
+    }
+    double of_stored = 0.0;  // what a joule more in the capacitor costs from here on
+    for (int k = count_ - 1; k >= 0; --k) {
+      if (of_power_[k] == 2.0) of_power_[k] = -of_stored;
+      else of_stored = -of_power_[k];
+    }
+  }
+  const double worth = terms_.energy_value;
+  double of_step = 0.0;
+  for (int k = 0; k < count_; ++k) {
+    of_step += of_power_[k] * power_[k];
+    of_power_[k] *= worth * step;
+  }
+  of_step_ += worth * of_step;
+  return worth * energy;
+}
+
+// From powers and torques back to positions, speeds and accelerations. Returns what the cost gains from a motion that is
+// slower, per relative change of the time between knots.
+double SplineCost::slower() {
+  const auto& arm = core_.model;
+  double gain = 0.0;
+  for (std::size_t k = 0; k < groups_.size(); ++k) {
+    Group& g = groups_[k];
+    Lane of_power{};
+    for (int l = 0; l < 8; ++l) of_power[l] = 8 * k + l < static_cast<std::size_t>(count_) ? of_power_[8 * k + l] : 0.0;
+    for (int j = 0; j < n_; ++j) {
+      const auto& d = arm.drive[j];
+      Lane w = of_power;
+      if (terms_.regeneration == dynamics::Regeneration::kNone) w = g.power[j] > 0.0 ? w : Lane{};
+      g.of_tau[j] += w * (g.qd[j] + 2.0 * d.copper_at_joint * g.tau[j]);
+      g.of_qd[j] += w * g.tau[j];
+      const Lane root = g.qd[j] * g.qd[j] + still * still;
+      g.of_qd[j] += g.of_tau[j] * (d.viscous + d.coulomb * still * still / (root * sqrt(root)));
+      g.of_qdd[j] += g.of_tau[j] * d.rotor;
+    }
+    const int b = arm.balance.joint;
+    if (b >= 0) {
+      using Dual = dynamics::Dual<Lane>;
+      const Dual s{g.s[b], g.c[b]}, c{g.c[b], -g.s[b]};
+      g.of_q[b] -= g.of_tau[b] * dynamics::balance_torque(arm.balance, s, c).d;
+    }
+    dynamics::newton_euler_adjoint(arm, g.s, g.c, g.qd, g.link, g.of_tau, g.of_q, g.of_qd, g.of_qdd);
+    Lane lane_gain{};
+    for (int j = 0; j < n_; ++j) lane_gain += g.of_qd[j] * g.qd[j] + 2.0 * g.of_qdd[j] * g.qdd[j];
+    gain += sum(lane_gain);
+  }
+  return gain;
+}
+
+}  // namespace ir
