@@ -192,7 +192,7 @@ candidates = st.builds(
     trajectory=st.none() | trajectories(),
     report=reports,
 )
-sentences = texts.filter(str.isprintable)  # control characters are escaped on their way into a message
+sentences = texts.filter(str.isprintable)  # control characters are escaped in messages
 statuses = st.builds(Status, st.sampled_from(StatusCode) | st.just(7), sentences, texts)
 plc_inputs = st.builds(plc.PlcInputs, *[bits] * 8, operating_modes)
 plc_outputs = st.builds(plc.PlcOutputs, stamps, *[bits] * 6, operating_modes)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description.power import DcLink
+from ir_description.robot import DcLink
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.read.recording import PowerSeries
 
