@@ -83,8 +83,8 @@ WORKING = np.deg2rad([0.0, -80.0, 100.0, 10.0, 40.0, 0.0])
 def swing(K: int, degrees: float = 50.0) -> FloatArray:
     """A movement of the first axis and a little of the others, from rest to rest."""
     u = np.clip((np.arange(K) - 2.0) / (K - 5.0), 0.0, 1.0)[:, None]
-    way = np.deg2rad([2.0 * degrees, 10.0, -15.0, 20.0, 15.0, -40.0])
-    control: FloatArray = WORKING + (u * u * (3.0 - 2.0 * u) - 0.5) * way
+    swing_by = np.deg2rad([2.0 * degrees, 10.0, -15.0, 20.0, 15.0, -40.0])
+    control: FloatArray = WORKING + (u * u * (3.0 - 2.0 * u) - 0.5) * swing_by
     return control
 
 

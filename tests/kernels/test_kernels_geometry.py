@@ -144,10 +144,10 @@ def test_no_translation_shorter_than_the_depth_parts_two_bodies(seed: int) -> No
             return float(moved.witnesses(AT_ZERO, [0]).distance[0])
 
         assert after((depth + 1e-6) * normal) >= 0.0, f"the {body.kind} holds on"
-        assert abs(after(0.5 * depth * normal) + 0.5 * depth) < 1e-6, "the depth shrinks on the way"
+        assert abs(after(0.5 * depth * normal) + 0.5 * depth) < 1e-6, "the depth shrinks in between"
         for direction in rng.normal(size=(40, 3)):
             shorter = 0.999 * depth * direction / np.linalg.norm(direction)
-            assert after(shorter) < 0.0, f"a shorter way out of the {body.kind} exists"
+            assert after(shorter) < 0.0, f"a shorter translation out of the {body.kind} exists"
 
 
 def test_a_threshold_per_pair_counts_for_its_pair_only() -> None:

@@ -21,8 +21,8 @@ def placed(robot: RobotLiteral) -> Chain:
 
 
 def shifted_arm() -> RobotLiteral:
-    """A spherical-wrist arm unlike the KR 210: other zero, lateral offset, an axis that points the other
-    way.
+    """A spherical-wrist arm unlike the KR 210: other zero, lateral offset, an axis that points in the
+    opposite direction.
     """
     robot = kr210()
     origin = robot.joint_origin.copy()

@@ -16,22 +16,22 @@ POWERS = st.lists(st.lists(st.floats(-5e3, 5e3), min_size=2, max_size=2), min_si
 
 
 @given(POWERS, st.sampled_from(REGENERATIONS), st.floats(1e-4, 0.1), st.floats(0.0, CAPACITY))
-def test_mains_are_axes_plus_burnt_plus_the_change_of_the_capacitor(
+def test_mains_are_axes_plus_dissipated_plus_the_change_of_the_capacitor(
     powers: list[list[float]], regeneration: Regeneration, dt: float, stored: float
 ) -> None:
     axis_power = np.array(powers)
     bus = dc_bus(axis_power, dt, DcBusParameters(CAPACITY, regeneration), stored)
     change = np.diff(bus.stored, prepend=stored)
-    assert bus.mains * dt == pytest.approx((axis_power.sum(axis=1) + bus.burnt) * dt + change, abs=1e-6)
+    assert bus.mains * dt == pytest.approx((axis_power.sum(axis=1) + bus.dissipated) * dt + change, abs=1e-6)
     assert (bus.stored >= 0.0).all()
     assert (bus.stored <= CAPACITY).all()
-    assert (bus.burnt >= 0.0).all()
+    assert (bus.dissipated >= 0.0).all()
     if regeneration != "fed_back":
         assert (bus.mains >= 0.0).all()
 
 
 @pytest.mark.parametrize(
-    ("regeneration", "mains", "burnt", "stored"),
+    ("regeneration", "mains", "dissipated", "stored"),
     [
         ("shared", [0.0, 0.0, 0.0, 94.0], [0.0, 94.0, 0.0, 0.0], [100.0, 106.0, 6.0, 0.0]),
         ("fed_back", [0.0, -94.0, 0.0, 94.0], [0.0, 0.0, 0.0, 0.0], [100.0, 106.0, 6.0, 0.0]),
@@ -39,12 +39,12 @@ def test_mains_are_axes_plus_burnt_plus_the_change_of_the_capacitor(
     ],
 )
 def test_a_surplus_goes_to_the_axes_then_the_capacitor_then_the_rest(
-    core: Any, regeneration: Regeneration, mains: list[float], burnt: list[float], stored: list[float]
+    core: Any, regeneration: Regeneration, mains: list[float], dissipated: list[float], stored: list[float]
 ) -> None:
     axis_power = np.array([[50.0, -150.0], [0.0, -100.0], [100.0, 0.0], [50.0, 50.0]])
     bus = dc_bus(axis_power, 1.0, DcBusParameters(CAPACITY, regeneration), core=core)
     assert bus.mains == pytest.approx(mains)
-    assert bus.burnt == pytest.approx(burnt)
+    assert bus.dissipated == pytest.approx(dissipated)
     assert bus.stored == pytest.approx(stored)
 
 
@@ -55,7 +55,7 @@ def test_steps_one_by_one_are_the_scan(core: Any) -> None:
     stored = 20.0
     for k in range(50):
         step = dc_bus(axis_power[k : k + 1], 0.01, parameters, stored, core=core)
-        assert (step.mains[0], step.burnt[0]) == (whole.mains[k], whole.burnt[k])
+        assert (step.mains[0], step.dissipated[0]) == (whole.mains[k], whole.dissipated[k])
         stored = float(step.stored[0])
 
 
@@ -68,7 +68,7 @@ def test_drive_energy_is_mechanical_work_plus_copper() -> None:
     tau = model.inverse_dynamics(q, qd, qdd)
     copper = kr210().copper_loss * (tau / kr210().gear_ratio) ** 2
     assert energy.axes == pytest.approx(((tau * qd + copper) * dt[:, None]).sum(axis=0))
-    assert energy.mains == pytest.approx(energy.axes.sum() + energy.burnt + energy.capacitor_change)
+    assert energy.mains == pytest.approx(energy.axes.sum() + energy.dissipated + energy.capacitor_change)
     assert energy.peak > 0.0
 
 

@@ -17,7 +17,7 @@ SAFETY = 0.02
 SCALE = np.array([1.0, 0.85, 0.75, 0.68, 0.63, 0.62])
 BUDGET = 50_000
 COAL = 1e-5  # [m] its distances of cylinders are iterated
-# A column between both ends and a beam over them: neither the straight way nor one over the top is free.
+# A column between both ends and a beam over them: neither the straight path nor one over the top is free.
 GATE = (
     box("column", (2.0, 0.0, 1.2), (0.3, 0.3, 2.4)),
     box("beam", (2.0, 0.0, 2.6), (0.4, 2.0, 0.3)),
@@ -77,7 +77,7 @@ def test_a_path_joins_the_ends_exactly_and_every_step_is_proved(
     assert found.found
     assert found.goal_index == 0
     assert np.array_equal(path[[0, -1]], [LEFT, RIGHT])
-    assert len(path) > 2, "the straight way must not be free, else this shows nothing"
+    assert len(path) > 2, "the straight path must not be free, else this shows nothing"
     assert (path >= KR210.position_min).all()
     assert (path <= KR210.position_max).all()
     assert (np.abs(np.diff(path, axis=0)).max(axis=1) > 0.0).all()
@@ -95,7 +95,7 @@ def test_coal_finds_nothing_too_near_on_a_path() -> None:
             assert nearest > SAFETY - COAL
 
 
-def test_the_straight_way_is_taken_where_it_is_free(of_core: Any) -> None:
+def test_the_straight_path_is_taken_where_it_is_free(of_core: Any) -> None:
     collision = model((FLOOR,), of_core)
     found = grown(collision, LEFT, RIGHT[None])
     assert np.array_equal(found.path, [LEFT, RIGHT])
@@ -130,7 +130,7 @@ def test_slices_give_the_path_of_one_call(of_core: Any, size: int) -> None:
     assert sliced.edges == before, "a path that is found costs nothing more"
 
 
-def test_where_no_way_leads_the_budget_is_spent_and_the_gap_told(of_core: Any) -> None:
+def test_where_no_path_leads_the_budget_is_spent_and_the_gap_stated(of_core: Any) -> None:
     behind = box(
         "behind", (0.0, 0.0, 2.0), (0.2, 1.1, 8.0)
     )  # a tool without an arm could pass over the robot
@@ -208,7 +208,7 @@ FOLDED = turned(0.0) + np.deg2rad([0.0, 50.0, 0.0, 0.0, 0.0, 0.0])  # into the f
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
+    ("changed", "said"),
     [
         ({"start": LEFT[:5]}, "start has shape"),
         ({"start": NAN}, r"start\[0\] is nan"),
@@ -232,12 +232,12 @@ FOLDED = turned(0.0) + np.deg2rad([0.0, 50.0, 0.0, 0.0, 0.0, 0.0])  # into the f
         ({"goal_lines": [NAN[None]]}, r"goal_lines\[0\]"),
     ],
 )
-def test_arguments_that_make_no_sense_are_named(changed: dict[str, Any], told: str) -> None:
+def test_arguments_that_make_no_sense_are_named(changed: dict[str, Any], said: str) -> None:
     usual = {
         "collision": model(GATE), "start": LEFT, "goals": GOALS, "threshold": SAFETY, "seed": 0,
         "low": KR210.position_min, "high": KR210.position_max, "scale": SCALE,
     }  # fmt: skip
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=said):
         BidirectionalTree(**{**usual, **changed})
 
 

@@ -218,7 +218,7 @@ def test_native_agrees_with_baseline() -> None:
 
 
 @pytest.mark.parametrize("lack", [1e-7, 1e-6, 1e-5])
-def test_pairs_that_lack_less_than_a_float_can_tell_count(core: Any, lack: float) -> None:
+def test_pairs_that_lack_less_than_a_float_can_resolve_count(core: Any, lack: float) -> None:
     collision, dynamics = kr210_models(few=core is None)
     q = np.tile(WORKING, (4, 1))
     threshold = collision.distances(q[:1]) + lack  # what every pair lacks, all the time

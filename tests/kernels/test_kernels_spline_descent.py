@@ -18,7 +18,7 @@ from spline_cases import along, at_rest, chain_models, kr210_cost, kr210_models,
 from ir_kernels import Chain, CollisionModel, DynamicsModel, InputError, SplineCost, SplineDescent, compiled
 from ir_msgs_py.arrays import FloatArray
 
-BLOCK = (box("block", (1.9, 0.35, 1.1), (0.3, 0.3, 2.2)),)  # in the way of `swing`
+BLOCK = (box("block", (1.9, 0.35, 1.1), (0.3, 0.3, 2.2)),)  # obstructs `swing`
 
 
 def descended(core: Any, evaluations: int, **options: Any) -> tuple[SplineCost, FloatArray, SplineDescent]:
@@ -27,7 +27,7 @@ def descended(core: Any, evaluations: int, **options: Any) -> tuple[SplineCost, 
     return cost, control, cost.descend(control, 0.15, evaluations=evaluations, **options)
 
 
-def test_the_descent_goes_down_and_tells_the_truth(core: Any) -> None:
+def test_the_descent_lowers_the_cost_and_reports_it_truly(core: Any) -> None:
     last = np.inf
     for evaluations in (1, 12, 25, 50) if core is None else (1, 12, 25, 50, 200):
         cost, control, found = descended(core, evaluations, tolerance=0.0)
@@ -118,7 +118,7 @@ def test_threads_share_one_object(core: Any) -> None:
 
 
 def test_other_threads_run_meanwhile() -> None:
-    """No thread is preempted here: this one gets its turn before the descent ends, as that gives way."""
+    """No thread is preempted here: this one gets its turn before the descent ends, as that yields."""
     if compiled.MODULE is None:
         pytest.skip("nothing compiled")
     cost, ready, ended = kr210_cost(compiled.MODULE, BLOCK, few=True), threading.Event(), []

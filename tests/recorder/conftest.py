@@ -259,7 +259,7 @@ class _Recorder:
         message.power, message.energy, message.base_power = power, self.energy, base
         link = self.power.dc_link
         message.bus_voltage = float(np.sqrt(link.voltage**2 + 2.0 * bus.stored[k] / link.capacitance))
-        message.burnt_power = float(bus.burnt[part].mean())
+        message.burnt_power = float(bus.dissipated[part].mean())
         message.joint_power, message.joint_torque = axis[part].mean(axis=0), tau[k]
         self._put("/ir_sim_driver/power_state", message, ns)
 
@@ -268,7 +268,7 @@ class _Recorder:
         report.duration = phase.seconds
         report.energy = float(mains.sum() * dt) * self.factor
         report.joint_energy = axis.sum(axis=0) * dt
-        report.base_energy, report.burnt_energy = base * phase.seconds, float(bus.burnt.sum() * dt)
+        report.base_energy, report.burnt_energy = base * phase.seconds, float(bus.dissipated.sum() * dt)
         report.peak_power, report.min_clearance = float(mains.max()), 0.1
 
     def _event(self, phase: Phase, index: int, total: int, event: str) -> None:

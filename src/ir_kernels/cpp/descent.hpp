@@ -27,7 +27,7 @@ inline double inner(const std::vector<double>& a, const std::vector<double>& b) 
 }
 
 // function(x, gradient) -> value; precondition(v): v <- M^-1 v for a positive definite M near the Hessian. Ends after
-// `most` evaluations, when ten iterations gain less than `tolerance` of the value, or where there is no way down (nor
+// `most` evaluations, when ten iterations gain less than `tolerance` of the value, or where no direction leads down (nor
 // where the function is not finite).
 template <class Function, class Precondition>
 Descent descend(std::vector<double>& x, Function&& function, Precondition&& precondition, int most, double tolerance) {
@@ -62,7 +62,7 @@ Descent descend(std::vector<double>& x, Function&& function, Precondition&& prec
       for (std::size_t i = 0; i < size; ++i) direction[i] += (alpha[k] - beta) * pairs[k].s[i];
     }
     double slope = -inner(g, direction);
-    if (!(slope < 0.0)) {  // only rounding can lead here: start again from the steepest way
+    if (!(slope < 0.0)) {  // only rounding can lead here: start again from the steepest direction
       if (pairs.empty()) break;
       pairs.clear();
       continue;

@@ -2,7 +2,7 @@
 // algorithm run backwards (reverse mode), at about twice its cost whatever the number of joints.
 //
 // With weights u on the torques, the adjoints of the loads are the velocities that the arm would have if its joints
-// turned at u; the adjoints of the motions follow from them on the way back to the base.
+// turned at u; the adjoints of the motions follow from them in the pass back to the base.
 #pragma once
 
 #include "dynamics_recursion.hpp"

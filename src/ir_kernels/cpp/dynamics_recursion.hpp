@@ -89,13 +89,13 @@ inline Vector<S> move_field(const Joint<T>& next, const S& square, const S& rate
   return a;
 }
 
-// Who doesn't want to know what the recursion passes on its way.
+// For callers that need nothing of what the recursion passes on.
 struct NoTrace {
   template <class S> void motion(int, const Vector<S>&, const Vector<S>&, const Vector<S>&) {}
   template <class S> void load(int, const Vector<S>&, const Vector<S>&) {}
 };
 
-// H qdd + h: sin and cos of q + theta0, torque per joint. Without `gravity` the weight is left out. `trace` is told the
+// H qdd + h: sin and cos of q + theta0, torque per joint. Without `gravity` the weight is left out. `trace` receives the
 // motion of each link (angular velocity and acceleration, acceleration of its origin) and the load that it hands on.
 template <int kJoints = 0, class S, class T, class Trace = NoTrace>
 inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau,

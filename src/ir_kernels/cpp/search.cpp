@@ -211,11 +211,11 @@ void BidirectionalSearch::join() {
 void BidirectionalSearch::confirm(int at_start, int at_goal) {
   prepare(Phase::confirm);
   meet_[0] = at_start, meet_[1] = at_goal;
-  std::vector<int> way;
-  for (int k = at_start; k >= 0; k = trees_[0].parent(k)) way.push_back(k);
-  std::reverse(way.begin(), way.end());
-  for (std::size_t k = 1; k < way.size(); ++k)
-    push(trees_[0].node(way[k - 1]), trees_[0].node(way[k]), {0, way[k], 0.0});
+  std::vector<int> branch;
+  for (int k = at_start; k >= 0; k = trees_[0].parent(k)) branch.push_back(k);
+  std::reverse(branch.begin(), branch.end());
+  for (std::size_t k = 1; k < branch.size(); ++k)
+    push(trees_[0].node(branch[k - 1]), trees_[0].node(branch[k]), {0, branch[k], 0.0});
   push(trees_[0].node(at_start), trees_[1].node(at_goal), {-1, -1, 0.0});
   for (int k = at_goal; trees_[1].parent(k) >= 0; k = trees_[1].parent(k))
     push(trees_[1].node(k), trees_[1].node(trees_[1].parent(k)), {1, k, 0.0});

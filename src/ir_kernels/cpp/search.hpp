@@ -2,7 +2,7 @@
 //
 // J. Kuffner, S. LaValle, "RRT-Connect", ICRA 2000, in batches of one register of lanes: the smaller tree draws
 // targets, goes one step towards each of them, and every new node is joined with the nearest of the other tree, as far
-// as the way is proved. Most targets lie near nodes or between start and goal, which is what finds narrow passages.
+// as the path is proved. Most targets lie near nodes or between start and goal, which is what finds narrow passages.
 //
 // Work is counted in certified edges, and sixteen configurations that are only looked at count as one. What is found
 // does not depend on how the work is divided into calls.

@@ -67,8 +67,8 @@ def same_length(**arrays: FloatArray) -> None:
     """Raise InputError when batches that belong together have different lengths."""
     lengths = {name: len(array) for name, array in arrays.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise InputError(f"batches of different length: {told}")
+        said = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise InputError(f"batches of different length: {said}")
 
 
 def number(name: str, value: Any, least: float, most: float = np.inf, *, above: bool = False) -> float:

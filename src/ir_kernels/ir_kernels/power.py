@@ -1,7 +1,7 @@
 """From joint torques to joules at the mains: axis power, the common DC bus, energy of a sampled trajectory.
 
 The axes of one controller share a DC bus that the supply only feeds (it rectifies). What braking axes give
-back goes to the other axes, then into the capacitor; the rest is burnt in the brake resistor.
+back goes to the other axes, then into the capacitor; the rest is dissipated in the brake resistor.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ class DcBusParameters:
     """What the bus can do with braking energy.
 
     capacity_energy [J]: what fits into the capacitor between rest voltage and brake chopper, C (U_on^2 -
-    U_0^2) / 2. regeneration: "shared" (the surplus beyond the capacitor is burnt), "none" (every axis'
-    braking energy is burnt, nothing is shared or stored), "fed_back" (the surplus beyond the capacitor
+    U_0^2) / 2. regeneration: "shared" (the surplus beyond the capacitor is dissipated), "none" (every axis'
+    braking energy is dissipated, nothing is shared or stored), "fed_back" (the surplus beyond the capacitor
     returns to the mains).
     """
 
@@ -44,25 +44,25 @@ class DcBusParameters:
 
 @dataclass(frozen=True)
 class DcBus:
-    """Step by step: mains (N,) W drawn for the axes, burnt (N,) W in the resistor, stored (N,) J after the
-    step.
+    """Step by step: mains (N,) W drawn for the axes, dissipated (N,) W in the resistor, stored (N,) J
+    after the step.
     """
 
     mains: FloatArray
-    burnt: FloatArray
+    dissipated: FloatArray
     stored: FloatArray
 
 
 @dataclass(frozen=True)
 class DriveEnergy:
-    """Where the drive energy of a trajectory goes, J: mains = sum(axes) + burnt + capacitor_change.
+    """Where the drive energy of a trajectory goes, J: mains = sum(axes) + dissipated + capacitor_change.
 
     axes (n,): signed energy each axis took from the bus. peak [W]: the largest mains power of a step.
     """
 
     mains: float
     axes: FloatArray
-    burnt: float
+    dissipated: float
     capacitor_change: float
     peak: float
 
@@ -89,13 +89,14 @@ def dc_bus(
 
     - "shared": demand P > 0 empties the capacitor first, the mains give the rest; surplus P < 0 fills it
     first, the
-      rest is burnt. mains >= 0.
-    - "fed_back": the same, but the rest of the surplus returns to the mains: mains < 0, burnt = 0.
-    - "none": mains = sum of the positive axes, burnt = sum of the negative ones; the capacitor stays as it
-    is.
+      rest is dissipated. mains >= 0.
+    - "fed_back": the same, but the rest of the surplus returns to the mains: mains < 0, dissipated
+      = 0.
+    - "none": mains = sum of the positive axes, dissipated = sum of the negative ones; the capacitor stays
+    as it is.
 
-    Always mains dt = (sum of axes + burnt) dt + change of stored, and 0 <= stored <= capacity_energy. What
-    is left in the capacitor at the end is not credited to anyone. N may be 1: a driver hands `stored` on
+    Always mains dt = (sum of axes + dissipated) dt + change of stored, and 0 <= stored <= capacity_energy.
+    What is left in the capacitor at the end is not credited to anyone. N may be 1: a driver hands `stored` on
     from call to call. Raises InputError.
     """
     power = checked("axis_power", axis_power, None, None)
@@ -127,7 +128,7 @@ def drive_energy(
     return DriveEnergy(
         mains=float(steps @ bus.mains),
         axes=axes,
-        burnt=float(steps @ bus.burnt),
+        dissipated=float(steps @ bus.dissipated),
         capacitor_change=float(bus.stored[-1] - stored),
         peak=float(bus.mains.max()),
     )

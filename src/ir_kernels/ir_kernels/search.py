@@ -23,7 +23,7 @@ class BidirectionalTree:
 
     low, high (n,): limits of the joints [rad]. scale (n,): how much each joint counts in the distance of
     configurations. seed: the same one gives the same path, another one usually another. start_line (M, n),
-    goal_lines (one (M_g, n) per goal): free ways that are known already, as a straight retreat: the
+    goal_lines (one (M_g, n) per goal): free paths that are known already, as a straight retraction: the
     configurations that follow the start, or that goal. They are certified like all else, and become the
     trees' first branches as far as they are free.
 

@@ -103,7 +103,7 @@ class SplineCost:
         evaluations: int = 100,
         tolerance: float = 1e-4,
     ) -> SplineDescent:
-        """Go down from a spline (K, n), K >= 7, at rest at both ends, which stay: three points at each.
+        """Descend from a spline (K, n), K >= 7, at rest at both ends, which stay: three points at each.
 
         L-BFGS with a metric in which bending counts; the interval changes too unless `fixed_interval`. Ends
         after `evaluations`, or when ten steps gain less than `tolerance` of the cost; at once where the cost

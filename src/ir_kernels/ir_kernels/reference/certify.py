@@ -54,7 +54,7 @@ class Edges:
         return result
 
     def spread(self, rows: IntArray, middle: FloatArray, half: FloatArray) -> FloatArray:
-        """Half of the way over the interval."""
+        """Half of the motion over the interval."""
         result: FloatArray = half[:, None] * np.abs(self.step[rows])
         return result
 

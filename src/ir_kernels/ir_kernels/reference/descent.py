@@ -50,8 +50,8 @@ def descend(
     """Where the descent from `x` (N,) ends, the value there, and how many evaluations it took.
 
     function(x): value and gradient; solve(v): M^-1 v, M positive definite and near the Hessian. Ends after
-    `evaluations`, when PATIENCE iterations gain less than `tolerance` of the value, or where there is no way
-    down.
+    `evaluations`, when PATIENCE iterations gain less than `tolerance` of the value, or where no direction
+    leads down.
     """
     value, gradient = function(x)
     pairs: Pairs = []
@@ -59,7 +59,7 @@ def descend(
     while used < evaluations:
         d = direction(gradient, pairs, solve)
         slope = -float(gradient @ d)
-        if not slope < 0.0:  # only rounding can lead here: start again from the steepest way
+        if not slope < 0.0:  # only rounding can lead here: start again from the steepest direction
             if not pairs:
                 break
             pairs = []

@@ -58,10 +58,10 @@ class Tree:
 
     def branch(self, node: int) -> list[int]:
         """The nodes from `node` to its root."""
-        way = [node]
-        while self.parent[way[-1]] >= 0:
-            way.append(self.parent[way[-1]])
-        return way
+        path = [node]
+        while self.parent[path[-1]] >= 0:
+            path.append(self.parent[path[-1]])
+        return path
 
 
 class Search:

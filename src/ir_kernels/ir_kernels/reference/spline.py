@@ -98,7 +98,7 @@ def bus(power: FloatArray, step: float, capacity: float, regeneration: str) -> t
             source.append("mains")
         elif wanted < stored - capacity:
             rest, stored = wanted - (stored - capacity), capacity
-            source.append("mains" if regeneration == "fed_back" else "burnt")
+            source.append("mains" if regeneration == "fed_back" else "dissipated")
         else:
             stored -= wanted
             source.append("capacitor")
@@ -184,8 +184,8 @@ class SplineCost:
         limit, falls = torque_limit(data, speed)
         use = np.abs(torque) / (limit * t.torque_share)
         too_much, too_fast = np.maximum(use - 1.0, 0.0), np.maximum(speed / t.velocity - 1.0, 0.0)
-        way = t.travel * (np.hypot(s.qd, STILL) - STILL)
-        rate = t.penalty * float(np.sum(too_much**2 + too_fast**2)) + float(np.sum(way))
+        travelled = t.travel * (np.hypot(s.qd, STILL) - STILL)
+        rate = t.penalty * float(np.sum(too_much**2 + too_fast**2)) + float(np.sum(travelled))
         weight = 2.0 * t.penalty * step * too_much
         of_torque = weight * np.sign(torque) / (limit * t.torque_share)
         s.of_qd += np.sign(s.qd) * (

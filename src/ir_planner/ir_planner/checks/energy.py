@@ -56,7 +56,7 @@ def movement_energy(
         total=float(watts.sum() * dt),
         base=scene.base_watts * span,
         joints=axes.sum(axis=0) * dt,
-        dissipated=float(bus.burnt.sum() * dt),
+        dissipated=float(bus.dissipated.sum() * dt),
         capacitor=float(bus.stored[-1]),
         peak=float(watts.max()),
         times=times,

@@ -98,7 +98,7 @@ class PowerMeter:
         self._stored = float(bus.stored[-1])
         self._steps += len(base)
         self._energy += self._dt * float((base + bus.mains).sum())
-        self._dissipated += self._dt * float(bus.burnt.sum())
+        self._dissipated += self._dt * float(bus.dissipated.sum())
         self._base_energy += self._dt * float(base.sum())
         self._axes = self._axes + self._dt * axes.sum(axis=0)
         self._power, self._torque, self._last_base = axes[-1], work.torque[-1], float(base[-1])
