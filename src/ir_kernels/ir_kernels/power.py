@@ -88,12 +88,10 @@ def dc_bus(
     voltage) before the first step. In every step, with P the signed sum of the axes:
 
     - "shared": demand P > 0 empties the capacitor first, the mains give the rest; surplus P < 0 fills it
-    first, the
-      rest is dissipated. mains >= 0.
-    - "fed_back": the same, but the rest of the surplus returns to the mains: mains < 0, dissipated
-      = 0.
+      first, the rest is dissipated. mains >= 0.
+    - "fed_back": the same, but the rest of the surplus returns to the mains: mains < 0, dissipated 0.
     - "none": mains = sum of the positive axes, dissipated = sum of the negative ones; the capacitor stays
-    as it is.
+      as it is.
 
     Always mains dt = (sum of axes + dissipated) dt + change of stored, and 0 <= stored <= capacity_energy.
     What is left in the capacitor at the end is not credited to anyone. N may be 1: a driver hands `stored` on
