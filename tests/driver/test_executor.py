@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
@@ -223,7 +224,7 @@ def test_up_to_the_bound_a_disturbed_tool_stays_within_two_millimetres(load, see
     assert outcomes[0].max_tool_deviation < 0.001
 
 
-def test_the_tube_stops_a_disturbed_robot_on_its_path(make, plan, start, run_out, home, there, cell):
+def test_a_robot_that_leaves_the_tube_is_stopped_by_the_brakes(make, plan, start, run_out, home, there, cell):
     simulation = make("pybullet")
     start(simulation, plan(2.0, home, there))
     simulation.run(0.9)
@@ -233,6 +234,10 @@ def test_the_tube_stops_a_disturbed_robot_on_its_path(make, plan, start, run_out
     assert "mm" in outcome.sentence
     assert "joint_a1" in outcome.sentence
     assert not simulation.executor.active
+    simulation.disturb(None)
+    simulation.run(0.5)
+    assert simulation.modes.mode is Mode.EMERGENCY_STOP
+    assert not simulation.backend.qd.any()
 
 
 def test_a_path_tolerance_names_the_joint_and_the_amount(make, plan, start, run_out, home, there):

@@ -7,6 +7,7 @@ from ir_sim_driver.controller.frames import Frame
 from ir_sim_driver.controller.goals import NO_GOAL
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation, VettedGoal
+from ir_sim_driver.controller.supervision import SupervisionSettings
 
 __all__ = [
     "NO_GOAL",
@@ -18,6 +19,7 @@ __all__ = [
     "Simulation",
     "SimulationSettings",
     "Snapshot",
+    "SupervisionSettings",
     "VettedGoal",
     "make_simulation",
     "report",

@@ -10,6 +10,7 @@ from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.transitions import TransitionTimes
+from ir_sim_driver.controller.supervision import SupervisionSettings
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import ControlSettings
 from ir_sim_driver.plc import PlcSettings
@@ -66,5 +67,6 @@ class SimulationSettings:
     control: ControlSettings = field(default_factory=ControlSettings)
     execution: ExecutionSettings = field(default_factory=ExecutionSettings)
     transitions: TransitionTimes = field(default_factory=TransitionTimes)
+    supervision: SupervisionSettings = field(default_factory=SupervisionSettings)
     idle: IdleTimes = field(default_factory=IdleTimes)
     plc: PlcSettings = field(default_factory=PlcSettings)

@@ -20,6 +20,7 @@ from ir_sim_driver.controller.emergency import EmergencyStop
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.controller.supervision import PERIOD, Command, Fault, Supervision
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion import (
     ErrorCode,
@@ -75,11 +76,13 @@ class Simulation:
         self.modes, self.pauses = self.control.modes, self.control.pauses
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
         self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)
+        self.supervision = Supervision(self.robot, settings.dt, settings.supervision)
         self.emergency = EmergencyStop(backend, self.executor, self.tool, self.notices)
         self._carry(load)
         self.steps = 0
         self.speed_scaling = 1.0
         self.fault = ""
+        self._broken = False  # the backend gave up: only `recover` touches it
         self._goals = 0
         self._outcomes: list[Outcome] = []
         self._goal_energy = 0.0
@@ -190,10 +193,11 @@ class Simulation:
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE, "the emergency stop is still pressed: release it first"
             )
-        if self.fault:
+        if self._broken:
             self.backend.reset(self.backend.q)
             self.executor.hold(self.backend.q)
-            self.fault = ""
+        self.fault, self._broken = "", False
+        self.supervision.recovered(self.backend.q)
         self.plc.reset_stop()
         if self.modes.mode is not Mode.EMERGENCY_STOP:
             return f"the emergency stop is reset; the mode is {self.modes.mode.name}"
@@ -219,8 +223,12 @@ class Simulation:
         self._change_mode(self.settings.dt)
         try:
             self._move()
+            if self.steps % PERIOD == 0:
+                self._supervise()
         except BackendError as error:
-            self._fail(error)
+            self._broken = True
+            self.backend.rest()
+            self._stop_for(Fault(str(error), ErrorCode.INVALID_GOAL))
         self.mains.step(self.modes.level)
         self._collect_outcomes()
         self.steps += 1
@@ -263,7 +271,7 @@ class Simulation:
 
     def _move(self) -> None:
         backend, executor = self.backend, self.executor
-        if self.fault:
+        if self._broken:
             backend.rest()
         elif self.modes.mode is Mode.EMERGENCY_STOP or (self.stopped and not self.modes.motors_on):
             self.emergency.step()
@@ -294,16 +302,24 @@ class Simulation:
         if now is not Mode.MOVING and before is not Mode.MOVING:
             self.notices.add(Level.OK, f"{before.name} -> {now.name}")
 
-    def _fail(self, error: BackendError) -> None:
-        self.fault = str(error)
-        self.notices.add(Level.ERROR, self.fault)
-        self.executor.drop(self.fault)
-        self.backend.rest()
+    def _supervise(self) -> None:
+        braking = self.stopped or not self.modes.motors_on
+        executor = self.executor
+        command = Command(executor.command, executor.deviation, self.settings.execution.tube)
+        fault = self.supervision.look(self.backend, command, braking)
+        if fault is not None and not self.fault:
+            self._stop_for(fault)
+
+    def _stop_for(self, fault: Fault) -> None:
+        """STOP 0: the brakes close at once, and stay so until somebody recovers."""
+        self.fault = fault.sentence
+        self.notices.add(Level.ERROR, f"{fault.sentence}; stopped by the brakes until recovered")
+        self.executor.drop(fault.sentence, fault.code)
 
     def _refusal(self) -> str:
         """Why no movement may start now, "" when it may."""
         if self.fault:
-            return f"the simulation has failed: {self.fault}"
+            return f"stopped by a fault, recover first: {self.fault}"
         return self.watch.lost or self.control.refusal()
 
     def _carry(self, load: Carried) -> None:

@@ -150,7 +150,7 @@ class Executor:
             self._finish()
         s = self._settings
         path_tolerance = Tolerances.of(self._names, goal.path_tolerance, s.path_tolerance)
-        quiet = min(s.tube, self._tool.quiet_bound(path_tolerance.position))
+        quiet = self._tool.quiet_bound(path_tolerance.position)
         self._run = _Run(
             Outcome(goal_id, ErrorCode.SUCCESSFUL, ""),
             route,
@@ -173,11 +173,11 @@ class Executor:
             self._will_end(code, sentence, canceled)
             self._run.stopping = True
 
-    def drop(self, sentence: str) -> None:
+    def drop(self, sentence: str, code: ErrorCode = ErrorCode.INVALID_GOAL) -> None:
         """End the goal at once: nobody follows the command any more."""
         if self._run is not None:
-            if not self._run.stopping:
-                self._will_end(ErrorCode.INVALID_GOAL, sentence, canceled=False)
+            if not self._run.stopping or code is not ErrorCode.INVALID_GOAL:
+                self._will_end(code, sentence, canceled=False)
             self._finish()
 
     def hold(self, q: FloatArray) -> None:
@@ -234,13 +234,6 @@ class Executor:
                 self._settle(run, error, robot)
 
     def _broken(self, run: _Run, error: FloatArray, robot: Backend) -> str:
-        if self.deviation > self._settings.tube:
-            return (
-                f"the tool is {self.deviation * 1e3:.2f} mm from the commanded path at "
-                f"{self.path_time:.3f} s: at most "
-                f"{self._settings.tube * 1e3:g} mm; worst is {self._names[int(np.abs(error).argmax())]} with "
-                f"{error[int(np.abs(error).argmax())]:+.6f} rad; stopped on the path"
-            )
         sentence = run.path_tolerance.broken_position(self._names, error)
         if not sentence and run.path_tolerance.has_velocity:
             sentence = run.path_tolerance.broken_velocity(self._names, self.motion().qd - robot.qd)

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.transitions import PREFIX, TransitionTimes
-from ir_sim_driver.controller import ControllerSettings, SimulationSettings
+from ir_sim_driver.controller import ControllerSettings, SimulationSettings, SupervisionSettings
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import BACKENDS, ControlSettings
@@ -67,6 +67,7 @@ class DriverParameters:
             control=Parameters(node, ControlSettings, prefix="control.").value,
             execution=execution.value,
             transitions=Parameters(node, TransitionTimes, prefix=PREFIX, read_only=True).value,
+            supervision=Parameters(node, SupervisionSettings, prefix="supervision.").value,
             idle=Parameters(node, IdleTimes, prefix=PREFIX).value,
             plc=Parameters(node, PlcSettings, prefix="plc.").value,
         )

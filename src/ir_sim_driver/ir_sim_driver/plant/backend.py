@@ -47,6 +47,10 @@ class Backend(Protocol):
     def torque(self) -> FloatArray:
         """Motor torque (n,) [Nm] of the last step."""
 
+    @property
+    def saturated(self) -> bool:
+        """Whether a motor could not give the torque that the command of the last step needed."""
+
     def reset(self, q: FloatArray) -> None:
         """Stand still at q (n,), commanded to stay there."""
 

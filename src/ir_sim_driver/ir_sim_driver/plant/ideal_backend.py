@@ -54,6 +54,11 @@ class IdealBackend:
         return (last + 0.5 * change) / self._dt
 
     @property
+    def saturated(self) -> bool:
+        """Never: torques follow from what is tracked."""
+        return False
+
+    @property
     def standing(self) -> bool:
         """Whether the robot stands."""
         if self.q is self._before:

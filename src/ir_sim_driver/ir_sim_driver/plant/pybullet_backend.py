@@ -56,7 +56,7 @@ class PyBulletBackend:
         self._zeros = [0.0] * self._n
         self._still: FloatArray = np.zeros(self._n)
         self.disturbance: FloatArray | None = None
-        self.torque = self._still
+        self.torque, self.saturated = self._still, False
         self.q: FloatArray = np.array(robot.machine_home, dtype=np.float64)
         self.qd = self._still
         self._speed: FloatArray = self._still
@@ -128,7 +128,7 @@ class PyBulletBackend:
         torque, cut = drives.limited(links + drives.rotor_inertia * qdd + resistance, now)
         if cut or self.disturbance is not None:
             links, qdd = self._driven(torque, resistance)
-        self.torque = torque
+        self.torque, self.saturated = torque, cut
         self._advance(links)
 
     def brake(self) -> None:
@@ -140,7 +140,7 @@ class PyBulletBackend:
         torque = np.clip(wanted, -self._brake_torque, self._brake_torque)
         if (torque != wanted).any() or self.disturbance is not None:
             links, _ = self._driven(torque, resistance)
-        self.torque = self._still
+        self.torque, self.saturated = self._still, False
         self._advance(links)
         self._follower.reset(self.q)
 
@@ -150,7 +150,7 @@ class PyBulletBackend:
             self._speed = self.qd = self._still
             self._follower.reset(self.q)
             self._stale = True
-        self.torque = self._still
+        self.torque, self.saturated = self._still, False
         self._speeds.append(self._still)
         self._torques.append(self._still)
 
@@ -204,8 +204,8 @@ class PyBulletBackend:
     def _call(self, function: Any, *arguments: Any, **more: Any) -> Any:
         try:
             return function(*arguments, physicsClientId=self._client, **more)
-        except self._bullet.error as error:
-            raise BackendError(f"PyBullet failed: {error}") from error
+        except (self._bullet.error, SystemError, ValueError, TypeError) as error:
+            raise BackendError(f"PyBullet failed: {error}") from error  # it raises whatever C leaves behind
 
     def _advance(self, links: FloatArray) -> None:
         bullet, call = self._bullet, self._call
