@@ -38,7 +38,7 @@ CHAINS_S = 300.0  # ceiling of the search through all chains of one instance
 
 @dataclass(frozen=True)
 class Instance:
-    """Stops in a cell, from machine home; load: "" the tool, or none; margin: S_m [m]."""
+    """Stops in a cell, from the posture park; load: "" the tool, or none; margin: S_m [m]."""
 
     cell: str
     stops: tuple[str, ...]
@@ -87,16 +87,16 @@ def instances(cell: str, count: int, seed: int) -> list[Instance]:
     scene = scene_of(cell)
     rng = np.random.default_rng([seed, *scene.cell.name.encode()])
     names = [station.name for station in scene.cell.stations]
-    home = np.array(scene.cell.machine_home)[None]
-    margin = SHARE_OF_ENDS * float(scene.collision.min_distance(home).distance[0])
+    park = np.array(scene.cell.posture("park"))[None]
+    margin = SHARE_OF_ENDS * float(scene.collision.min_distance(park).distance[0])
     margin = min(margin, *(margin_at(scene, station) for station in scene.cell.stations))
     found: list[Instance] = []
     while len(found) < count:
         stops: list[str] = []
         length = int(rng.integers(STOPS[0], STOPS[1] + 1))
         while len(stops) < length:
-            name = str(rng.choice([*names, "home"]))
-            if name != (stops[-1] if stops else "home"):
+            name = str(rng.choice([*names, "park"]))
+            if name != (stops[-1] if stops else "park"):
                 stops.append(name)
         found += [Instance(cell, tuple(stops), load, margin) for load in ("", NO_LOAD)]
     return found[:count]
@@ -112,7 +112,7 @@ def compared(instance: Instance, objective: str, seed: int, known: EdgeCosts) ->
         objective=wanted,
         load=instance.load,
     )
-    start = np.array(planner.cell.machine_home)
+    start = np.array(planner.cell.posture("park"))
     begin = time.perf_counter()
     plan = planner.plan_program(instance.stops, 0.0, options, start)
     planned = time.perf_counter()
