@@ -103,7 +103,7 @@ def _inside(zone: Zone, point: FloatArray) -> bool:
 
 
 def _zones(cell: Cell) -> Iterator[Finding]:
-    """Overlapping zones put one machine in the way out of the other; without stations nobody goes in."""
+    """Where zones overlap, one machine obstructs the withdrawal from the other, if there are stations."""
     machines = [machine for machine in cell.equipment if machine.enabled]
     visited = {station.equipment for station in cell.stations}
     zones = [machine.zone for machine in machines]

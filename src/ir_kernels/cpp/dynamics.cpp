@@ -161,13 +161,13 @@ py::tuple dc_bus(const Array& power, const Array& dt, double capacity, const std
                                 : regeneration == "none" ? core::Regeneration::kNone
                                                          : core::Regeneration::kFedBack;
   const py::ssize_t N = power.shape(0);
-  Array mains(N), burnt(N), level(N);
-  double *m = mains.mutable_data(), *b = burnt.mutable_data(), *l = level.mutable_data();
+  Array mains(N), dissipated(N), level(N);
+  double *m = mains.mutable_data(), *b = dissipated.mutable_data(), *l = level.mutable_data();
   {
     py::gil_scoped_release released;
     core::dc_bus(power.data(), dt.data(), N, static_cast<int>(power.shape(1)), capacity, kind, stored, m, b, l);
   }
-  return py::make_tuple(mains, burnt, level);
+  return py::make_tuple(mains, dissipated, level);
 }
 
 py::tuple polynomial_extrema(const Array& coefficients, const Array& durations) {

@@ -46,7 +46,7 @@ bool Envelope::limits(const double* qd, long N, double* limit) const {
 }
 
 void dc_bus(const double* power, const double* dt, long N, int n, double capacity, Regeneration regeneration,
-            double stored, double* mains, double* burnt, double* level) {
+            double stored, double* mains, double* dissipated, double* level) {
   for (long k = 0; k < N; ++k) {
     double wanted = 0.0, returned = 0.0, net = 0.0;
     for (int i = 0; i < n; ++i) {
@@ -55,17 +55,17 @@ void dc_bus(const double* power, const double* dt, long N, int n, double capacit
       returned += std::max(-p, 0.0);
       net += p;
     }
-    burnt[k] = 0.0;
+    dissipated[k] = 0.0;
     if (regeneration == Regeneration::kNone) {
       mains[k] = wanted;
-      burnt[k] = returned;
+      dissipated[k] = returned;
     } else {
       net *= dt[k];  // J that the axes want in this step
       const double moved = net > 0.0 ? std::min(net, stored) : -std::min(-net, capacity - stored);
       stored -= moved;
       double rest = net - moved;  // J that the capacitor could not give or take
       if (rest < 0.0 && regeneration == Regeneration::kShared) {
-        burnt[k] = -rest / dt[k];
+        dissipated[k] = -rest / dt[k];
         rest = 0.0;
       }
       mains[k] = rest / dt[k];

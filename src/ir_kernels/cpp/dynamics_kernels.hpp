@@ -45,6 +45,6 @@ struct Core {
 
 enum class Regeneration { kShared, kNone, kFedBack };
 void dc_bus(const double* power, const double* dt, long N, int n, double capacity, Regeneration regeneration,
-            double stored, double* mains, double* burnt, double* level);
+            double stored, double* mains, double* dissipated, double* level);
 
 }  // namespace ir::dynamics

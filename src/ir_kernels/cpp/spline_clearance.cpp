@@ -9,7 +9,7 @@ namespace {
 
 constexpr int P = SplineCost::samples;
 
-// Lists, lane by lane, the pairs nearer than their threshold and margin; and those that may be, as far as lanes can tell.
+// Lists, lane by lane, the pairs nearer than their threshold and margin; and those that may be, within the rounding of lanes.
 template <class V> struct Within {
   using S = Scalar<V>;
   const Shifts<S>& shift;

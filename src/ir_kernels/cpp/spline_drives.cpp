@@ -55,9 +55,9 @@ double SplineCost::drives(double step) {
       g.of_tau[j] = weight * inverse * (g.tau[j] > 0.0 ? splat<Lane>(1.0) : splat<Lane>(-1.0));
       g.of_qd[j] = sign_v * (2.0 * step * terms_.penalty * fastest * over - weight * torque * inverse / limit * falls);
       if (terms_.travel[j] > 0.0) {
-        const Lane way = terms_.travel[j] * (root - still) * g.counts;
-        cost += way * step;
-        of_step += way;
+        const Lane travelled = terms_.travel[j] * (root - still) * g.counts;
+        cost += travelled * step;
+        of_step += travelled;
         g.of_qd[j] += (step * terms_.travel[j]) * g.counts * v / root;
       }
     }
@@ -82,7 +82,7 @@ double SplineCost::bus(double step) {
     std::fill(of_power_.begin(), of_power_.end(), 1.0);
   } else {
     // of_power_ first says where a joule of this sample comes from: 1 the mains (or goes back there), 2 the capacitor, 0
-    // nowhere, as one is burnt less
+    // nowhere, as less is dissipated
     double stored = 0.0;
     for (int k = 0; k < count_; ++k) {
       const double wanted = power_[k] * step, full = stored - terms_.capacity;

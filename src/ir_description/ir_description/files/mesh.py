@@ -72,7 +72,7 @@ def read_stl(path: Path) -> FloatArray:
 
 
 def triangles_from_stl(content: bytes) -> FloatArray:
-    """Return the triangles (T, 3, 3) of STL content; the length tells binary from ASCII."""
+    """Return the triangles (T, 3, 3) of STL content; binary where the length fits, else ASCII."""
     count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else -1
     if len(content) == 84 + 50 * count:
         triangles = np.frombuffer(content, dtype=_BINARY, offset=84)["corners"].astype(np.float64)

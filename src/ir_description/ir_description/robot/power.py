@@ -35,7 +35,7 @@ class ControllerMode:
 
 @dataclass(frozen=True)
 class DcLink:
-    """Bus of the drives: the supply rectifies only; what the capacitors cannot take is burnt."""
+    """Bus of the drives: the supply rectifies only; what the capacitors cannot take is dissipated."""
 
     capacitance: float  # F
     voltage: float  # V, rectified mains
@@ -112,7 +112,7 @@ class PowerData:
 
     @property
     def dc_link_capacity_energy(self) -> float:
-        """Energy [J] that fits into the DC link before braking energy is burnt."""
+        """Energy [J] that fits into the DC link before braking energy is dissipated."""
         return self.dc_link.capacity_energy
 
     def mode(self, name: str) -> ControllerMode:
