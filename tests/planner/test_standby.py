@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
-from ir_planner.program.standby import break_even, mode_watts, pause_energy, plan_standby
+from ir_planner.program.standby import break_even, late_start, mode_watts, pause_energy, plan_standby
 from ir_planner.scene.planning_scene import load_text, scene_with
 
 from ir_description import load_cell, load_power_data
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 
 CELL = load_cell("demo")
 POWER = load_power_data()
@@ -54,6 +56,8 @@ def test_the_chosen_mode_is_the_cheapest_that_the_pause_has_time_for(pause: floa
     assert standby.saving == pytest.approx(
         pause_energy("STAND_ON_MOTORS", pause, HOME, SCENE, TIMES) - standby.energy
     )
+    motors = mode_watts("STAND_ON_MOTORS", HOME, SCENE)
+    assert standby.saving_on_motors == pytest.approx(motors * pause - standby.energy)
     assert pause >= standby.chosen.time_min_pause
     assert standby.wake_at + standby.chosen.regular_time_to_operate == pytest.approx(pause)
 
@@ -67,3 +71,48 @@ def test_longer_pauses_go_deeper() -> None:
 def test_what_is_no_pause_is_refused(pause: float) -> None:
     with pytest.raises(RequestError, match="pause is"):
         plan_standby(pause, HOME, SCENE, TIMES)
+
+
+TIMER = POWER.motors_to_brakes_in_program
+
+
+@pytest.mark.parametrize("pause", [1.0, TIMER - 0.5, TIMER + 0.1, TIMER + 0.8, TIMER + 5.0, 60.0])
+def test_a_pause_that_the_controller_is_left_to_costs_what_the_driver_measures(pause: float) -> None:
+    """The simulated controller stands, and after the pause a movement asks for motors."""
+    start = SimulationSettings(controller=ControllerSettings(start_mode="STAND_ON_MOTORS"))
+    simulation = make_simulation("demo", backend="ideal", settings=start, data=POWER)
+    q = np.array(simulation.backend.q)
+    simulation.run(pause)
+    simulation.plc.set_bit("drives_on", True)  # what a movement asks for: motors
+    late = 0.0
+    while not simulation.modes.motors_on:
+        simulation.run(0.01)
+        late += 0.01
+    simulation.mains.settle()
+    measured = simulation.mains.meter.reading().energy
+    assert late == pytest.approx(late_start(pause, SCENE, TIMES), abs=0.03)
+    planned = pause_energy("STAND_ON_MOTORS", pause, q, SCENE, TIMES)
+    assert planned == pytest.approx(measured, rel=0.03, abs=20.0)
+
+
+def test_a_minute_is_not_spent_on_motors() -> None:
+    """The controller's own timer is what a saving is held against."""
+    standby = plan_standby(60.0, HOME, SCENE, TIMES)
+    assert standby.chosen.name == "STAND_ON_BRAKES"
+    assert standby.energies[0] < 0.7 * mode_watts("STAND_ON_MOTORS", HOME, SCENE) * 60.0
+    assert standby.saving < 0.5 * standby.saving_on_motors
+    assert "against the controller's own timer (brakes after 20 s" in standby.sentence
+    assert "against standing on motors" in standby.sentence
+
+
+@given(st.floats(0.5, 7200.0))
+@settings(deadline=None, max_examples=60)
+def test_no_sequence_of_two_modes_costs_less(pause: float) -> None:
+    """Standing on motors first, or leaving and entering again, never pays."""
+    best = plan_standby(pause, HOME, SCENE, TIMES).energy
+    for share in (0.1, 0.3, 0.5, 0.9):
+        split = [
+            min(pause_energy(mode.name, part, HOME, SCENE, TIMES) for mode in POWER.modes)
+            for part in (share * pause, (1.0 - share) * pause)
+        ]
+        assert best <= sum(split) + 1e-6

@@ -233,8 +233,9 @@ class Requests:
     def plan_standby(self, request: Any, response: Any) -> Status:
         """Where to rest during a pause."""
         q = state_of(request.state, self.planner.cell, StatusCode.INVALID_ROBOT_STATE)
-        fill_standby(response, self.planner.standby(request.pause, q, request.load))
-        return Status.success()
+        standby = self.planner.standby(request.pause, q, request.load)
+        fill_standby(response, standby)
+        return Status.success(standby.sentence)
 
     def _state(self, msg: Any, code: StatusCode, at_rest: str = "") -> FloatArray:
         cell = self.planner.cell

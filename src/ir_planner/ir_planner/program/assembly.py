@@ -8,7 +8,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.transitions import TransitionTimes
 
-from ir_planner.program.standby import pause_energy, plan_standby
+from ir_planner.program.standby import BRAKES, MOTORS, late_start, pause_energy, plan_standby
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
 from ir_planner.program.steps import PlacedStep, Scenes, signal_text
@@ -132,9 +132,11 @@ def _pause(
         mode = plan_standby(duration, q, scene, times).chosen.name
     elif requested == AUTO:
         mode = ""
-    energy = pause_energy(mode or "STAND_ON_MOTORS", duration, q, scene, times) if duration > 0.0 else 0.0
-    if not np.isfinite(energy):  # asked for by name though it is too short: it is spent coming and going
-        energy = pause_energy("STAND_ON_MOTORS", duration, q, scene, times)
+    elif not requested and late_start(duration, scene, times) > 0.0:
+        mode = BRAKES  # the controller closes them anyway: asked for, they are open again in time
+    energy = pause_energy(mode or MOTORS, duration, q, scene, times) if duration > 0.0 else 0.0
+    if not np.isfinite(energy):  # asked for by name though it is too short: the runner stands on motors
+        energy = pause_energy(MOTORS, duration, q, scene, times)
     return PlannedMovement(
         kind=MovementKind.PAUSE,
         from_station=here,

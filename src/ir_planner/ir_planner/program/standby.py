@@ -2,7 +2,8 @@
 
 A mode may be entered when the pause covers going in, the shortest stay and coming out. While going in the
 power is that of the mode that is left (standing on motors), while coming out that of standing on motors as
-well: an assumption of the power data that decides every break-even.
+well: an assumption of the power data that decides every break-even. Left to itself, the controller stands on
+motors until its timer closes the brakes, and opens them when the next movement asks, which starts later then.
 """
 
 from dataclasses import dataclass
@@ -18,23 +19,35 @@ from ir_planner.checks import holding_watts
 from ir_planner.errors import RequestError
 from ir_planner.scene import PlanningScene
 
-MOTORS = "STAND_ON_MOTORS"
+MOTORS, BRAKES = "STAND_ON_MOTORS", "STAND_ON_BRAKES"
 PAUSE_MAX = 604_800.0  # s: a week
 
 
 @dataclass(frozen=True)
 class Standby:
-    """chosen mode, wake_at [s from the start of the pause], energy over the pause [J], saving against motors.
+    """chosen mode, wake_at [s from the start of the pause], energy over the pause [J].
 
-    alternatives: all modes, shallow to deep, and their energies [J] (inf: the pause is too short).
+    saving [J]: against what the controller does by itself (`timer` s on motors, then on brakes);
+    saving_on_motors [J]: against standing on motors all the time. alternatives: all modes, shallow to deep,
+    and their energies [J] (inf: the pause is too short); on motors with what the controller does itself.
     """
 
     chosen: PowerMode
     wake_at: float
     energy: float
     saving: float
+    saving_on_motors: float
+    timer: float
     alternatives: tuple[PowerMode, ...]
     energies: tuple[float, ...]
+
+    @property
+    def sentence(self) -> str:
+        """What is saved, against what."""
+        return (
+            f"{self.chosen.name} saves {self.saving:.0f} J against the controller's own timer (brakes after "
+            f"{self.timer:g} s on motors), {self.saving_on_motors:.0f} J against standing on motors"
+        )
 
 
 def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
@@ -44,18 +57,44 @@ def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
     if name == MOTORS:
         return holding_watts(q, scene)
     always = sum(load.watts_always for load in scene.loads)
-    bus = sum(load.watts_drive_bus for load in scene.loads) if name == "STAND_ON_BRAKES" else 0.0
+    bus = sum(load.watts_drive_bus for load in scene.loads) if name == BRAKES else 0.0
     return scene.power.mode(name).controller_watts + always + bus
 
 
 def pause_energy(
     name: str, pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes
 ) -> float:
-    """Energy [J] of a pause [s] in a mode, inf when it is too short for it."""
+    """Energy [J] of a pause [s] in a mode until the next movement can start, inf when it is too short for it.
+
+    On motors: with what the controller does by itself.
+    """
+    if name == MOTORS:
+        return _energy_by_itself(pause, q, scene, times)
     change = times.enter(name) + times.leave(name)
     if pause < change + times.minimum_stay(name):
         return float("inf")
     return mode_watts(MOTORS, q, scene) * change + mode_watts(name, q, scene) * (pause - change)
+
+
+def late_start(pause: float, scene: PlanningScene, times: TransitionTimes) -> float:
+    """How much later than the end of a pause [s] on motors the next movement starts: the brakes that the
+    controller has closed must open.
+    """
+    begun = pause - scene.power.motors_to_brakes_in_program
+    if begun < 0.0:
+        return 0.0
+    closed = times.enter(BRAKES) + times.minimum_stay(BRAKES)
+    return max(closed - begun, 0.0) + times.leave(BRAKES)
+
+
+def _energy_by_itself(pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
+    """Energy [J] of a pause that the controller is left to, and of opening its brakes afterwards."""
+    motors, brakes = mode_watts(MOTORS, q, scene), mode_watts(BRAKES, q, scene)
+    late = late_start(pause, scene, times)
+    if late == 0.0:
+        return motors * pause
+    on_motors = scene.power.motors_to_brakes_in_program + times.enter(BRAKES) + times.leave(BRAKES)
+    return motors * on_motors + brakes * (pause + late - on_motors)
 
 
 def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Standby:
@@ -67,8 +106,16 @@ def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: Trans
     modes = tuple(_mode(name, q, scene, times) for name in REST_MODES)
     energies = tuple(pause_energy(name, pause, q, scene, times) for name in REST_MODES)
     k = int(np.argmin(energies))
-    wake_at = pause - times.leave(REST_MODES[k])
-    return Standby(modes[k], wake_at, energies[k], energies[0] - energies[k], modes, energies)
+    return Standby(
+        chosen=modes[k],
+        wake_at=pause - times.leave(REST_MODES[k]),
+        energy=energies[k],
+        saving=energies[0] - energies[k],
+        saving_on_motors=mode_watts(MOTORS, q, scene) * pause - energies[k],
+        timer=scene.power.motors_to_brakes_in_program,
+        alternatives=modes,
+        energies=energies,
+    )
 
 
 def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> PowerMode:
