@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_description import load_cell, load_power_data
+from ir_description import Cell, load_cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks.energy import STEP_S, movement_energy
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
@@ -51,8 +51,12 @@ class Cost:
 
 def scene_of(cell: str) -> PlanningScene:
     """A bundled cell or the cell of a file with its tool."""
-    described = load_cell(cell)
-    return scene_with(described, load_text(described), load_power_data())
+    return scene_of_cell(load_cell(cell))
+
+
+def scene_of_cell(cell: Cell) -> PlanningScene:
+    """A cell with its tool."""
+    return scene_with(cell, load_text(cell), load_power_data())
 
 
 def tasks_of(cell: str) -> list[Task]:

@@ -1,6 +1,7 @@
 """What does a regional movement cost, how fast is it known, and what do OMPL and TOPP-RA reach beside it?
 
     python benchmarks/regional.py [--cell FILE]... [--task NAME]... [--seeds N] [--peers N] [--coal N]
+                                  [--variants N [--variant-seed N]]
                                   [--patient N] [--best-seconds S | --minute] [--best FILE] [--quick]
                                   [--json FILE] [--plot FILE]
 
@@ -9,7 +10,8 @@ with 1 s of work; then OMPL's RRTConnect and
 BKPIECE1 (validity by the project's own kernel every 0.01 rad, PathSimplifier) with TOPP-RA over their paths
 (speed, acceleration and torque, no limit of jerk) and the uniform slow-down of least J. The best known J
 is what any method finds in longer time: some seconds per task, or --minute for 60 s of each method; an
-earlier run's JSON adds what it found by --best. Coal looks at the first N different movements of a task.
+earlier run's JSON adds what it found by --best. --variants: instead of the cells, N of each that nobody tuned
+for. Coal looks at the first N different movements of a task.
 """
 
 from __future__ import annotations
@@ -37,10 +39,12 @@ from _regional_tasks import CELLS, Task, tasks_of
 from _regional_toppra import timed
 from _results import Claim, at_least, command_line, finish, line_of
 from _second_opinion import SecondOpinion
+from _variants import variant_files
 
 from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
 
+VARIANTS = Path("out/variants")
 METHODS = 3  # of the best known J
 GENETIC = "genetic"
 GENETIC_CELLS = ("open", "table_columns")
@@ -51,6 +55,8 @@ def arguments() -> argparse.Namespace:
     quick = "2 tasks per cell there and back, 2 seeds, 1 search, 0.3 s for the best known J"
     parser = command_line(__doc__, CELLS, 30, quick)
     parser.add_argument("--task", action="append", help="only tasks of this name, as home->p1")
+    parser.add_argument("--variants", type=int, default=0, help="mirrored, turned and jittered ones per cell")
+    parser.add_argument("--variant-seed", type=int, default=0, help="what the variants are drawn from")
     parser.add_argument("--patient", type=int, default=3, help="seeds with 1 s of work per task")
     parser.add_argument("--peers", type=int, default=5, help="searches of each of OMPL's planners per task")
     parser.add_argument("--coal", type=int, default=1, help="movements per task that Coal checks")
@@ -67,7 +73,10 @@ def arguments() -> argparse.Namespace:
 
 def chosen_tasks(given: argparse.Namespace) -> dict[str, list[Task]]:
     """The tasks of each cell that are asked for."""
-    chosen = {cell: tasks_of(cell) for cell in given.cell or CELLS}
+    cells = list(given.cell or CELLS)
+    if given.variants:
+        cells = variant_files(cells, given.variants, given.variant_seed, VARIANTS)
+    chosen = {cell: tasks_of(cell) for cell in cells}
     if given.task:
         chosen = {cell: [t for t in tasks if t.name in given.task] for cell, tasks in chosen.items()}
     elif given.quick:
