@@ -21,6 +21,7 @@ from ir_sim_driver import (
     IdleTimes,
     PlcSettings,
 )
+from ir_sim_driver.controller import SupervisionSettings
 from ir_sim_driver.node.parameters import NodeSettings
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,6 +40,7 @@ NODES: dict[str, tuple[tuple[str, Any], ...]] = {
         *(("", link()) for link in LINKS),
         ("control.", ControlSettings()),
         ("execution.", ExecutionSettings()),
+        ("supervision.", SupervisionSettings()),
         (f"{FIXED}{PREFIX}", TransitionTimes()),
         (PREFIX, IdleTimes()),
         ("plc.", PlcSettings()),

@@ -1,4 +1,4 @@
-"""Any trajectory becomes cheaper between its end points: certified, as wished, with its trade of time for
+"""Any trajectory becomes cheaper between its end points: certified, as requested, with its trade of time for
 energy.
 """
 
@@ -58,11 +58,11 @@ def quintic(points: FloatArray, duration: float, scene: PlanningScene) -> JointT
 
 
 def swung(points: FloatArray, joint: int, by: float) -> FloatArray:
-    """The straight way in 20 steps, with a joint that swings out and back."""
+    """The straight path in 20 steps, with a joint that swings out and back."""
     share = np.linspace(0.0, 1.0, 21)
-    way = points[0] + share[:, None] * (points[1] - points[0])
-    way[:, joint] += by * np.sin(np.pi * share) ** 2
-    return np.asarray(way)
+    path = points[0] + share[:, None] * (points[1] - points[0])
+    path[:, joint] += by * np.sin(np.pi * share) ** 2
+    return np.asarray(path)
 
 
 def check_movement(trajectory: JointTrajectory | None, ends: FloatArray, scene: PlanningScene) -> None:
@@ -158,7 +158,7 @@ def no_descent(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_descent")
-def test_where_pushing_fails_a_way_round_is_found_and_said(scene_of: SceneOf) -> None:
+def test_where_pushing_fails_a_path_around_is_found_and_noted(scene_of: SceneOf) -> None:
     scene = scene_of("table_columns")
     ends = ends_of(scene, "tL->side1")
     plan = optimized(quintic(ends, 6.0, scene), scene, replace(OPTIONS, max_iterations=400_000))
@@ -168,7 +168,7 @@ def test_where_pushing_fails_a_way_round_is_found_and_said(scene_of: SceneOf) ->
 
 
 @pytest.mark.usefixtures("no_descent")
-def test_where_nothing_is_found_the_pair_in_the_way_is_named(scene_of: SceneOf) -> None:
+def test_where_nothing_is_found_the_obstructing_pair_is_named(scene_of: SceneOf) -> None:
     scene = scene_of("table_columns")
     options = replace(OPTIONS, planner_id="direct")
     plan = optimized(quintic(ends_of(scene, "tL->side1"), 6.0, scene), scene, options)
@@ -215,10 +215,10 @@ def test_an_original_that_is_best_is_given_back_with_a_note(
         assert "the original is kept" in plan.info.stages[-1].note
 
 
-# -- as wished
+# -- as requested
 
 
-def test_a_wished_duration_is_kept_and_gets_cheaper(detour: JointTrajectory, scene: PlanningScene) -> None:
+def test_a_requested_duration_is_kept_and_gets_cheaper(detour: JointTrajectory, scene: PlanningScene) -> None:
     energies = []
     for duration in (1.0, 1.3):
         plan = optimized(detour, scene, replace(OPTIONS, duration=duration))
@@ -405,8 +405,8 @@ def test_ends_out_of_range_and_in_collision_are_named(scene: PlanningScene) -> N
 
 def test_points_between_that_leave_the_joints_ranges_are_brought_back(scene: PlanningScene) -> None:
     ends = ends_of(scene, TASK)
-    way = swung(ends, 4, 2.0 * float(scene.cell.robot.position_max[4]))
-    plan = optimized(quintic(way, 30.0, scene), scene)
+    path = swung(ends, 4, 2.0 * float(scene.cell.robot.position_max[4]))
+    plan = optimized(quintic(path, 30.0, scene), scene)
     assert not plan.before.certified
     check_movement(plan.trajectory, ends, scene)
 
