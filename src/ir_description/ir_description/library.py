@@ -52,6 +52,11 @@ def bundled_cells() -> tuple[str, ...]:
     return _bundled("cells")
 
 
+def is_path(text: str) -> bool:
+    """Whether a text that names a cell is the path of a file, and not the name of a bundled cell."""
+    return os.sep in text or text.endswith((".yaml", ".yml"))
+
+
 def load_cell(name_or_path: str | Path) -> Cell:
     """Return a bundled cell by its name, or the cell of a file by its path.
 
@@ -61,7 +66,7 @@ def load_cell(name_or_path: str | Path) -> Cell:
     name = os.fspath(name_or_path)
     if isinstance(name_or_path, str) and name in bundled_cells():
         return _bundled_cell(name)
-    if isinstance(name_or_path, str) and os.sep not in name and not name.endswith((".yaml", ".yml")):
+    if isinstance(name_or_path, str) and not is_path(name):
         raise UnknownNameError("cell", name, bundled_cells())
     path = Path(name)
     try:

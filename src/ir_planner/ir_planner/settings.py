@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from ir_kernels.power import Regeneration
+from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.settings import check_settings, setting, stage
 from ir_msgs_py.transitions import TransitionTimes
 
@@ -53,6 +54,11 @@ class PlannerSettings:
         "", "Cell file or bundled cell to start with; empty: wait for set_cell.", read_only=True
     )
 
+    roots: tuple[str, ...] = setting(
+        ("",),
+        "Folders below which set_cell reads files; empty: IR_FILE_ROOTS, else the working folder.",
+        read_only=True,
+    )
     transitions: TransitionTimes = stage(TransitionTimes)
     interaction: InteractionSettings = stage(InteractionSettings)
     withdrawal: ModifiedGa = stage(ModifiedGa)
@@ -60,6 +66,11 @@ class PlannerSettings:
 
     def __post_init__(self) -> None:
         check_settings(self)
+
+    @property
+    def file_roots(self) -> FileRoots:
+        """The folders below which set_cell reads files."""
+        return FileRoots.of(self.roots)
 
     @property
     def braking_energy(self) -> Regeneration:

@@ -15,7 +15,7 @@ from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 
-from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, robot_urdf
+from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, is_path, robot_urdf
 from ir_kernels import KernelError
 from ir_planner.errors import CancelledError, PlannerError, RequestError
 from ir_planner.node.answers import (
@@ -101,8 +101,11 @@ class Requests:
         return callback
 
     def set_cell(self, request: Any, response: Any) -> Status:
-        """Another cell."""
-        cell = self.planner.set_cell(request.cell_yaml, request.cell_file)
+        """Another cell; a file must lie below the roots, whatever the request says."""
+        file = request.cell_file
+        if is_path(file):
+            file = str(self.planner.settings.file_roots.inside(file))
+        cell = self.planner.set_cell(request.cell_yaml, file)
         response.cell_name, response.stations = cell.name, stations_to_msg(cell)
         self.cell_changed()
         return Status.success()
