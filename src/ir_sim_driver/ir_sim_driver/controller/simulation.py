@@ -169,7 +169,12 @@ class Simulation:
                 StatusCode.INVALID_ROBOT_STATE, "the robot moves: a load changes only while it stands"
             )
         self.mains.settle()
-        self._carry(load)
+        before = self.load
+        try:
+            self._carry(load)
+        except BackendError:
+            self._carry(before)
+            raise
 
     def set_execution(self, settings: ExecutionSettings) -> None:
         """Use other bounds of trajectories from the next goal on."""

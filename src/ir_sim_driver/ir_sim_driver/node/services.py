@@ -106,5 +106,7 @@ class Services:
             answer = Status(error.code, str(error), self._source)
         except (MsgsError, DriverError) as error:
             answer = Status(StatusCode.FAILURE, str(error), self._source)
+        except Exception as error:  # a bug in one answer must not end the node
+            answer = Status(StatusCode.FAILURE, f"the request failed: {error!r}"[:500], self._source)
         response.status = status_to_msg(answer)
         return response

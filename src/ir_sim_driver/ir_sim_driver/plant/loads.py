@@ -12,8 +12,10 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.plant.load_diagram import LoadDiagram
 
 CUSTOM = "custom"
+_FAR, _BIG = 100.0, 1e6  # m, kg m^2: beyond what any robot carries; the load diagram is what bounds a load
 _PAYLOAD_CODE = StatusCode.PLANNING_FAILED  # -1, as controllers answer an impossible payload
 
 
@@ -74,6 +76,12 @@ def custom_load(
         raise RequestRefusedError(
             _PAYLOAD_CODE, f"inertia has {inertia.size} values: it must have 6, or none"
         )
+    for name, values, bound, unit in (
+        ("center_of_mass", com, _FAR, "m"),
+        ("inertia", inertia, _BIG, "kg m^2"),
+    ):
+        if not (np.abs(values) <= bound).all():  # NaN is refused too, and nothing overflows below
+            raise RequestRefusedError(_PAYLOAD_CODE, f"{name} is {values}: at most {bound:g} {unit} each")
     if mass == 0.0:
         return Carried(CUSTOM, ())
     matrix = np.zeros((3, 3))
@@ -86,13 +94,11 @@ def custom_load(
         load = Load(CUSTOM, "tool", mass, com, matrix, (), always, drive_bus)
     except ValueError as error:
         raise RequestRefusedError(_PAYLOAD_CODE, str(error)) from error
-    return Carried(CUSTOM, (load,))
+    return _within_payload(Carried(CUSTOM, (load,)), cell.robot)
 
 
 def _within_payload(what: Carried, robot: RobotModel) -> Carried:
-    if what.mass > robot.rated_payload:
-        raise RequestRefusedError(
-            _PAYLOAD_CODE,
-            f"{what.text} weighs {what.mass:g} kg: the robot carries at most {robot.rated_payload:g} kg",
-        )
+    excess = LoadDiagram(robot).excess(what.text, what.loads)
+    if excess:
+        raise RequestRefusedError(_PAYLOAD_CODE, excess)
     return what

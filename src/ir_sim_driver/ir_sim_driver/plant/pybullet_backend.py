@@ -7,9 +7,8 @@ counterbalance) and applies H qdd + h to the links: exact, and without saturatio
 
 from __future__ import annotations
 
-import tempfile
+import os
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -93,12 +92,13 @@ class PyBulletBackend:
         if bullet.isConnected(self._client):
             bullet.disconnect(physicsClientId=self._client)
         self._client = client = _connect(bullet, self._dt, self._gravity)
-        with tempfile.TemporaryDirectory(prefix="ir_sim_driver_") as folder:
-            path = Path(folder) / "robot.urdf"
-            path.write_text(text, encoding="utf-8")
-            self._body = bullet.loadURDF(
-                str(path), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
-            )
+        file = os.memfd_create("robot.urdf")  # a full or read-only disk is no reason to have no robot
+        try:
+            os.write(file, text.encode())
+            path, flags = f"/proc/self/fd/{file}", bullet.URDF_USE_INERTIA_FROM_FILE
+            self._body = self._call(bullet.loadURDF, path, useFixedBase=True, flags=flags)
+        finally:
+            os.close(file)
         self._joints = self._movable_joints()
         for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
             bullet.changeDynamics(

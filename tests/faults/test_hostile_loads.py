@@ -1,0 +1,91 @@
+"""Loads that the wrist cannot carry or that no body can have: refused with value and bound; the rest runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ir_description import Cell, load_cell
+from ir_sim_driver import RequestRefusedError, custom_load, make_simulation
+
+MILLIMETRE = 0.001
+
+
+@pytest.fixture(scope="module")
+def cell() -> Cell:
+    return load_cell("open")
+
+
+def custom(cell: Cell, mass: float, com: tuple[float, float, float], *inertia: float) -> None:
+    custom_load(cell, mass, np.array(com), np.array(inertia), 0.0, 0.0)
+
+
+def test_the_rated_load_point_is_carried_and_a_little_more_is_not(cell: Cell) -> None:
+    """210 kg at 0.24 m in front of the flange and 0.27 m beside it: published, and not used to build it."""
+    custom(cell, 210.0, (0.24, 0.27 - MILLIMETRE, 0.0), 105.0, 0.0, 0.0, 105.0, 0.0, 105.0)
+    with pytest.raises(RequestRefusedError, match=r"moment of .* Nm about the last axis.* at most 556 Nm"):
+        custom(cell, 210.0, (0.1, 0.28, 0.0))
+    with pytest.raises(RequestRefusedError, match=r"moment of .* Nm about the wrist's centre.* at most 1090"):
+        custom(cell, 210.0, (0.33, 0.0, 0.0))
+
+
+def test_the_rated_mass_at_a_metre_is_refused(cell: Cell) -> None:
+    with pytest.raises(RequestRefusedError, match="2502 Nm"):
+        custom(cell, 210.0, (1.0, 0.0, 0.0))
+
+
+def test_a_flywheel_is_refused(cell: Cell) -> None:
+    with pytest.raises(RequestRefusedError, match=r"inertia of .* kg m\^2 about .*: .* at most"):
+        custom(cell, 10.0, (0.1, 0.0, 0.0), 300.0, 0.0, 0.0, 300.0, 0.0, 300.0)
+
+
+@pytest.mark.parametrize(
+    "inertia",
+    [
+        (1.0, 0.0, 0.0, 1.0, 0.0, 2.1),  # triangle inequality
+        (1.0, 5.0, 0.0, 1.0, 0.0, 1.0),  # not positive
+        (float("nan"), 0.0, 0.0, 1.0, 0.0, 1.0),
+        (1e308, 0.0, 0.0, 1e308, 0.0, 1e308),
+        (1.0, 0.0, 0.0),
+    ],
+)
+def test_what_no_body_can_have_is_refused(cell: Cell, inertia: tuple[float, ...]) -> None:
+    with pytest.raises(RequestRefusedError):
+        custom(cell, 10.0, (0.1, 0.0, 0.0), *inertia)
+
+
+def survivors(cell: Cell, cases: int, seed: int) -> tuple[int, list[str]]:
+    """Random loads of all sizes and shapes on the physics: how many were carried, and what went wrong."""
+    generator = np.random.default_rng(seed)
+    simulation = make_simulation(cell, backend="pybullet")
+    carried, wrong = 0, []
+    for case in range(cases):
+        mass = 10.0 ** generator.uniform(-9.0, 2.32)
+        com = generator.normal(size=3) * 10.0 ** generator.uniform(-6.0, 0.0)
+        shape = mass * np.abs(generator.normal(size=3)) * 10.0 ** generator.uniform(-9.0, 1.0, 3)
+        shape *= np.where(generator.random(3) < 0.2, 1e-12, 1.0)  # needles and discs
+        turn = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+        tensor = turn @ np.diag(shape.sum() - shape) @ turn.T
+        try:
+            load = custom_load(cell, mass, com, tensor[np.triu_indices(3)], 0.0, 0.0)
+        except RequestRefusedError:
+            continue
+        simulation.set_load(load)
+        simulation.run(0.02)
+        carried += 1
+        if simulation.fault:
+            wrong.append(f"case {case} of seed {seed}: {simulation.fault}")
+            simulation = make_simulation(cell, backend="pybullet")
+    return carried, wrong
+
+
+def test_forty_random_loads_are_carried_or_refused(cell: Cell) -> None:
+    carried, wrong = survivors(cell, 40, seed=0)
+    assert wrong == []
+    assert carried > 10
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(4))
+def test_two_thousand_random_loads_are_carried_or_refused(cell: Cell, seed: int) -> None:
+    assert survivors(cell, 500, seed=10 + seed)[1] == []
