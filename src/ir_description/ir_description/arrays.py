@@ -6,9 +6,8 @@ writable.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -17,7 +16,7 @@ ROTATION_TOLERANCE = 1e-9
 """Largest entry of R R^T - 1 that still counts as a rotation."""
 
 
-def frozen(value: Any, shape: tuple[int | None, ...], name: str) -> FloatArray:
+def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> FloatArray:
     """Return a read-only float64 copy of that shape, (None, 3) for (N, 3), refusing NaN and infinity."""
     try:
         array = np.array(value, dtype=np.float64)
@@ -34,7 +33,7 @@ def frozen(value: Any, shape: tuple[int | None, ...], name: str) -> FloatArray:
     return array
 
 
-def frozen_pose(value: Any, name: str) -> FloatArray:
+def frozen_pose(value: ArrayLike, name: str) -> FloatArray:
     """Return a read-only (4, 4) rigid motion, refusing what is not one."""
     pose = frozen(value, (4, 4), name)
     rotation = pose[:3, :3]
@@ -47,7 +46,7 @@ def frozen_pose(value: Any, name: str) -> FloatArray:
     return pose
 
 
-def frozen_inertia(value: Any, name: str) -> FloatArray:
+def frozen_inertia(value: ArrayLike, name: str) -> FloatArray:
     """Return a read-only (3, 3) inertia [kg m^2], refusing what no body can have.
 
     A body's inertia is symmetric and positive definite, and its principal moments satisfy the triangle
@@ -78,7 +77,7 @@ def in_range(value: float, low: float, high: float, unit: str, name: str, *, ope
     return number
 
 
-def solid_box_inertia(mass: float, size: Any) -> FloatArray:
+def solid_box_inertia(mass: float, size: ArrayLike) -> FloatArray:
     """Return the inertia (3, 3) [kg m^2] of a solid box about its centre: mass [kg], full size (3,) [m]."""
     x, y, z = frozen(size, (3,), "size") ** 2
     return frozen(np.diag([y + z, x + z, x + y]) * (mass / 12.0), (3, 3), "inertia")

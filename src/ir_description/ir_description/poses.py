@@ -6,9 +6,9 @@ A, B, C [deg] turn about Z, then the new Y, then the new X: R = Rz(A) Ry(B) Rx(C
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_description.arrays import frozen
 from ir_msgs_py.arrays import FloatArray
@@ -20,7 +20,7 @@ MATRIX_TOLERANCE = 1e-6
 """A matrix this far from orthonormal is made so, beyond it is refused."""
 
 
-def pose_of(position: Any, rotation: Any = None) -> FloatArray:
+def pose_of(position: ArrayLike, rotation: ArrayLike | None = None) -> FloatArray:
     """Return the read-only pose (4, 4) of a position (3,) [m] and a rotation (3, 3)."""
     pose = np.eye(4)
     pose[:3, 3] = position
@@ -51,7 +51,7 @@ def _cos_sin(angle_deg: float) -> tuple[float, float]:
     return math.cos(math.radians(turn)), math.sin(math.radians(turn))
 
 
-def rotation_from_abc(abc_deg: Any) -> FloatArray:
+def rotation_from_abc(abc_deg: ArrayLike) -> FloatArray:
     """Return the rotation (3, 3) of KUKA's A, B, C [deg]."""
     a, b, c = frozen(abc_deg, (3,), "abc_deg")
     (ca, sa), (cb, sb), (cc, sc) = _cos_sin(a), _cos_sin(b), _cos_sin(c)
@@ -75,7 +75,7 @@ def abc_from_rotation(rotation: FloatArray) -> FloatArray:
     return np.degrees([a, b, c])
 
 
-def rotation_from_quaternion(xyzw: Any) -> FloatArray:
+def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
     """Return the rotation (3, 3) of a quaternion x, y, z, w; small errors of length are normalised."""
     q = frozen(xyzw, (4,), "quaternion")
     length = float(np.linalg.norm(q))
@@ -93,7 +93,7 @@ def rotation_from_quaternion(xyzw: Any) -> FloatArray:
     )
 
 
-def rotation_from_matrix(rows: Any) -> FloatArray:
+def rotation_from_matrix(rows: ArrayLike) -> FloatArray:
     """Return rows (3, 3) as a rotation; errors of a few written digits are removed."""
     R = frozen(rows, (3, 3), "rotation")
     error = float(np.abs(R @ R.T - np.eye(3)).max())

@@ -2,9 +2,10 @@
 names them.
 """
 
-from typing import Any
+from typing import SupportsFloat
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
 from ir_kernels.errors import InputError
@@ -13,7 +14,7 @@ from ir_msgs_py.arrays import FloatArray
 FLOAT64 = np.dtype(np.float64)
 
 
-def shaped(name: str, value: Any, *shape: int | None) -> FloatArray:
+def shaped(name: str, value: ArrayLike, *shape: int | None) -> FloatArray:
     """`value` as a C-contiguous float64 array of that shape; values are not looked at.
 
     None in the shape is any length but 0: (None, 3) for (N, 3).
@@ -58,7 +59,7 @@ def finite(name: str, array: FloatArray) -> FloatArray:
     return array
 
 
-def checked(name: str, value: Any, *shape: int | None) -> FloatArray:
+def checked(name: str, value: ArrayLike, *shape: int | None) -> FloatArray:
     """`shaped` and `finite`: (None, 3) for (N, 3)."""
     return finite(name, shaped(name, value, *shape))
 
@@ -71,7 +72,9 @@ def same_length(**arrays: FloatArray) -> None:
         raise InputError(f"batches of different length: {said}")
 
 
-def number(name: str, value: Any, least: float, most: float = np.inf, *, above: bool = False) -> float:
+def number(
+    name: str, value: SupportsFloat, least: float, most: float = np.inf, *, above: bool = False
+) -> float:
     """`value` as a finite float within least and most, not least itself where `above`; or InputError."""
     try:
         number = float(value)

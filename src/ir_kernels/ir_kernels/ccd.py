@@ -1,7 +1,6 @@
 """Inverse kinematics of any serial chain by cyclic coordinate descent (eqs. 2 and 3), many starts at once."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,7 +69,7 @@ def ccd(
     position_max: ArrayLike,
     settings: CcdSettings | None = None,
     *,
-    core: Any = compiled.MODULE,
+    core: compiled.Core = compiled.MODULE,
 ) -> CcdResult:
     """Bring `chain`'s tcp to `pose` (4, 4) in the world from each of `starts` (P, n) rad.
 

@@ -6,7 +6,6 @@ penetration, which is the shortest translation that parts them (for one capsule 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -177,7 +176,7 @@ class CollisionModel:
         return Certificate(verdict, (begin, end), pair, bound)
 
 
-def core_of(geometry: Geometry, module: Any) -> Any:
+def core_of(geometry: Geometry, module: compiled.Core) -> compiled.Core:
     """The model of one compiled module, or the one in NumPy where that is None."""
     if module is None:
         from ir_kernels.reference.model import Model  # half of the import time, for those who need it

@@ -10,17 +10,20 @@ import os
 import warnings
 from typing import Any
 
+Core = Any
+"""The compiled module, which has no types, or None: the NumPy reference takes its place."""
+
 CHOICES = ("native", "baseline", "reference")
 
 
-def _import(name: str) -> Any | None:
+def _import(name: str) -> Core:
     try:
         return importlib.import_module(f"ir_kernels.{name}")
     except ImportError:
         return None
 
 
-def load(choice: str = "") -> tuple[str, Any | None]:
+def load(choice: str = "") -> tuple[str, Core]:
     """Name of the build and its module, None for the NumPy reference.
 
     `choice`: one of CHOICES, or empty for the fastest that runs here. Raises ImportError when a build that is

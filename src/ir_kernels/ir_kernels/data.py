@@ -6,7 +6,7 @@ indexed 0..n-1.
 """
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from ir_kernels import arguments
 from ir_kernels.errors import InputError
 from ir_msgs_py.arrays import FloatArray, IntArray
+
+T = TypeVar("T", bound=np.generic)
 
 
 class ChainLike(Protocol):
@@ -81,7 +83,7 @@ class BodyLike(Protocol):
         """(V, 3) in the body frame, (0, 3) for all kinds but mesh."""
 
 
-def read_only(array: NDArray[Any]) -> NDArray[Any]:
+def read_only(array: NDArray[T]) -> NDArray[T]:
     """The same array, which can't be written through this name any more."""
     array.setflags(write=False)
     return array
@@ -131,7 +133,7 @@ def poses(value: ArrayLike, name: str) -> FloatArray:
     return result
 
 
-def unique_names(items: Sequence[Any], name: str) -> tuple[str, ...]:
+def unique_names(items: Sequence[CapsuleLike] | Sequence[BodyLike], name: str) -> tuple[str, ...]:
     """Names of the items; InputError when one is used twice."""
     names = tuple(str(item.name) for item in items)
     if len(set(names)) < len(names):

@@ -17,6 +17,7 @@ from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
 from ir_kernels.reference import dynamics as reference
 from ir_kernels.reference import torque_bounds as bounds_reference
+from ir_kernels.robot_like import LoadLike, RobotLike
 from ir_kernels.torque_bounds import TorqueBounds, torque_bounds
 from ir_msgs_py.arrays import FloatArray
 
@@ -44,12 +45,12 @@ class DynamicsModel:
 
     def __init__(
         self,
-        robot: Any,
-        loads: Sequence[Any] = (),
+        robot: RobotLike,
+        loads: Sequence[LoadLike] = (),
         base_pose: ArrayLike | None = None,
         gravity: float = STANDARD_GRAVITY,
         *,
-        core: Any = compiled.MODULE,
+        core: compiled.Core = compiled.MODULE,
     ) -> None:
         pose = np.eye(4) if base_pose is None else base_pose
         self.data = dynamics_data(robot, loads, pose, gravity)

@@ -5,11 +5,12 @@ Loads are lumped into the last link here, so that a robot with its tool and part
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_kernels.errors import InputError
+from ir_kernels.robot_like import CounterbalanceLike, LoadLike, RobotLike
 from ir_msgs_py.arrays import FloatArray
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
@@ -65,7 +66,7 @@ class DynamicsData:
         return len(self.mass)
 
 
-def _frozen(name: str, value: Any, shape: tuple[int, ...]) -> FloatArray:
+def _frozen(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(value, dtype=np.float64)
     if array.shape != shape:
         raise InputError(f"{name} has shape {array.shape}, expected {shape}")
@@ -76,7 +77,7 @@ def _frozen(name: str, value: Any, shape: tuple[int, ...]) -> FloatArray:
 
 
 def lump(
-    mass: float, com: FloatArray, inertia: FloatArray, loads: Sequence[Any]
+    mass: float, com: FloatArray, inertia: FloatArray, loads: Sequence[LoadLike]
 ) -> tuple[float, FloatArray, FloatArray]:
     """Mass, centre of mass (3,) and inertia (3, 3) about it of a link with loads bolted on.
 
@@ -101,7 +102,7 @@ def lump(
     return total, centre, lumped
 
 
-def _counterbalance(data: Any) -> CounterbalanceData | None:
+def _counterbalance(data: CounterbalanceLike | None) -> CounterbalanceData | None:
     if data is None:
         return None
     packed = CounterbalanceData(
@@ -123,8 +124,10 @@ def _counterbalance(data: Any) -> CounterbalanceData | None:
     return packed
 
 
-def dynamics_data(robot: Any, loads: Sequence[Any], base_pose: Any, gravity: float) -> DynamicsData:
-    """Pack a robot (see `ir_kernels.data.Robot`), its loads and its mounting.
+def dynamics_data(
+    robot: RobotLike, loads: Sequence[LoadLike], base_pose: ArrayLike, gravity: float
+) -> DynamicsData:
+    """Pack a robot, its loads and its mounting.
 
     `base_pose` (4, 4): pose of link 0 in the world, whose z points up. `gravity` [m/s^2]. Raises InputError.
     """

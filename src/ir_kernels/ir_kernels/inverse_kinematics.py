@@ -3,7 +3,6 @@ limits.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,7 +45,12 @@ class SphericalWristIk:
     """
 
     def __init__(
-        self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike, *, core: Any = compiled.MODULE
+        self,
+        chain: Chain,
+        position_min: ArrayLike,
+        position_max: ArrayLike,
+        *,
+        core: compiled.Core = compiled.MODULE,
     ) -> None:
         self.chain = chain
         self.geometry = wrist_geometry(chain)

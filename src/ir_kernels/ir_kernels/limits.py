@@ -3,7 +3,6 @@ well.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,7 +57,11 @@ def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray,
 
 
 def polynomial_extrema(
-    coefficients: ArrayLike, durations: ArrayLike, derivative: int = 0, *, core: Any = compiled.MODULE
+    coefficients: ArrayLike,
+    durations: ArrayLike,
+    derivative: int = 0,
+    *,
+    core: compiled.Core = compiled.MODULE,
 ) -> Extrema:
     """Extremes of the `derivative`-th derivative of q(t) = sum_k c_k t^k, t in [0, duration], to rounding.
 

@@ -5,7 +5,7 @@ back goes to the other axes, then into the capacitor; the rest is dissipated in 
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,7 +80,7 @@ def dc_bus(
     parameters: DcBusParameters,
     stored: float = 0.0,
     *,
-    core: Any = compiled.MODULE,
+    core: compiled.Core = compiled.MODULE,
 ) -> DcBus:
     """Run the DC bus over N steps in which the axes take constant powers `axis_power` (N, n) W.
 

@@ -5,7 +5,6 @@ slices, so that the caller can stop between them; what it finds does not depend 
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -129,7 +128,7 @@ class BidirectionalTree:
         return np.array(self._search.gap()[1], dtype=np.float64).reshape(2, self._n)
 
 
-def _core() -> Any:
+def _core() -> compiled.Core:
     """The compiled search, or the one in NumPy."""
     if compiled.MODULE is None:
         from ir_kernels.reference.search import Search

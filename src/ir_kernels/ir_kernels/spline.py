@@ -14,7 +14,6 @@ DynamicsModel.torque_bounds.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,7 +65,7 @@ class SplineCost:
         dynamics: DynamicsModel,
         terms: SplineTerms,
         *,
-        core: Any = compiled.MODULE,
+        core: compiled.Core = compiled.MODULE,
     ) -> None:
         self.n = dynamics.n
         _same_chain(collision, dynamics)
@@ -75,7 +74,7 @@ class SplineCost:
         if core is None:
             from ir_kernels.reference.spline import SplineCost as Reference
 
-            self._core: Any = Reference(collision._geometry, dynamics.data, kept)
+            self._core: compiled.Core = Reference(collision._geometry, dynamics.data, kept)
             return
         scene, drives = collision._core, dynamics._core
         if not isinstance(scene, core.Model):

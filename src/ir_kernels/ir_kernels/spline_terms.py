@@ -1,7 +1,6 @@
 """What a motion along a spline is judged by: bounds, costs and thresholds, checked once."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,7 +40,7 @@ class SplineTerms:
     clearance_penalty: float = 1e4
 
 
-def _copy(value: ArrayLike) -> Any:
+def _copy(value: ArrayLike) -> ArrayLike:
     """The same numbers, contiguous, where nobody else writes; what is no array is left to the checks."""
     return value.copy() if isinstance(value, np.ndarray) else value
 
@@ -49,7 +48,7 @@ def _copy(value: ArrayLike) -> Any:
 def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
     """The terms as contiguous arrays and floats, or InputError naming the one that makes no sense."""
     names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
-    arrays: dict[str, Any] = {
+    arrays: dict[str, FloatArray] = {
         name: data.array(_copy(getattr(terms, name)), f"terms.{name}", (n,)) for name in names
     }
     for name in names[:3]:
@@ -72,12 +71,22 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
         "penalty",
         "clearance_penalty",
     )
-    numbers: dict[str, Any] = {
+    numbers: dict[str, float] = {
         name: arguments.number(f"terms.{name}", getattr(terms, name), 0.0) for name in free
     }
     return SplineTerms(
-        **arrays,
-        **numbers,
+        velocity=arrays["velocity"],
+        acceleration=arrays["acceleration"],
+        jerk=arrays["jerk"],
+        low=arrays["low"],
+        high=arrays["high"],
+        travel=arrays["travel"],
+        energy_value=numbers["energy_value"],
+        time_value=numbers["time_value"],
+        capacity_energy=numbers["capacity_energy"],
+        clearance_margin=numbers["clearance_margin"],
+        penalty=numbers["penalty"],
+        clearance_penalty=numbers["clearance_penalty"],
         threshold=_thresholds(terms.threshold, pairs),
         torque_share=arguments.number("terms.torque_share", terms.torque_share, 0.0, 1.0, above=True),
         clearance_scale=arguments.number("terms.clearance_scale", terms.clearance_scale, 0.0, above=True),

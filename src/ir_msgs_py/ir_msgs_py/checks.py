@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -53,7 +53,7 @@ def one_of(value: str, known: Collection[str], name: str) -> str:
     return value
 
 
-def read_only(value: Any, name: str, shape: tuple[int | None, ...]) -> FloatArray:
+def read_only(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
     """Return a read-only float64 copy of the array; (None, 3) stands for any (N, 3).
 
     A copy that is already read-only float64 and owns its data is passed on as it is.

@@ -12,9 +12,10 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.checks import set_field
@@ -76,10 +77,10 @@ class JointTrajectory:
     def from_seconds(
         cls,
         joint_names: Sequence[str],
-        times: Any,
-        positions: Any,
-        velocities: Any | None = None,
-        accelerations: Any | None = None,
+        times: ArrayLike,
+        positions: ArrayLike,
+        velocities: ArrayLike | None = None,
+        accelerations: ArrayLike | None = None,
     ) -> JointTrajectory:
         """Round times (N,) [s] to nanoseconds; the rest as in the class."""
         seconds = np.asarray(times, dtype=np.float64)
@@ -90,9 +91,9 @@ class JointTrajectory:
         return cls(
             tuple(joint_names),
             np.rint(seconds * NS_PER_S).astype(np.int64),
-            positions,
-            velocities,
-            accelerations,
+            np.asarray(positions, dtype=np.float64),
+            None if velocities is None else np.asarray(velocities, dtype=np.float64),
+            None if accelerations is None else np.asarray(accelerations, dtype=np.float64),
         )
 
     @property
@@ -124,7 +125,7 @@ class JointTrajectory:
         """
         return self._polynomials
 
-    def sample(self, t: Any) -> Samples:
+    def sample(self, t: ArrayLike) -> Samples:
         """Motion at times t (M,) from start [s]; the robot rests before the first point and after the last.
 
         At a point that two segments share the later one counts.
@@ -181,7 +182,7 @@ class JointTrajectory:
         return coefficients, durations
 
 
-def _checked_times(times_ns: Any) -> IntArray:
+def _checked_times(times_ns: ArrayLike) -> IntArray:
     given = np.asarray(times_ns)
     if given.ndim != 1:
         raise TrajectoryError(f"times_ns have shape {given.shape}: they must be (N,)")
@@ -202,7 +203,7 @@ def _checked_times(times_ns: Any) -> IntArray:
     return times
 
 
-def _checked_values(values: Any, what: str, shape: tuple[int, int]) -> FloatArray:
+def _checked_values(values: ArrayLike, what: str, shape: tuple[int, int]) -> FloatArray:
     array: FloatArray = np.array(values, dtype=np.float64)
     if array.shape != shape:
         raise TrajectoryError(

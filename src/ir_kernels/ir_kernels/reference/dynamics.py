@@ -7,8 +7,7 @@ Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980), composite bodies
 Arrays q, qd, qdd, tau are (N, n); rad, rad/s, rad/s^2, Nm.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -75,7 +74,11 @@ def rigid_body_torque(
 
 
 def counterbalance_torque(
-    data: CounterbalanceData, sin: Number, cos: Number, sqrt: Any, power: Any
+    data: CounterbalanceData,
+    sin: Number,
+    cos: Number,
+    sqrt: Callable[..., Number],
+    power: Callable[..., Number],
 ) -> Number:
     """Torque about the joint's +axis (positive lowers the arm), for any kind of number with its sqrt and
     power.

@@ -7,10 +7,10 @@ all points of its arguments, because every end is moved outwards by two units in
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from ir_kernels.reference.vectors import Number
 from ir_msgs_py.arrays import FloatArray
 
 OUTWARD, TINY = 4.5e-16, 1e-300
@@ -27,17 +27,17 @@ class Interval:
     def __neg__(self) -> Interval:
         return Interval(-self.hi, -self.lo)
 
-    def __add__(self, other: Any) -> Interval:
+    def __add__(self, other: Number) -> Interval:
         o = interval(other)
         return outward(self.lo + o.lo, self.hi + o.hi)
 
-    def __sub__(self, other: Any) -> Interval:
+    def __sub__(self, other: Number) -> Interval:
         return self + -interval(other)
 
-    def __rsub__(self, other: Any) -> Interval:
+    def __rsub__(self, other: Number) -> Interval:
         return interval(other) - self
 
-    def __mul__(self, other: Any) -> Interval:
+    def __mul__(self, other: Number) -> Interval:
         o = interval(other)
         p, q, r, s = self.lo * o.lo, self.lo * o.hi, self.hi * o.lo, self.hi * o.hi
         return outward(
@@ -51,27 +51,27 @@ class Interval:
 class Dual:
     """Value v and derivative d along one direction, both any kind of number."""
 
-    v: Any
-    d: Any
+    v: Number
+    d: Number
     __array_ufunc__ = None
 
     def __neg__(self) -> Dual:
         return Dual(-self.v, -self.d)
 
-    def __add__(self, other: Any) -> Dual:
+    def __add__(self, other: Number) -> Dual:
         return (
             Dual(self.v + other.v, self.d + other.d)
             if isinstance(other, Dual)
             else Dual(self.v + other, self.d)
         )
 
-    def __sub__(self, other: Any) -> Dual:
+    def __sub__(self, other: Number) -> Dual:
         return self.__add__(-other)
 
-    def __rsub__(self, other: Any) -> Dual:
+    def __rsub__(self, other: Number) -> Dual:
         return (-self).__add__(other)
 
-    def __mul__(self, other: Any) -> Dual:
+    def __mul__(self, other: Number) -> Dual:
         if isinstance(other, Dual):
             return Dual(self.v * other.v, self.d * other.v + self.v * other.d)
         return Dual(self.v * other, self.d * other)
@@ -79,7 +79,7 @@ class Dual:
     __radd__, __rmul__ = __add__, __mul__
 
 
-def interval(x: Any) -> Interval:
+def interval(x: Number) -> Interval:
     """X itself, or the interval that holds just the number(s) x."""
     return x if isinstance(x, Interval) else Interval(np.asarray(x, float), np.asarray(x, float))
 
@@ -94,7 +94,7 @@ def intersect(a: Interval, b: Interval) -> Interval:
     return Interval(np.maximum(a.lo, b.lo), np.minimum(a.hi, b.hi))
 
 
-def power(x: Any, exponent: float) -> Any:
+def power(x: Number, exponent: float) -> Number:
     """X to a constant exponent for x > 0, also for dual numbers."""
     if isinstance(x, Dual):
         return Dual(power(x.v, exponent), power(x.v, exponent - 1.0) * exponent * x.d)

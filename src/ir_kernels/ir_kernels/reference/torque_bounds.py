@@ -7,7 +7,6 @@ counts where the velocity may vanish, none where the joint rests through the seg
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,8 @@ from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.reference import dynamics
 from ir_kernels.reference.interval import Dual, Interval, intersect, interval, power, sine_cosine
 from ir_kernels.reference.limits import derivative, evaluate
-from ir_msgs_py.arrays import FloatArray
+from ir_kernels.reference.vectors import Number
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 FIRST_PIECE = 0.05  # s, longest piece to begin with
 FEWEST_PIECES = 8  # of a segment to begin with
@@ -28,7 +28,7 @@ ROUNDING_MARGIN = 1e-9  # of the limit
 class Pieces:
     """Times begin..end (K,) within the segments (K,)."""
 
-    segment: Any
+    segment: IntArray
     begin: FloatArray
     end: FloatArray
 
@@ -40,7 +40,7 @@ def _horner(a: list[Interval], x: Interval) -> Interval:
     return value
 
 
-def _smooth_torque(data: DynamicsData, sin: Any, cos: Any, qd: Any, qdd: Any) -> list[Any]:
+def _smooth_torque(data: DynamicsData, sin: Number, cos: Number, qd: Number, qdd: Number) -> list[Number]:
     tau = dynamics.rigid_body_torque(data, sin, cos, qd, qdd)
     for j in range(data.n):
         tau[j] = tau[j] + qdd[j] * float(data.rotor_inertia[j]) + qd[j] * float(data.viscous[j])
@@ -56,8 +56,9 @@ def least_limit(data: DynamicsData, joint: int, slowest: FloatArray, fastest: Fl
     """Smallest torque available (K,) over the speeds slowest..fastest (K,)."""
     speeds, torques = data.envelope_speed[joint], data.envelope_torque[joint]
 
-    def limit(speed: FloatArray) -> Any:
-        return np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
+    def limit(speed: FloatArray) -> FloatArray:
+        found: FloatArray = np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
+        return found
 
     least = np.minimum(limit(slowest), limit(fastest))
     for speed, torque in zip(speeds, torques[1:], strict=True):
@@ -108,7 +109,7 @@ def upper_ratios(
 
 
 def sampled_ratios(
-    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, segment: Any, t: FloatArray
+    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, segment: IntArray, t: FloatArray
 ) -> FloatArray:
     """(K, n): |tau| / limit at local times t (K,) of the segments (K,)."""
     c = coefficients[segment]
