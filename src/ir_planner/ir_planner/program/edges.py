@@ -57,7 +57,9 @@ class CostEdges:
         """Coarse solutions of the parts that have none yet; where all have, the movements."""
         fresh = [part for part in parts if part not in self._looked_at]
         if not fresh:
-            return self._planned(parts)
+            lines = [part for part in parts if part.kind != ACROSS]
+            found = dict(zip(lines or parts, self._planned(lines or parts), strict=True))
+            return [found.get(part, Settled(0.0, exact=False)) for part in parts]
         self._looked_at.update(fresh)
         return [self._coarse(part) if part in fresh else Settled(0.0, exact=False) for part in parts]
 
