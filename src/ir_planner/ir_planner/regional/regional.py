@@ -15,12 +15,13 @@ from ir_msgs_py.status import Status
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.regional.answer import MovementPlan
-from ir_planner.regional.exploration import Path, Searches, first_paths, improve
+from ir_planner.regional.exploration import Path, Searches, first_paths
 from ir_planner.regional.refusal import refusal
+from ir_planner.regional.safeguards import Exploration, best_found, not_worse_than_baseline
 from ir_planner.request import Context
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
-from ir_planner.timing import Movement
+from ir_planner.timing import Movement, check_requested
 
 _TIMED = 3  # paths that get straight steps with blended corners: the cheapest by W is rarely not best
 
@@ -49,18 +50,19 @@ def search_regional(
     blocked = end_in_collision(start, ends.goals[0], space, context.safety_distance)
     if blocked is not None:
         return blocked, None
-    refinement = Refinement(context)
-    portfolio = Portfolio(space, refinement)
     paths = first_paths(ends, space, context, searches)
-    best: tuple[str, Movement] | None = None
+    if not paths:
+        return refusal(start, ends.goals[0], space, context.journal), None
     there = np.abs(ends.goals - start).max(axis=1).min() < STILL
-    if paths and not there and not _straight_steps_only(context.options):
-        improve(ends, paths, portfolio, context, searches)
-        best = portfolio.best()
-        if best is None:
-            refinement.check_requested()
-    if paths and best is None:
-        best = _in_straight_steps(paths, portfolio, context)
+    best, shortest = None, np.inf
+    if not there and not _straight_steps_only(context.options):
+        best, shortest = best_found(Exploration(ends, paths, space, searches), context)
+    if context.options.planner_id == "" and not there:
+        best = not_worse_than_baseline(best, paths, context)
+    if best is None:
+        if np.isfinite(shortest):
+            check_requested(shortest, context.options)
+        best = _in_straight_steps(paths, Portfolio(space, Refinement(context)), context)
     if best is None:
         return refusal(start, ends.goals[0], space, context.journal), None
     context.journal.planner_id, movement = best

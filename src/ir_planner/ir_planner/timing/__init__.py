@@ -1,5 +1,6 @@
 """Time scaling: seven-phase laws, straight movements (PTP), blended corners, the best duration."""
 
+from ir_planner.timing.baseline import baseline
 from ir_planner.timing.blending import TimedPath, blended, stretched
 from ir_planner.timing.durations import DURATION_SLACK, at_best_duration, check_duration, check_requested
 from ir_planner.timing.level_timing import fastest
@@ -26,6 +27,7 @@ __all__ = [
     "StepLaws",
     "TimedPath",
     "at_best_duration",
+    "baseline",
     "best_stretch",
     "blended",
     "check_duration",

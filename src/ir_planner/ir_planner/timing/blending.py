@@ -92,7 +92,8 @@ def stretched(trajectory: JointTrajectory, factor: float) -> JointTrajectory:
     )
 
 
-def standing(position: FloatArray, joint_names: tuple[str, ...]) -> JointTrajectory:
-    """The shortest trajectory there is: 1 ms of rest, for a goal that is the start."""
+def standing(position: FloatArray, joint_names: tuple[str, ...], duration: float = 0.0) -> JointTrajectory:
+    """Rest at `position` (n,) for `duration` s, at least 1 ms: the shortest trajectory there is."""
     rest = np.zeros((2, len(position)))
-    return JointTrajectory(joint_names, np.array([0, GRID_NS]), np.stack([position, position]), rest, rest)
+    end = max(round(duration * 1e9), GRID_NS)
+    return JointTrajectory(joint_names, np.array([0, end]), np.stack([position, position]), rest, rest)

@@ -12,15 +12,15 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 
+from ir_kernels import dc_bus
 from ir_planner.checks import movement_energy
 from ir_planner.request import Context
 from ir_planner.scene import path_cost
-from ir_planner.timing.blending import stretched
 
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported
-_MOST_STEPS = 5000  # of a movement that lasts long
+_FEWEST_STEPS, _MOST_STEPS = 100, 5000  # of a movement that is short, or lasts long
 _DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it moves
 _TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
 _BESIDE = 5e-3  # weight of what breaks ties
@@ -101,12 +101,33 @@ def best_stretch(fastest: JointTrajectory, context: Context) -> float:
     if context.options.objective in ("time", "movement_cost"):
         return 1.0
 
-    def cost(factor: float) -> float:
-        return coarse_energy_cost(stretched(fastest, factor), context)
-
-    costs = [cost(float(factor)) for factor in _FACTORS]
+    costs = _costs(fastest, _FACTORS, context)
     k = int(np.argmin(costs))
     around = np.linspace(_FACTORS[max(k - 1, 0)], _FACTORS[min(k + 1, len(_FACTORS) - 1)], _REFINED + 2)[1:-1]
-    refined = [cost(float(factor)) for factor in around]
+    refined = _costs(fastest, around, context)
     best = int(np.argmin(refined))
     return float(around[best]) if refined[best] < costs[k] else float(_FACTORS[k])
+
+
+def _costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> FloatArray:
+    """J, or joules where the objective is not J (F,), of a trajectory stretched by `factors` (F,); all of
+    them from the same samples.
+    """
+    scene, begin = context.scene, float(fastest.times[0])
+    span = fastest.duration - begin
+    count = int(np.clip(np.ceil(span / _COARSE_STEP), _FEWEST_STEPS, _MOST_STEPS))
+    motion = fastest.sample(begin + (np.arange(count) + 0.5) * (span / count))
+    slower = factors[:, None, None]
+    shape = (len(factors) * count, -1)
+    q = np.broadcast_to(motion.q, (len(factors), *motion.q.shape)).reshape(shape)
+    qd, qdd = (motion.qd / slower).reshape(shape), (motion.qdd / slower**2).reshape(shape)
+    axes = scene.dynamics.axis_power(qd, scene.dynamics.inverse_dynamics(q, qd, qdd))
+    steps = factors * span / count
+    drives = [
+        float(dc_bus(power, float(step), scene.dc_bus).mains.sum() * step)
+        for power, step in zip(axes.reshape(len(factors), count, -1), steps, strict=True)
+    ]
+    per_second = scene.base_watts
+    if context.options.objective == "time_and_energy":
+        per_second = context.options.time_value
+    return np.array(drives) + per_second * factors * span

@@ -44,7 +44,7 @@ def straight_steps(waypoints: FloatArray, context: Context) -> Movement:
     """
     waypoints = distinct(waypoints)
     if len(waypoints) == 1:
-        trajectory = standing(waypoints[0], context.joint_names)
+        trajectory = standing(waypoints[0], context.joint_names, context.options.duration)
         return Movement(waypoints, trajectory, context, "the goal is the start")
 
     def timed(limits: MotionLimits) -> Movement:

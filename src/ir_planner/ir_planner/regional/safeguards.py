@@ -1,0 +1,104 @@
+"""What an answer is compared with before it is given, so that no other request would have found a better one.
+
+The baseline movement is a candidate of every answer of the default portfolio. A requested duration is met by
+the cheapest movement of free duration too, and where nothing else is left by the fastest one, both stretched.
+The movements of least W have few turns: some of them are faster than what the descent for time ends in.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_msgs_py.options import PlanOptions
+
+from ir_planner.checks import FreeSpace
+from ir_planner.optimize import Portfolio, Refinement
+from ir_planner.regional.exploration import Path, Searches, improve
+from ir_planner.request import Context
+from ir_planner.search import Ends
+from ir_planner.timing import DURATION_SLACK, Movement, baseline
+
+Answer = tuple[str, Movement]  # the search that found it
+DIRECT = "direct"  # the search that finds straight segments
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """What the improvement of a request starts from."""
+
+    ends: Ends
+    paths: list[Path]
+    space: FreeSpace
+    searches: Searches
+
+
+def best_found(exploration: Exploration, context: Context) -> tuple[Answer | None, float]:
+    """The best answer by the searches and descents of the request and of its companions, and the shortest
+    duration [s] met where none is as short as requested.
+    """
+    options = context.options
+    best, shortest = _improved(exploration, context)
+    if options.planner_id:
+        return best, shortest
+    for objective in _companions(options):
+        other, duration = _companion(exploration, context, objective)
+        best, shortest = _cheaper(best, other), min(shortest, duration)
+        if duration <= options.duration:
+            break  # the others are for requests that leave no time for least cost
+    return best, shortest
+
+
+def _companions(options: PlanOptions) -> tuple[str, ...]:
+    """Objectives, at a free duration, whose answers may serve a request better than its own descent."""
+    if options.duration > 0.0:
+        return ("time_and_energy", "time", "movement_cost")
+    return ("movement_cost",) if options.objective == "time" else ()
+
+
+def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Context) -> Answer | None:
+    """The best answer, or a baseline movement that costs less: to the goal of the best answer, or to the
+    first goal with a free straight segment. None where there is neither.
+    """
+    straight = [path for _, path in paths if len(path) == 2]
+    if best is not None:
+        reached = best[1].path[-1]
+        straight = [path for path in straight if np.array_equal(path[-1], reached)] or straight
+    for path in straight[:1]:
+        with context.journal.stage("baseline") as notes:
+            movement = baseline(path[0], path[1], context)
+            if movement is None or not movement.certified:
+                notes.append("the straight segment can't be moved along as asked")
+            elif best is None or movement.cost < best[1].cost:
+                notes.append("the baseline movement costs less" if best else "the baseline movement")
+                return DIRECT, movement
+    return best
+
+
+def _improved(exploration: Exploration, context: Context) -> tuple[Answer | None, float]:
+    refinement = Refinement(context)
+    portfolio = Portfolio(exploration.space, refinement)
+    improve(exploration.ends, exploration.paths, portfolio, context, exploration.searches)
+    return portfolio.best(), refinement.shortest
+
+
+def _companion(exploration: Exploration, context: Context, objective: str) -> tuple[Answer | None, float]:
+    """The best answer for another objective at a free duration, as an answer to this request: stretched where
+    a duration is requested. None where it takes longer; and its own duration [s].
+    """
+    found, _ = _improved(exploration, context.asking(objective))
+    if found is None:
+        return None, np.inf
+    method, other = found
+    own, requested = other.trajectory.duration, context.options.duration
+    movement = Movement(other.path, other.trajectory, context, other.note)
+    if requested > 0.0:
+        if own > requested * (1.0 + DURATION_SLACK):
+            return None, own
+        movement = movement.stretched_by(max(requested / own, 1.0))
+    return ((method, movement) if movement.certified else None), own
+
+
+def _cheaper(best: Answer | None, other: Answer | None) -> Answer | None:
+    if best is None or other is None:
+        return best or other
+    return other if other[1].cost < best[1].cost else best

@@ -1,0 +1,53 @@
+"""The baseline movement: the straight joint segment, as a controller's PTP would run it.
+
+One seven-phase S-curve for all joints (synchronous) with the data's limits, uniformly slowed until torque
+keeps its share of the envelope; longer durations by uniform time scaling. Every answer of the default
+portfolio is compared with it.
+"""
+
+import numpy as np
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ir_planner.request import Context
+from ir_planner.scene import STILL, MotionLimits
+from ir_planner.timing.blending import TimedPath, blended, stretched
+from ir_planner.timing.durations import DURATION_SLACK, at_best_duration
+from ir_planner.timing.movement import Movement
+from ir_planner.timing.ptp import free_law, path_limits, torque_per_segment
+from ir_planner.timing.time_law import StepLaws
+from ir_planner.timing.torque_shares import within_torque
+
+_ROUNDS = 25  # gravity doesn't fall with speed: a load near the envelope takes several
+_BELOW = 1.0005  # a little slower than asked for, so that few rounds end it
+
+
+def baseline(start: FloatArray, goal: FloatArray, context: Context) -> Movement | None:
+    """The baseline from `start` to `goal` (n,), at the requested duration or the best for the objective;
+    None where no duration carries the load, or the requested one is too short. Its clearance is not asked
+    for here.
+    """
+    ends = np.stack([start, goal])
+    if np.abs(goal - start).max() < STILL:
+        return None
+
+    def timed(limits: MotionLimits) -> Movement | None:
+        quickest = _quickest(ends, limits, context)
+        requested = context.options.duration
+        if quickest is None or 0.0 < requested < quickest.duration * (1.0 - DURATION_SLACK):
+            return None
+        return Movement(ends, at_best_duration(quickest, context), context)
+
+    movement = within_torque(timed, context)
+    return movement if movement is not None and movement.torque.violation is None else None
+
+
+def _quickest(ends: FloatArray, limits: MotionLimits, context: Context) -> JointTrajectory | None:
+    law = free_law(path_limits(ends[1] - ends[0], limits))
+    trajectory = blended(TimedPath(ends, (StepLaws((law,)),), ()), context.joint_names)
+    for _ in range(_ROUNDS):
+        use = torque_per_segment(trajectory, context.scene.dynamics).max() / limits.torque_share
+        if use <= 1.0:
+            return trajectory
+        trajectory = stretched(trajectory, float(np.sqrt(use)) * _BELOW)
+    return None
