@@ -27,6 +27,18 @@ SPREAD = 0.35  # rad: standard deviation of the bump that makes one start differ
 _GAUSS = (0.5 - np.sqrt(3.0) / 6.0, 0.5 + np.sqrt(3.0) / 6.0)  # two points per interval
 _KILO = 1e-3  # powers in kW and energies in kJ: numbers near 1
 _JERK_WEIGHT = 1e-7  # makes the least energy unique; far below a joule
+_OPTIONS: dict[str, Any] = {
+    "ipopt": {
+        "max_iter": ITERATIONS,
+        "print_level": 0,
+        "sb": "yes",
+        "tol": 1e-5,  # of energies in kJ
+        "acceptable_tol": 1e-4,
+        "acceptable_iter": 5,
+    },
+    "print_time": False,
+    "expand": True,  # scalar expressions: each evaluation is ten times as fast
+}
 
 
 class EnergyPeer:
@@ -100,49 +112,37 @@ class EnergyPeer:
 
     def _problem(self) -> tuple[Any, dict[str, Any]]:
         """The solver and the bounds of its variables and constraints."""
-        n, robot = self._n, self._scene.cell.robot
+        n = self._n
         X, U = ca.MX.sym("X", 3 * n, MESH + 1), ca.MX.sym("U", n, MESH)
         bus = ca.MX.sym("bus", 3, 2 * MESH)  # mains [kW], dissipated [kW], stored [kJ]
         p = ca.MX.sym("p", 2 * n + 1)
         h = p[2 * n] / MESH
-        q, qd, qdd = X[:n, :-1], X[n : 2 * n, :-1], X[2 * n :, :-1]
-        following = ca.vertcat(
-            q + h * (qd + h * (qdd / 2 + h * U / 6)), qd + h * (qdd + h * U / 2), qdd + h * U
-        )
+        power, uses = self._along(X, U, h)
+        before = ca.horzcat(0.0, bus[2, :-1])
+        balance = _KILO * power - bus[0, :] + bus[1, :] - (before - bus[2, :]) / (h / 2)
+        ends = ca.vertcat(X[:n, 0] - p[:n], X[:n, -1] - p[n : 2 * n], X[n:, 0], X[n:, -1])
+        following = X[:, 1:] - ca.vertcat(*_moved(X[:, :-1], U, h))
+        equal = ca.vertcat(ca.vec(following), balance.T, ends)
+        energy = ca.sum2(bus[0, :]) * h / 2
+        smooth = h * ca.sumsqr(U / ca.DM(self._scene.limits.jerk))
+        problem = {
+            "x": ca.vertcat(ca.vec(X), ca.vec(U), ca.vec(bus)),
+            "p": p,
+            "f": energy + _JERK_WEIGHT * smooth,
+            "g": ca.vertcat(equal, uses),
+        }
+        zeros, share = np.zeros(int(equal.numel())), np.full(int(uses.numel()), TORQUE_SHARE)
+        bounds = {"lbg": np.concatenate([zeros, -share]), "ubg": np.concatenate([zeros, share])}
+        return ca.nlpsol("peer", "ipopt", problem, _OPTIONS), self._box() | bounds
+
+    def _along(self, X: Any, U: Any, h: Any) -> tuple[Any, Any]:
+        """Power (1, 2 MESH) W of all axes at the points of the mesh, and use of torque, one long column."""
         powers, uses = [], []
         for point in _GAUSS:
-            t = point * h
-            at = (q + t * (qd + t * (qdd / 2 + t * U / 6)), qd + t * (qdd + t * U / 2), qdd + t * U)
-            power, use = self._power.map(MESH)(*at)
+            power, use = self._power.map(MESH)(*_moved(X[:, :-1], U, point * h))
             powers.append(power)
-            uses.append(use)
-        wanted = _KILO * ca.reshape(ca.vertcat(*powers), 1, 2 * MESH)
-        before = ca.horzcat(0.0, bus[2, :-1])
-        balance = wanted - bus[0, :] + bus[1, :] - (before - bus[2, :]) / (h / 2)
-        ends = ca.vertcat(X[:n, 0] - p[:n], X[:n, -1] - p[n : 2 * n], X[n:, 0], X[n:, -1])
-        constraints = [ca.vec(X[:, 1:] - following), balance.T, ends, *(ca.vec(use) for use in uses)]
-        equal = sum(int(c.numel()) for c in constraints[:3])
-        share = np.full(2 * n * MESH, TORQUE_SHARE)
-        upper = np.concatenate([np.zeros(equal), share])
-        lower = np.concatenate([np.zeros(equal), -share])
-        energy = ca.sum2(bus[0, :]) * h / 2
-        cost = energy + _JERK_WEIGHT * h * ca.sumsqr(U / ca.DM(robot.jerk_max))
-        variables = ca.vertcat(ca.vec(X), ca.vec(U), ca.vec(bus))
-        problem = {"x": variables, "p": p, "f": cost, "g": ca.vertcat(*constraints)}
-        options: dict[str, Any] = {
-            "ipopt": {
-                "max_iter": ITERATIONS,
-                "print_level": 0,
-                "sb": "yes",
-                "tol": 1e-5,
-                "acceptable_tol": 1e-4,
-                "acceptable_iter": 5,
-                "mu_strategy": "monotone",
-            },
-            "print_time": False,
-            "expand": True,
-        }
-        return ca.nlpsol("peer", "ipopt", problem, options), {**self._box(), "lbg": lower, "ubg": upper}
+            uses.append(ca.vec(use))
+        return ca.reshape(ca.vertcat(*powers), 1, 2 * MESH), ca.vertcat(*uses)
 
     def _box(self) -> dict[str, FloatArray]:
         """Limits of position, speed, acceleration and jerk, and of the bus."""
@@ -157,3 +157,10 @@ class EnergyPeer:
             "lbx": np.concatenate([states[0], -jerk, np.zeros(6 * MESH)]),
             "ubx": np.concatenate([states[1], jerk, bus]),
         }
+
+
+def _moved(X: Any, U: Any, t: Any) -> tuple[Any, Any, Any]:
+    """q, qd, qdd (n, MESH) a time t after the states X (3n, MESH) under the jerk U (n, MESH)."""
+    n = U.shape[0]
+    q, qd, qdd = X[:n, :], X[n : 2 * n, :], X[2 * n :, :]
+    return q + t * (qd + t * (qdd / 2 + t * U / 6)), qd + t * (qdd + t * U / 2), qdd + t * U
