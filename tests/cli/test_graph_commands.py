@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -76,3 +77,19 @@ def test_echo_prints_the_latched_message(machine: Node, capsys: pytest.CaptureFi
 def test_list_shows_names_with_types(machine: Node, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "topics"]) == 0
     assert f"{TOPIC} [ir_msgs/msg/Signal]\n" in capsys.readouterr().out
+
+
+def test_a_typo_is_answered_with_the_name_that_was_meant(
+    machine: Node, capsys: pytest.CaptureFixture[str]
+) -> None:
+    began = time.monotonic()
+    assert main(["call", "/machin/set", "{}"]) == 1
+    assert f"no service /machin/set: did you mean {SERVICE}?" in capsys.readouterr().err
+    assert time.monotonic() - began < 4.5  # not the whole time of discovery
+
+
+def test_another_type_than_the_services_is_refused_at_once(
+    machine: Node, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["call", SERVICE, "ir_msgs/srv/SetLoad", "{}"]) == 1
+    assert f"service {SERVICE} has the type ir_msgs/srv/SetPlcInput" in capsys.readouterr().err

@@ -11,14 +11,12 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.types import interface_type
 from ir_msgs_py.ros.yaml_messages import message_from_yaml, message_to_yaml
 
-from .errors import CommandError
+from .lookup import absolute, checked_type, type_of
+from .terminal import SHOWN_ELEMENTS
+from .words import type_and_text
 
-DISCOVERY_SECONDS = 5.0
-"""Longest wait for a name to appear in the graph; discovery on one machine takes tenths of a second."""
 LISTING_SECONDS = 1.0
 """Wait before a list is printed, so that discovery is complete."""
-SHOWN_ELEMENTS = 128
-"""Longer arrays end in "..." unless --full asks for all, as in ros2cli."""
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -46,8 +44,9 @@ def run_call(arguments: argparse.Namespace) -> int:
     """Call a service and print its response; exit code 1 when its status is not a success."""
     with Client(node_name="ir_call") as client:
         name = absolute(arguments.service)
-        typed, request_text = _type_and_text(arguments.values)
-        service_type = interface_type(typed or _wait_for(client.graph.services, name, "service"), "srv")
+        typed, request_text = type_and_text(arguments.values, "service")
+        found = type_of(client.graph.services, name, "service")
+        service_type = interface_type(checked_type(typed, found, name, "service"), "srv")
         request = message_from_yaml(service_type.Request, request_text)
         response = client.call(name, request, arguments.timeout)
     sys.stdout.write(message_to_yaml(response, None if arguments.full else SHOWN_ELEMENTS))
@@ -60,7 +59,7 @@ def run_echo(arguments: argparse.Namespace) -> int:
     limit = None if arguments.full else SHOWN_ELEMENTS
     with Client(node_name="ir_echo", timeout=arguments.timeout) as client:
         name = absolute(arguments.topic)
-        message_type = interface_type(_wait_for(client.graph.topics, name, "topic", arguments.timeout), "msg")
+        message_type = interface_type(type_of(client.graph.topics, name, "topic", arguments.timeout), "msg")
         if arguments.once:
             sys.stdout.write(message_to_yaml(client.next_message(name, message_type), limit) + "---\n")
             return 0
@@ -79,30 +78,3 @@ def run_list(arguments: argparse.Namespace) -> int:
     for name, kind in sorted(found.items()):
         sys.stdout.write(f"{name} [{kind}]\n")
     return 0
-
-
-def absolute(name: str) -> str:
-    """Return the name with the leading slash that people leave out."""
-    return name if name.startswith("/") else "/" + name
-
-
-def _type_and_text(values: list[str]) -> tuple[str, str]:
-    """`[type] [yaml]`: the type may be left out, which ros2cli does not allow."""
-    if len(values) > 2:
-        raise CommandError(f"{len(values)} arguments after the service: at most a type and one YAML text")
-    typed = values[0] if values and "/" in values[0].split("{")[0].split(":")[0] else ""
-    text = values[-1] if len(values) > bool(typed) else ""
-    return typed, text
-
-
-def _wait_for(look: object, name: str, kind: str, seconds: float = DISCOVERY_SECONDS) -> str:
-    """Type of a name as soon as the graph shows it."""
-    assert callable(look)
-    deadline = time.monotonic() + seconds
-    while name not in (known := look()):
-        if time.monotonic() > deadline:
-            shown = ", ".join(sorted(known)) or "none: do the nodes run in this ROS_DOMAIN_ID?"
-            raise CommandError(f"no {kind} {name} (waited {seconds:g} s); there is: {shown}")
-        time.sleep(0.02)
-    found: str = known[name]
-    return found

@@ -7,9 +7,11 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 
 from .environment import apply, ros_defaults
 from .errors import CommandError
+from .suggestions import unknown_name
 
 COMMAND_MODULES = {
     "demo": "ir_cli.demo.command",
@@ -17,10 +19,18 @@ COMMAND_MODULES = {
     "call": "ir_cli.graph_commands",
     "echo": "ir_cli.graph_commands",
     "list": "ir_cli.graph_commands",
+    "send_goal": "ir_cli.action_commands",
+    "cancel": "ir_cli.action_commands",
     "cell": "ir_cli.cell_commands",
     "report": "ir_cli.report_command",
 }
 """Only the module that is needed is imported: `ir cell check` does not wait for rclpy."""
+
+WITHOUT_ROS = ("cell", "report")
+"""Commands that need no middleware, whatever its environment is."""
+
+MISUSED = 2
+"""Exit code for a command line that makes no sense, as argparse uses it."""
 
 INTERRUPTED = 130
 """Exit code of a command that SIGINT ended, as shells use it."""
@@ -29,15 +39,19 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code, 1 with one sentence on stderr when it failed."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    apply(ros_defaults())
     chosen = next((word for word in words if not word.startswith("-")), "")
-    parser = _parser(chosen)
-    parsed = parser.parse_args(words)
+    if chosen and chosen not in COMMAND_MODULES:
+        sys.stderr.write(f"ir: {unknown_name('command', chosen[:80], COMMAND_MODULES, 'ir --help')}\n")
+        return MISUSED
+    parsed = _parser(chosen).parse_args(words)
     # a background job of a shell ignores SIGINT, and SIGTERM would leave child processes behind
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        if chosen not in WITHOUT_ROS:
+            apply(ros_defaults())
         code: int = parsed.run(parsed)
+        sys.stdout.flush()
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
@@ -50,11 +64,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser(chosen: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="ir", description="Energy-aware planning for industrial robots.")
+    parser.add_argument("--version", action="version", version=f"ir {_version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     wanted = [chosen] if chosen in COMMAND_MODULES else list(COMMAND_MODULES)
     for module in dict.fromkeys(COMMAND_MODULES[command] for command in wanted):
         import_module(module).add_commands(commands)
     return parser
+
+
+def _version() -> str:
+    try:
+        return version("ir_cli")
+    except PackageNotFoundError:
+        return "unknown (not installed)"
 
 
 def _expected_errors() -> tuple[type[Exception], ...]:
@@ -63,7 +85,8 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     from ir_msgs_py.errors import MsgsError
     from ir_recorder.errors import RecorderError
 
-    return (CommandError, DescriptionError, MsgsError, RecorderError)
+    # OSError: a full disk, no permission, no descriptor left
+    return (CommandError, DescriptionError, MsgsError, OSError, RecorderError)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,9 @@ import time
 from collections.abc import Sequence
 from typing import TextIO
 
+SHOWN_ELEMENTS = 128
+"""Longer arrays of a message end in "..." unless --full asks for all, as in ros2cli."""
+
 
 class Progress:
     """Steps with their seconds; on a terminal the running step's line is kept up to date."""

@@ -8,15 +8,20 @@ clock is never scaled.
 from __future__ import annotations
 
 import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from ir_cli.errors import DemonstrationError
 from ir_cli.nodes import cell_nodes
 from ir_cli.processes import NodeProcesses
 from ir_cli.terminal import Progress
 from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
+from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.answers import ProgramPlan
 from ir_msgs_py.ros.client import Client
@@ -40,6 +45,8 @@ LONGEST_PAUSE = 12.0
 """Seconds; longer pauses of the program are cut to this."""
 TOUR_STAY = 1.2
 """Seconds in each power mode at machine home: a plateau of the mains meter (100 Hz) needs some tenths."""
+LOOK_SECONDS = 0.1
+"""Between two looks whether the nodes are there."""
 START_SECONDS = 30.0
 """Longest wait for a node to offer its services: four processes that start at once on a slow machine."""
 
@@ -76,14 +83,14 @@ class Demonstration:
                     recorder={"facts": self._facts(), "roots": [str(self._out.resolve())]},
                 )
             )
-            self._start_recording(client, recording)
-            progress.end(str(recording))
-            nodes.check()
-            plan = self._plan(client)
-            self._tour(client)
-            self._drive(client, plan)
-            nodes.check()
-            client.ask("/" + names.STOP_RECORDING, StopRecording.Request())
+            _await_services(client, nodes)
+            with _naming_the_dead(nodes):
+                self._start_recording(client, recording)
+                progress.end(str(recording))
+                plan = self._plan(client)
+                self._tour(client)
+                self._drive(client, plan)
+                client.ask("/" + names.STOP_RECORDING, StopRecording.Request())
             nodes.end()
         progress.begin("read the recording, write report and picture")
         outcome = examine(recording, self._out / "report.html", self._out / "demo.png", len(self._loads))
@@ -139,6 +146,28 @@ class Demonstration:
     def _wake(self) -> None:
         """Send the Wake-on-LAN packet that the program runner would send."""
         send_packet(magic_packet(self._link.mac), self._link.wake_address, self._link.wake_port)
+
+
+def _await_services(client: Client, nodes: NodeProcesses) -> None:
+    """Wait until every node offers its services; a node that ends meanwhile is named at once."""
+    wanted = {f"/{name}" for name in (names.GET_CELL, names.SET_PLC_INPUT, names.START_RECORDING)}
+    deadline = time.monotonic() + START_SECONDS
+    while missing := wanted - set(client.graph.services()):
+        nodes.check()
+        if time.monotonic() > deadline:
+            raise DemonstrationError(f"no {', '.join(sorted(missing))} after {START_SECONDS:g} s")
+        time.sleep(LOOK_SECONDS)
+
+
+@contextmanager
+def _naming_the_dead(nodes: NodeProcesses) -> Iterator[None]:
+    """A request that fails because a node ended says which node, and why."""
+    try:
+        yield
+    except (DemonstrationError, MsgsError):
+        nodes.check()
+        raise
+    nodes.check()
 
 
 def free_udp_port() -> int:

@@ -21,6 +21,8 @@ from ir_msgs_py.errors import ParameterError
 
 VARIABLE = "IR_NETWORK"
 CHOICES = ("loopback", "secure", "insecure")
+DOMAIN = "ROS_DOMAIN_ID"
+MOST_DOMAIN = 232  # higher ones have no UDP ports left
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PEERS = "ROS_STATIC_PEERS"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
@@ -36,8 +38,12 @@ def profile(name: str) -> str:
 def network_variables(environment: Mapping[str, str]) -> tuple[dict[str, str], tuple[str, ...]]:
     """Variables to set for the choice in `environment`, and those to remove.
 
-    Raises ParameterError for an unknown choice, and for `secure` where security isn't enforced.
+    Raises ParameterError for an unknown choice, for `secure` where security isn't enforced, and for a
+    domain that is none.
     """
+    domain = environment.get(DOMAIN, "")
+    if domain and not (domain.isascii() and domain.isdigit() and int(domain) <= MOST_DOMAIN):
+        raise ParameterError(f"{DOMAIN} is {domain[:60]!a}: it must be a whole number 0 .. {MOST_DOMAIN}")
     choice = environment.get(VARIABLE, "") or "loopback"
     if choice not in CHOICES:
         raise ParameterError(f"{VARIABLE} is {choice[:60]!a}: known are {', '.join(CHOICES)}")
