@@ -6,8 +6,9 @@ from ir_sim_driver.controller.driver import Bodies, Driver, Snapshot
 from ir_sim_driver.controller.frames import Frame
 from ir_sim_driver.controller.goals import NO_GOAL
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
-from ir_sim_driver.controller.simulation import Simulation, VettedGoal
+from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.controller.supervision import SupervisionSettings
+from ir_sim_driver.controller.vetting import VettedGoal
 
 __all__ = [
     "NO_GOAL",

@@ -6,7 +6,7 @@ clock. No ROS.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,8 +19,10 @@ from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.emergency import EmergencyStop
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.controller.mode_control import ModeControl
+from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.controller.supervision import PERIOD, Command, Fault, Supervision
+from ir_sim_driver.controller.supervision import PERIOD, Supervision
+from ir_sim_driver.controller.vetting import VettedGoal, vet
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion import (
     ErrorCode,
@@ -29,9 +31,6 @@ from ir_sim_driver.motion import (
     Outcome,
     ToolPoint,
     TrajectoryGoal,
-    check_goal,
-    check_trajectory,
-    checked_route,
     manual_scaling,
 )
 from ir_sim_driver.notices import Level, Notices
@@ -39,14 +38,6 @@ from ir_sim_driver.plant import Backend, Carried
 from ir_sim_driver.plc import Plc, Watchdog
 
 _HOME = 0.01  # rad off machine home that still count as there
-
-
-@dataclass(frozen=True, eq=False)
-class VettedGoal:
-    """A goal whose trajectory was found executable with the dynamics of one load."""
-
-    goal: TrajectoryGoal
-    dynamics: DynamicsModel
 
 
 class Simulation:
@@ -76,13 +67,12 @@ class Simulation:
         self.modes, self.pauses = self.control.modes, self.control.pauses
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
         self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)
-        self.supervision = Supervision(self.robot, settings.dt, settings.supervision)
         self.emergency = EmergencyStop(backend, self.executor, self.tool, self.notices)
+        supervision = Supervision(self.robot, settings.dt, settings.supervision)
+        self.safety = Safety(backend, self.executor, self.plc, self.emergency, supervision, self.notices)
         self._carry(load)
         self.steps = 0
         self.speed_scaling = 1.0
-        self.fault = ""
-        self._broken = False  # the backend gave up: only `recover` touches it
         self._goals = 0
         self._outcomes: list[Outcome] = []
         self._goal_energy = 0.0
@@ -100,36 +90,31 @@ class Simulation:
     @property
     def stopped(self) -> bool:
         """Whether an emergency stop or a fault is latched: nothing moves until somebody recovers."""
-        return self.plc.stopped or bool(self.fault)
+        return self.safety.stopped
+
+    @property
+    def fault(self) -> str:
+        """Why the robot is stopped, "" when it is not or by the emergency stop."""
+        return self.safety.fault
 
     # -- what may be asked ----------------------------------------------------------------------------------
 
     def vet(self, goal: TrajectoryGoal, now_ns: int) -> VettedGoal:
-        """Check all of a goal that does not depend on the robot's state. Takes its time, may run beside
-        `step`.
+        """Check all of a goal that does not depend on the robot's state; may run beside `step`.
 
         Raises TrajectoryRefusedError.
         """
-        dynamics, settings = self.dynamics, self.settings.execution
-        checked = check_goal(goal, tuple(self.robot.joint_names), settings, now_ns)
-        check_trajectory(checked.trajectory, self.robot, dynamics, settings)
-        return VettedGoal(checked, dynamics)
+        return vet(goal, self.robot, self.dynamics, self.settings.execution, now_ns)
 
     def execute(self, vetted: VettedGoal, now_ns: int) -> int:
-        """Start a vetted goal and return its id; the goal that runs is preempted. Raises
-        TrajectoryRefusedError.
-        """
+        """Start a vetted goal, return its id; preempts the one that runs. Raises TrajectoryRefusedError."""
         refusal = self._refusal()
-        if not refusal and vetted.dynamics is not self.dynamics:
-            refusal = "the load changed while the trajectory was checked"
         if refusal:
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
-        goal = vetted.goal
-        now, delay = self.executor.motion(), max(0.0, (goal.stamp_ns - now_ns) * 1e-9)
-        delay = 0.0 if goal.stamp_ns == 0 else delay
-        route = checked_route(goal.trajectory, now, self.robot, self.dynamics, self.settings.execution, delay)
+        now, delay = self.executor.motion(), vetted.delay(now_ns)
+        route = vetted.route(now, self.robot, self.dynamics, self.settings.execution, delay)
         self._goals += 1
-        self.executor.start(self._goals, goal, route, 0.0 if now.qd.any() else delay)
+        self.executor.start(self._goals, vetted.goal, route, 0.0 if now.qd.any() else delay)
         self._collect_outcomes()
         self._goal_energy = self.mains.energy()
         return self._goals
@@ -187,23 +172,13 @@ class Simulation:
             self.control.latches.wake = True
 
     def recover(self) -> str:
-        """Leave the emergency stop: release the brakes where the robot stands. Never moves or resumes
-        anything.
+        """Leave the emergency stop: release the brakes where the robot stands, move and resume nothing.
 
         Returns a remark. Raises RequestRefusedError.
         """
         if self.modes.mode is not Mode.EMERGENCY_STOP and not self.stopped:
             return f"nothing to recover from: the mode is {self.modes.mode.name}"
-        if self.plc.pressed:
-            raise RequestRefusedError(
-                StatusCode.INVALID_ROBOT_STATE, "the emergency stop is still pressed: release it first"
-            )
-        if self._broken:
-            self.backend.reset(self.backend.q)
-            self.executor.hold(self.backend.q)
-        self.fault, self._broken = "", False
-        self.supervision.recovered(self.backend.q)
-        self.plc.reset_stop()
+        self.safety.recover()
         if self.modes.mode is not Mode.EMERGENCY_STOP:
             return f"the emergency stop is reset; the mode is {self.modes.mode.name}"
         self.control.latches.recover = True
@@ -229,11 +204,9 @@ class Simulation:
         try:
             self._move()
             if self.steps % PERIOD == 0:
-                self._supervise()
+                self.safety.supervise(self.modes.motors_on, self.settings.execution.tube)
         except BackendError as error:
-            self._broken = True
-            self.backend.rest()
-            self._stop_for(Fault(str(error), ErrorCode.INVALID_GOAL))
+            self.safety.failed(error)
         self.mains.step(self.modes.level)
         self._collect_outcomes()
         self.steps += 1
@@ -276,10 +249,9 @@ class Simulation:
 
     def _move(self) -> None:
         backend, executor = self.backend, self.executor
-        if self._broken:
-            backend.rest()
-        elif self.modes.mode is Mode.EMERGENCY_STOP or (self.stopped and not self.modes.motors_on):
-            self.emergency.step()
+        braked = self.modes.mode is Mode.EMERGENCY_STOP or (self.stopped and not self.modes.motors_on)
+        if braked or self.safety.broken:
+            self.safety.brake()
         elif self.modes.level is Mode.STAND_ON_MOTORS:
             backend.track(executor.advance(self._scaling(), self.modes.motors_on))
             executor.supervise(backend)
@@ -299,27 +271,13 @@ class Simulation:
 
     def _mode_changed(self, before: Mode, now: Mode) -> None:
         if now is Mode.EMERGENCY_STOP:
-            self.emergency.start(self.fault or "emergency stop", self._standing())
+            self.safety.entered(self._standing())
         elif before is Mode.EMERGENCY_STOP:
             self.executor.hold(self.backend.q)
         if now in OFF_THE_NETWORK:
             self.watch.forget()
         if now is not Mode.MOVING and before is not Mode.MOVING:
             self.notices.add(Level.OK, f"{before.name} -> {now.name}")
-
-    def _supervise(self) -> None:
-        braking = self.stopped or not self.modes.motors_on
-        executor = self.executor
-        command = Command(executor.command, executor.deviation, self.settings.execution.tube)
-        fault = self.supervision.look(self.backend, command, braking)
-        if fault is not None and not self.fault:
-            self._stop_for(fault)
-
-    def _stop_for(self, fault: Fault) -> None:
-        """STOP 0: the brakes close at once, and stay so until somebody recovers."""
-        self.fault = fault.sentence
-        self.notices.add(Level.ERROR, f"{fault.sentence}; stopped by the brakes until recovered")
-        self.executor.drop(fault.sentence, fault.code)
 
     def _refusal(self) -> str:
         """Why no movement may start now, "" when it may."""

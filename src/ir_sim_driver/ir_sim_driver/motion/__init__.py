@@ -3,6 +3,7 @@
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.executor import Executor, Following
 from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, Outcome, TrajectoryGoal
+from ir_sim_driver.motion.lead_in import Route
 from ir_sim_driver.motion.manual_speed import manual_scaling
 from ir_sim_driver.motion.path import Motion, Path
 from ir_sim_driver.motion.tool_point import ToolPoint
@@ -17,6 +18,7 @@ __all__ = [
     "Motion",
     "Outcome",
     "Path",
+    "Route",
     "ToolPoint",
     "TrajectoryGoal",
     "check_goal",

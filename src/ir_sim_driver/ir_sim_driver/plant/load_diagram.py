@@ -34,7 +34,7 @@ class LoadDiagram:
         self._inertias: FloatArray = free / needed - np.array(robot.reflected_inertia)[-2:]
 
     def excess(self, text: str, loads: Sequence[Load]) -> str:
-        """What loads in the last link's frame exceed, with value and bound; "" if nothing. text: names them."""
+        """What loads in the last link's frame exceed, with value and bound; "" if nothing."""
         mass = float(sum(load.mass for load in loads))
         if mass > self._mass:
             return f"{text} weighs {mass:g} kg: the robot carries at most {self._mass:g} kg"
