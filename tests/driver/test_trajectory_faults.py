@@ -141,7 +141,7 @@ def test_effort_and_multi_dof_are_unsupported(standing, start, plan, home):
         (JointTolerance("joint_a1", -2.0), "-2"),
         (JointTolerance("joint_a1", float("nan")), "nan"),
         (JointTolerance("joint_a1", velocity=float("inf")), "inf"),
-        (JointTolerance("joint_a1", acceleration=0.5), "nobody measures accelerations"),
+        (JointTolerance("joint_a1", acceleration=0.5), "nothing measures accelerations"),
     ],
 )
 def test_tolerances_that_mean_nothing_are_refused(standing, start, plan, home, tolerance, word):

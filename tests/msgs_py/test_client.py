@@ -112,7 +112,7 @@ def test_a_refusal_raises_its_sentence_and_code(client):
 
 def test_a_service_that_nobody_offers_is_named(client):
     with pytest.raises(
-        ServiceUnavailableError, match=r"nobody offers the service /nowhere \(waited 0.05 s\)"
+        ServiceUnavailableError, match=r"no node offers the service /nowhere \(waited 0.05 s\)"
     ):
         client.call("/nowhere", SetCell.Request(), timeout=0.05)
 

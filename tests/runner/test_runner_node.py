@@ -391,7 +391,7 @@ def test_a_planner_that_is_gone_is_named(ros_context, ros_executor):
     cell = Cell(ros_context, ros_executor, planner="ir_planner_2", response_timeout=0.1)
     result = cell.run(program_id="known")
     assert result.status.code == StatusCode.TIMED_OUT
-    assert result.status.message == "nobody offers /ir_planner_2/get_program within 0.1 s"
+    assert result.status.message == "no node offers /ir_planner_2/get_program within 0.1 s"
     cell.client.close()
 
 

@@ -10,7 +10,7 @@ MsgsError
 ├── UnknownTypeError                  no such message, service or action type
 ├── ParameterError (ValueError)       a parameter out of range or a settings class without its descriptions
 └── ClientError
-    ├── ServiceUnavailableError       nobody offers it
+    ├── ServiceUnavailableError       no node offers it
     ├── CallTimedOutError             offered, but no answer in time
     └── RequestRefusedError           answered with a status that is not SUCCESS; carries it
 """

@@ -103,7 +103,7 @@ class Client:
         client = self._executor.run(lambda: self._client(service, service_type))
         deadline = time.monotonic() + limit
         if not self._executor.wait_until(client.service_is_ready, limit):
-            raise ServiceUnavailableError(f"nobody offers the service {service} (waited {limit:g} s)")
+            raise ServiceUnavailableError(f"no node offers the service {service} (waited {limit:g} s)")
         future: Future = self._executor.run(lambda: client.call_async(request))
         if not self._executor.wait(future, max(0.0, deadline - time.monotonic())):
             self._executor.run(lambda: client.remove_pending_request(future))

@@ -102,7 +102,7 @@ class Driver:
         duration is not limited: speed scaling may prolong or hold a movement.
         """
         if not await self._waiting.until(self._execute.server_is_ready, self._response_timeout):
-            return _timed_out(f"nobody offers {self.name}/execute_trajectory", self._response_timeout)
+            return _timed_out(f"no node offers {self.name}/execute_trajectory", self._response_timeout)
         goal = ExecuteTrajectory.Goal(
             trajectory=trajectory_to_msg(trajectory), trajectory_id=trajectory.trajectory_id
         )

@@ -37,7 +37,7 @@ class GoalSender:
         client = self._executor.run(lambda: self._client(action, action_type))
         if not self._executor.wait_until(client.server_is_ready, response_timeout):
             raise ServiceUnavailableError(
-                f"nobody offers the action {action} (waited {response_timeout:g} s)"
+                f"no node offers the action {action} (waited {response_timeout:g} s)"
             )
         on_feedback = None if feedback is None else lambda message: feedback(message.feedback)
         sent: Future = self._executor.run(lambda: client.send_goal_async(goal, feedback_callback=on_feedback))

@@ -50,7 +50,7 @@ class Waiting:
     async def ask(self, client: Any, request: Any, timeout: float) -> Any:
         """Call a service: its response, or a TIMED_OUT Status when there is none in `timeout` [s]."""
         if not await self.until(client.service_is_ready, timeout):
-            return Status(StatusCode.TIMED_OUT, f"nobody offers {client.service_name} within {timeout:g} s")
+            return Status(StatusCode.TIMED_OUT, f"no node offers {client.service_name} within {timeout:g} s")
         future: Future = client.call_async(request)
         if not await self.answer(future, timeout):
             client.remove_pending_request(future)

@@ -151,7 +151,7 @@ def _check_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) ->
             )
     if tolerance.acceleration > 0.0:
         raise _invalid(
-            f"acceleration tolerance of {tolerance.name} is {tolerance.acceleration:g} rad/s^2: nobody "
+            f"acceleration tolerance of {tolerance.name} is {tolerance.acceleration:g} rad/s^2: nothing "
             "measures accelerations, it must be 0 (default) or -1 (unbounded)"
         )
 
