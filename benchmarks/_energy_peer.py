@@ -42,12 +42,16 @@ _OPTIONS: dict[str, Any] = {
 
 
 class EnergyPeer:
-    """The problem of one scene, built once; its duration and ends are parameters."""
+    """The problem of one scene, built once; its duration and ends are parameters.
+
+    energy: what the last solution costs by the problem itself [J].
+    """
 
     def __init__(self, scene: PlanningScene) -> None:
         self._scene, self._n = scene, scene.cell.robot.n
         self._power = self._power_function()
         self._solver, self._bounds = self._problem()
+        self.energy = float("nan")
 
     def solve(self, q0: FloatArray, q1: FloatArray, duration: float, seed: int) -> JointTrajectory | None:
         """A local minimum from q0 to q1 (n,) in `duration` [s]; None where IPOPT finds none. Seed 0 starts
@@ -58,6 +62,7 @@ class EnergyPeer:
         found = self._solver(x0=guess, p=given, **self._bounds)
         if not self._solver.stats()["success"]:
             return None
+        self.energy = float(found["f"]) / _KILO
         states = np.array(found["x"]).ravel()[: 3 * self._n * (MESH + 1)].reshape(MESH + 1, 3, self._n)
         q, qd, qdd = (states[:, k].copy() for k in range(3))
         q[0], q[-1], qd[[0, -1]], qdd[[0, -1]] = q0, q1, 0.0, 0.0
