@@ -46,7 +46,7 @@ def _agreement(model: DynamicsModel, peer: Any, samples: Sequence[FloatArray], r
     return float(np.abs(arm - rnea).max() / np.abs(rnea).max())
 
 
-def _dynamics(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
+def _dynamics(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:  # long: a table of figures
     robot = load_robot()
     model, peer = DynamicsModel(robot, (Tool(),)), pinocchio_arm(robot, (Tool(),))
     q = rng.uniform(robot.position_min, robot.position_max, (SAMPLES, 6))

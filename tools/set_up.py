@@ -184,7 +184,7 @@ def metadata_files() -> list[Path]:
     return [f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")]
 
 
-def stages(python_version: str) -> list[Stage]:
+def stages(python_version: str) -> list[Stage]:  # long: a table of four rows
     """Return the steps in their order; a later one may depend on an earlier one's fingerprint."""
     constraints = ROOT / "requirements" / "constraints.txt"
     wheels = fingerprint([constraints, *REQUIREMENTS], python_version)

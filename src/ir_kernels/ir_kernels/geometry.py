@@ -88,7 +88,7 @@ def _known(name: str, names: Sequence[str], argument: str) -> None:
         raise InputError(f"{argument} names {name!r}: known are {listed}")
 
 
-def geometry(
+def geometry(  # long: the pairs of one model, of both kinds
     chain: Chain,
     items: Sequence[CapsuleLike],
     bodies: Sequence[BodyLike],

@@ -33,7 +33,7 @@ class BidirectionalTree:
     which is. A goal that isn't free, while another one is, is never reached.
     """
 
-    def __init__(
+    def __init__(  # long: checks of one argument after the other
         self,
         collision: CollisionModel,
         start: ArrayLike,

@@ -50,7 +50,7 @@ def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
     return np.asarray(point)
 
 
-def wrist_geometry(chain: Chain) -> WristGeometry:
+def wrist_geometry(chain: Chain) -> WristGeometry:  # long: every condition with its sentence
     """Derive the constants of `chain`; InputError names the condition that it breaks, with the value."""
     if chain.n != 6:
         raise InputError(f"chain has {chain.n} joints, the closed form needs 6")

@@ -27,51 +27,50 @@ def figure(item: Item) -> Item:
     return table["value"]
 
 
-def robot_from_yaml(text: str, source: str = "<text>") -> RobotModel:
+_KEYS = (
+    "format",
+    "name",
+    "rated_payload_kg",
+    "machine_home_deg",
+    "joints",
+    "drives",
+    "links",
+    "counterbalance",
+    "capsules",
+    "self_pairs",
+    "load_self_capsules",
+)
+_JOINT_KEYS = (
+    "names",
+    "origin_m",
+    "axis",
+    "position_min_deg",
+    "position_max_deg",
+    "velocity_deg_s",
+    "acceleration_rad_s2",
+    "jerk_deg_s3",
+)
+_DRIVE_KEYS = (
+    "gear_ratio",
+    "gear_peak_torque_nm",
+    "motor_peak_torque_nm",
+    "reflected_inertia_kgm2",
+    "friction_viscous_nms_rad",
+    "friction_coulomb_nm",
+    "copper_loss_w_per_nm2",
+    "envelope_rad_s_nm",
+)
+
+
+def robot_from_yaml(text: str, source: str = "<text>") -> RobotModel:  # long: one line per field
     """Return the robot a text describes; errors name file and line."""
     root = read_items(text, source, RobotFileError)
-    top = root.table(
-        (
-            "format",
-            "name",
-            "rated_payload_kg",
-            "machine_home_deg",
-            "joints",
-            "drives",
-            "links",
-            "counterbalance",
-            "capsules",
-            "self_pairs",
-            "load_self_capsules",
-        )
-    )
+    top = root.table(_KEYS)
     top["format"].choice((FORMAT,))
-    joints = top["joints"].table(
-        (
-            "names",
-            "origin_m",
-            "axis",
-            "position_min_deg",
-            "position_max_deg",
-            "velocity_deg_s",
-            "acceleration_rad_s2",
-            "jerk_deg_s3",
-        )
-    )
+    joints = top["joints"].table(_JOINT_KEYS)
     joint_names = tuple(item.name() for item in joints["names"].list(1, 16))
     n = len(joint_names)
-    drives = top["drives"].table(
-        (
-            "gear_ratio",
-            "gear_peak_torque_nm",
-            "motor_peak_torque_nm",
-            "reflected_inertia_kgm2",
-            "friction_viscous_nms_rad",
-            "friction_coulomb_nm",
-            "copper_loss_w_per_nm2",
-            "envelope_rad_s_nm",
-        )
-    )
+    drives = top["drives"].table(_DRIVE_KEYS)
     links = [_link(item) for item in top["links"].list(n + 1, n + 1)]
     link_names = tuple(name for name, *_ in links)
     capsules = tuple(_capsule(item, link_names) for item in top["capsules"].list(0, 200))

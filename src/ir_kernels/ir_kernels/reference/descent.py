@@ -44,7 +44,7 @@ def direction(gradient: FloatArray, pairs: Pairs, solve: Solve) -> FloatArray:
     return d
 
 
-def descend(
+def descend(  # long: line for line what descent.hpp does
     x: FloatArray, function: Function, solve: Solve, evaluations: int, tolerance: float
 ) -> tuple[FloatArray, float, int]:
     """Where the descent from `x` (N,) ends, the value there, and how many evaluations it took.

@@ -28,7 +28,7 @@ from ir_kernels.reference.vectors import (
 from ir_msgs_py.arrays import FloatArray
 
 
-def rigid_body_torque(
+def rigid_body_torque(  # long: the recursion out and back, step by step
     data: DynamicsData,
     sin: Sequence[Number],
     cos: Sequence[Number],

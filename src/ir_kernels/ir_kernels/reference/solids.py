@@ -109,7 +109,9 @@ def depth_box(p0: FloatArray, p1: FloatArray, half: FloatArray) -> Depth:
     return _shallowest(direction, np.abs(direction) @ half, p0, p1)
 
 
-def depth_cylinder(p0: FloatArray, p1: FloatArray, radius: float, half_length: float) -> Depth:
+def depth_cylinder(  # long: the cases of one closed form
+    p0: FloatArray, p1: FloatArray, radius: float, half_length: float
+) -> Depth:
     """Penetration of segments (N, 3), (N, 3) into the cylinder about z."""
 
     def support(direction: FloatArray) -> FloatArray:

@@ -1,26 +1,32 @@
 """The descent on the speed profile along a fixed path: s at the knots of a uniform spline; its duration."""
 
+from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dtbtrs
 
+from scipy.optimize import Bounds, OptimizeResult, minimize
+
 from ir_kernels import SplineCost
 from ir_planner.optimize.fixed_path import FixedPath, from_knots
-from ir_planner.optimize.lbfgs import descend
 from ir_planner.optimize.passing import jerk_bands
 from ir_planner.optimize.terms import spline_cost
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import objective_weights
 
+Function = Callable[[Any], tuple[float, FloatArray]]  # Any: SciPy hands over vectors of its own type
 _SPARSE = 40  # places of the path for the weight of an objective
 _EVALUATIONS = 250
+_MEMORY = 16  # pairs of L-BFGS: more of them gain nothing here
+_PATIENCE, _GAIN = 10, 1e-5  # so many steps must gain so much of the value together
 _BENDING = 0.03  # weight of the jerk of s in the metric
 _S, _TIME = 0.03, 0.1  # scales of s and of the duration's logarithm
-_TOO_FAR, _REFUSED = 100.0, 1e30  # a first step may overshoot: beyond that many scales it costs that much
+_FARTHEST = 10.0  # scales of s, and of the logarithm of the duration, in one descent
 
 
 def optimised_profile(
@@ -33,8 +39,35 @@ def optimised_profile(
     descent = _Descent(path, s, duration, context.options.duration > 0.0)
     weights = objective_weights(context, path.q[::_SPARSE])
     cost = spline_cost(context, limits, weights, stiffness * weights.power)
-    x, evaluations = descend(lambda x: descent.value(x, cost), np.zeros(len(s) + 1), _EVALUATIONS)
+    x, evaluations = _minimised(lambda x: descent.value(x, cost), np.zeros(len(s) + 1))
     return *descent.at(x), evaluations
+
+
+def _minimised(function: Function, x: FloatArray) -> tuple[FloatArray, int]:
+    """The lowest point (N,) that L-BFGS-B finds from x (N,), and its evaluations."""
+    values: list[float] = []
+
+    def gains(intermediate_result: OptimizeResult) -> None:
+        values.append(float(intermediate_result.fun))
+        if len(values) > _PATIENCE and values[-1 - _PATIENCE] - values[-1] < _GAIN * abs(values[-1]):
+            raise StopIteration
+
+    found = minimize(
+        function,
+        x,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=Bounds(-_FARTHEST, _FARTHEST),  # a first step may overshoot
+        callback=gains,
+        options={
+            "maxcor": _MEMORY,
+            "maxfun": _EVALUATIONS,
+            "maxiter": _EVALUATIONS,
+            "ftol": 0.0,
+            "gtol": 0.0,
+        },
+    )
+    return np.asarray(found.x), int(found.nfev)
 
 
 class _Descent:
@@ -53,8 +86,6 @@ class _Descent:
 
     def value(self, x: FloatArray, cost: SplineCost) -> tuple[float, FloatArray]:
         """Cost and its gradient (C + 1,)."""
-        if np.abs(x).max() > _TOO_FAR:
-            return _REFUSED, np.zeros_like(x)
         s, duration = self.at(x)
         q, slope = self.path.at(s)
         spline = self.path.spline_over(q, duration)

@@ -76,32 +76,27 @@ def parse_goal(text: str, cell: Cell) -> Goal:
     joints = [f"A{i + 1}" for i in range(cell.robot.n)]
     if len(words) > 1 and keys[0] in joints:
         values = _numbers(keys, words[1::2], joints, "deg")
-        return Goal(
-            configuration=within_limits(np.radians(values), cell, "goal", StatusCode.GOAL_STATE_INVALID),
-            text=stripped,
-        )
+        q = within_limits(np.radians(values), cell, "goal", StatusCode.GOAL_STATE_INVALID)
+        return Goal(configuration=q, text=stripped)
     if len(words) > 1 and keys[0] in _POSE_KEYS:
-        x, y, z, *abc = _numbers(keys, words[1::2], list(_POSE_KEYS), "")
-        if max(abs(x), abs(y), abs(z)) > _LENGTH_MAX:
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"goal lies at ({x:g}, {y:g}, {z:g}) m: X, Y and Z must be in "
-                f"[-{_LENGTH_MAX:g}, {_LENGTH_MAX:g}] m",
-            )
-        pose = np.eye(4)
-        pose[:3, :3] = rotation_from_abc(abc)
-        pose[:3, 3] = x, y, z
-        return Goal(pose=pose, text=stripped)
-    raise UnknownNameError(
-        "goal",
-        stripped,
-        [
-            *(s.name for s in cell.stations),
-            *POSTURES,
-            '"A1 0 A2 -90 ..." in degrees',
-            '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"',
-        ],
-    )
+        return Goal(pose=_pose(_numbers(keys, words[1::2], list(_POSE_KEYS), "")), text=stripped)
+    texts = ('"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"')
+    raise UnknownNameError("goal", stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
+
+
+def _pose(values: list[float]) -> FloatArray:
+    """Pose (4, 4) of X, Y, Z [m] and A, B, C [deg] within the workspace; else RequestError."""
+    x, y, z, *abc = values
+    if max(abs(x), abs(y), abs(z)) > _LENGTH_MAX:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"goal lies at ({x:g}, {y:g}, {z:g}) m: X, Y and Z must be in "
+            f"[-{_LENGTH_MAX:g}, {_LENGTH_MAX:g}] m",
+        )
+    pose = np.eye(4)
+    pose[:3, :3] = rotation_from_abc(abc)
+    pose[:3, 3] = x, y, z
+    return pose
 
 
 def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> FloatArray:
