@@ -45,7 +45,7 @@ def _copy(value: ArrayLike) -> ArrayLike:
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
-def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
+def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:  # long: one check per term
     """The terms as contiguous arrays and floats, or InputError naming the one that makes no sense."""
     names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
     arrays: dict[str, FloatArray] = {

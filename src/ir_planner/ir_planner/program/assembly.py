@@ -62,7 +62,7 @@ def wait_at_end(
     return _pause(here, seconds, AUTO, q, scene, times)
 
 
-def assembled(
+def assembled(  # long: what a step does, in its order
     steps: tuple[PlacedStep, ...],
     legs: Legs,
     scenes: Scenes,
