@@ -14,6 +14,7 @@ from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.goals import NO_GOAL, QUEUE_MAX
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.power import IdleTimes
 
@@ -49,7 +50,7 @@ def test_frames_carry_what_is_due(driver):
 def test_power_is_the_mean_since_the_last_frame(driver, plan, cell):
     home = np.array(cell.machine_home)
     goal = TrajectoryGoal(plan(1.5, home, home + 0.1))
-    wait_for_start(driver, driver.submit(lambda: goal, lambda outcome: None))
+    wait_for_start(driver, driver.submit(2, lambda: goal, lambda outcome: None))
     powers = [frame.power for frame in frames(driver, 500) if frame.power is not None]
     energy = np.array([power.energy for power in powers])
     mean = np.array([power.power for power in powers])
@@ -74,7 +75,7 @@ def test_outcomes_reach_the_sender_of_their_goal(driver, plan, cell):
     for target in (home + 0.05, home - 0.05):
         goal = TrajectoryGoal(plan([1.5], target))
         ended = functools.partial(lambda target, outcome: outcomes.append((target[0], outcome.code)), target)
-        wait_for_start(driver, driver.submit(lambda goal=goal: goal, ended))
+        wait_for_start(driver, driver.submit(2, lambda goal=goal: goal, ended))
         frames(driver, 100)
     frames(driver, 800)
     assert outcomes == [
@@ -94,7 +95,7 @@ def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
         heard.append(outcome)
         done.set()
 
-    driver.submit(refuse, ended)
+    driver.submit(2, refuse, ended)
     assert done.wait(10.0)
     assert (heard[0].goal_id, heard[0].code, heard[0].sentence) == (
         NO_GOAL,
@@ -111,10 +112,17 @@ def test_a_flood_of_goals_is_bounded(driver):
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
     for _ in range(QUEUE_MAX + 20):
-        driver.submit(slow, answers.append)
+        driver.submit(2, slow, answers.append)
     assert len(answers) == 20
     assert all("send fewer" in answer.sentence for answer in answers)
     release.set()
+
+
+def test_a_goal_of_too_many_points_is_refused_before_it_waits(driver):
+    answers = []
+    limit = ExecutionSettings().max_points
+    driver.submit(limit + 1, lambda: pytest.fail("it was read"), answers.append)
+    assert answers[0].sentence == f"the trajectory has {limit + 1} points: at most {limit}"
 
 
 def test_a_check_does_not_hold_up_the_plant(driver):
@@ -125,7 +133,7 @@ def test_a_check_does_not_hold_up_the_plant(driver):
         release.wait(10.0)
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
-    driver.submit(slow, lambda outcome: None)
+    driver.submit(2, slow, lambda outcome: None)
     assert blocking.wait(10.0)
     assert len(frames(driver, 100)) == 100
     release.set()

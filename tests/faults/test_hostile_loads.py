@@ -79,10 +79,12 @@ def survivors(cell: Cell, cases: int, seed: int) -> tuple[int, list[str]]:
     return carried, wrong
 
 
-def test_forty_random_loads_are_carried_or_refused(cell: Cell) -> None:
+def test_forty_random_loads_are_carried_or_refused(cell: Cell, capfd: pytest.CaptureFixture[str]) -> None:
     carried, wrong = survivors(cell, 40, seed=0)
     assert wrong == []
     assert carried > 10
+    said = "".join(capfd.readouterr())  # Bullet takes what it calls bad for zero
+    assert "Bad inertia" not in said
 
 
 @pytest.mark.long

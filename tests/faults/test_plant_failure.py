@@ -20,7 +20,7 @@ def broken(monkeypatch: pytest.MonkeyPatch) -> tuple[Driver, list[Outcome]]:
     q, rest = simulation.backend.q, np.zeros((2, 6))
     names = simulation.robot.joint_names
     goal = TrajectoryGoal(JointTrajectory.from_seconds(names, [0.0, 2.0], [q, q + 0.2], rest, rest))
-    ticket = driver.submit(lambda: goal, outcomes.append)
+    ticket = driver.submit(2, lambda: goal, outcomes.append)
     stamp = 0
     while driver.following(ticket) is None:
         stamp += 2_000_000
@@ -33,7 +33,7 @@ def broken(monkeypatch: pytest.MonkeyPatch) -> tuple[Driver, list[Outcome]]:
     with pytest.raises(SystemError):
         driver.tick(stamp + 2_000_000)
     driver.fail("the plant has stopped")
-    driver.submit(lambda: goal, outcomes.append)
+    driver.submit(2, lambda: goal, outcomes.append)
     driver.close()
     return driver, outcomes
 

@@ -95,9 +95,11 @@ class Driver:
 
     # -- movements ------------------------------------------------------------------------------------------
 
-    def submit(self, read: Callable[[], TrajectoryGoal], ended: Callable[[Outcome], None]) -> int:
+    def submit(
+        self, points: int, read: Callable[[], TrajectoryGoal], ended: Callable[[Outcome], None]
+    ) -> int:
         """Check a goal beside everything else and start it; returns its ticket. See `Goals.submit`."""
-        return self._goals.submit(read, ended)
+        return self._goals.submit(points, read, ended)
 
     def cancel(self, ticket: int) -> None:
         """Stop a goal along its path, also one that is still being checked."""

@@ -34,8 +34,8 @@ class Goals:
         """Stop checking."""
         self._checker.shutdown(wait=True, cancel_futures=True)
 
-    def submit(self, read: Read, ended: Ended) -> int:
-        """Check a goal beside everything else and start it; returns its ticket.
+    def submit(self, points: int, read: Read, ended: Ended) -> int:
+        """Check a goal of so many points beside everything else and start it; returns its ticket.
 
         read: makes the goal, may raise TrajectoryRefusedError. ended: gets the outcome, whether the goal was
         refused (id NO_GOAL) or executed; it is called from other threads.
@@ -44,6 +44,9 @@ class Goals:
             self._tickets += 1
             ticket = self._tickets
             refusal = self._dead
+            limit = self._simulation.settings.execution.max_points
+            if not refusal and points > limit:  # refused before it waits: what waits takes memory
+                refusal = f"the trajectory has {points} points: at most {limit}"
             if not refusal and len(self._pending) >= QUEUE_MAX:
                 refusal = f"{QUEUE_MAX} trajectories are waiting to be checked: send fewer"
             if not refusal:

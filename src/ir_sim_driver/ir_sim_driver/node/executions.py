@@ -46,7 +46,8 @@ class Executions:
             done.set_result(outcome)
             self._node.wake()
 
-        ticket = self._driver.submit(lambda: goal_from_action(request, limit), ended)
+        points = len(request.trajectory.points)
+        ticket = self._driver.submit(points, lambda: goal_from_action(request, limit), ended)
         self._tickets[key] = ticket
         if key in self._canceled:  # before it was submitted
             self._driver.cancel(ticket)
@@ -55,6 +56,7 @@ class Executions:
         end_feedback()
         self._tickets.pop(key, None)
         self._canceled.discard(key)
+        request.trajectory.points = []  # the action keeps the request as long as the result
         return self._result(handle, outcome)
 
     def cancel(self, handle: Any) -> None:

@@ -18,6 +18,7 @@ from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
+_LABEL_MAX = 64  # four times a trajectory id; a longer one would be published 50 times a second
 
 
 def goal_from_trajectory(msg: Any, max_points: int) -> TrajectoryGoal:
@@ -48,8 +49,13 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
         _tolerances(goal.path_tolerance),
         _tolerances(goal.goal_tolerance),
         wait.sec + wait.nanosec * _NS,
-        label=str(getattr(goal, "trajectory_id", "")),
+        label=_label(str(getattr(goal, "trajectory_id", ""))),
     )
+
+
+def _label(text: str) -> str:
+    """A name as states and diagnostics carry it: printable, at most _LABEL_MAX characters."""
+    return "".join(c if c.isprintable() else "?" for c in text[:_LABEL_MAX])
 
 
 def fill_joint_state(msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, torque: FloatArray) -> None:

@@ -58,6 +58,7 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STREAM = QoSProfile(depth=2000)
 _MARKERS_PERIOD, _DIAGNOSTICS_PERIOD = 0.05, 1.0  # s
 _LAG_MAX = 5.0  # s behind the clock beyond which the grid starts anew instead of catching up
+_RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
 REFUSALS = (DriverError, DescriptionError, MsgsError)
 _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
@@ -142,7 +143,9 @@ class SimDriver(Node):
             executions.cancel(handle)
             return CancelResponse.ACCEPT
 
-        return ActionServer(self, action_type, name, executions.execute, cancel_callback=cancel)
+        return ActionServer(
+            self, action_type, name, executions.execute, cancel_callback=cancel, result_timeout=_RESULT_KEPT
+        )
 
     def _open_links(self) -> dict[str, OpenLink]:
         links = {}
@@ -227,7 +230,7 @@ class SimDriver(Node):
 
     def _on_trajectory(self, msg: JointTrajectory) -> None:
         limit = self._driver.max_points
-        self._driver.submit(lambda: goal_from_trajectory(msg, limit), self._topic_ended)
+        self._driver.submit(len(msg.points), lambda: goal_from_trajectory(msg, limit), self._topic_ended)
 
     def _topic_ended(self, outcome: Outcome) -> None:
         if outcome.code is not ErrorCode.SUCCESSFUL:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,8 @@ BRAKE_FACTOR = 1.5
 """Torque of a mechanical brake over the joint's largest motor torque (an estimate; no public figure)."""
 SPEED_GUARD = 50.0
 """Speed [rad/s] that no joint reaches: beyond it the physics has diverged."""
-_CHUNK = 4096
+_CHUNK = 4096  # steps whose work is kept when nobody asks for it
+_THICKNESS = 1e-6  # share of the largest principal moment; a thousand times finer than it is known
 
 
 class PyBulletBackend:
@@ -85,7 +87,7 @@ class PyBulletBackend:
 
     def set_load(self, loads: Sequence[Load]) -> None:
         """Rebuild the robot with these loads, in the same motion."""
-        self._loads = tuple(loads)
+        self._loads = tuple(_solid(load) for load in loads)
         text = self._urdf(self._robot, self._loads)
         bullet = self._bullet
         # a new server: the inverse dynamics of a removed body live on in the old one
@@ -242,6 +244,17 @@ class PyBulletBackend:
             info = self._bullet.getJointInfo(self._body, joint, physicsClientId=self._client)
             by_name[info[1].decode()] = joint
         return [by_name[name] for name in self._robot.joint_names]
+
+
+def _solid(load: Load) -> Load:
+    """The load with an inertia that Bullet does not take for impossible by rounding, and then for zero.
+
+    A flat disc fulfils the triangle inequality of the principal moments with equality.
+    """
+    moments = np.linalg.eigvalsh(load.inertia)
+    if moments[0] + moments[1] - moments[2] > _THICKNESS * moments[2]:
+        return load
+    return replace(load, inertia=load.inertia + np.eye(3) * (_THICKNESS * moments[2]))
 
 
 def _pybullet() -> Any:
