@@ -1,4 +1,4 @@
-"""Standby: which power mode takes the least energy in a pause, and when to wake the controller."""
+"""Standby: which power mode takes the least energy in a pause, when to wake the controller, what is saved."""
 
 import time
 
@@ -10,11 +10,12 @@ PAUSES = (2.0, 10.0, 60.0, 600.0, 3600.0)  # s
 def main() -> None:
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
+    print("pause [s]  mode             wake at [s]  energy [kJ]  saving [kJ] over timer, motors")
     for pause in PAUSES:
         advice = planner.standby(pause, q=None, load="")
         print(
-            f"pause of {pause:6.0f} s: {advice.chosen.name}, wake after {advice.wake_at:.1f} s, "
-            f"{advice.energy / 1000.0:.1f} kJ, {advice.saving / 1000.0:.1f} kJ less than on motors"
+            f"{pause:9.0f}  {advice.chosen.name:15}  {advice.wake_at:11.1f}  {advice.energy / 1000.0:11.1f}  "
+            f"{advice.saving / 1000.0:11.1f}, {advice.saving_on_motors / 1000.0:.1f}"
         )
 
 

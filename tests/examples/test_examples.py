@@ -22,7 +22,7 @@ PRINTS = {
     "04_service_movement": r"modified_ga: \d\.\d\d s, \d+ J at the mains",
     "05_pareto_front": r"^ +\d\.\d\d +\d+ +\d\.\d$",
     "06_program": r"^program \w+: \d+\.\d s, \d+\.\d kJ",
-    "07_standby": r"pause of   3600 s: HIBERNATION, wake after 3480\.0 s",
+    "07_standby": r"^ +3600  HIBERNATION +3480\.0 ",
     "08_read_a_recording": r"^BUS_POWER_OFF +\d+\.\d\d s +\d+ J",
 }
 
