@@ -10,12 +10,14 @@ PAUSES = (2.0, 10.0, 60.0, 600.0, 3600.0)  # s
 def main() -> None:
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
-    print("pause [s]  mode             wake at [s]  energy [kJ]  saving [kJ] over timer, motors")
+    print(
+        "pause [s]  mode             wake at [s]  energy [kJ]  saved [kJ]: against the timer, against motors"
+    )
     for pause in PAUSES:
         advice = planner.standby(pause, q=None, load="")
         print(
             f"{pause:9.0f}  {advice.chosen.name:15}  {advice.wake_at:11.1f}  {advice.energy / 1000.0:11.1f}  "
-            f"{advice.saving / 1000.0:11.1f}, {advice.saving_on_motors / 1000.0:.1f}"
+            f"{advice.saving / 1000.0:29.1f}, {advice.saving_on_motors / 1000.0:14.1f}"
         )
 
 
