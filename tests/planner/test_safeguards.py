@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,3 +107,22 @@ def test_a_movement_to_where_it_starts_takes_the_requested_duration(demo_scene: 
     assert plan.status.ok
     assert plan.report.duration == 2.5
     assert ask(demo_scene, np.stack([home, home]), PlanOptions()).report.duration < 0.01
+
+
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(cell=CELLS, seed=st.integers(0, 10_000), planner_id=st.sampled_from(["", "direct"]))
+def test_asynchronous_joints_never_take_longer_and_the_answer_names_its_timing(
+    cell: str, seed: int, planner_id: str, scene_of: SceneOf
+) -> None:
+    scene = scene_of(cell)
+    ends = free_ends(scene, seed)
+    synchronous = PlanOptions(objective="time", planner_id=planner_id)
+    common = ask(scene, ends, synchronous)
+    own = ask(scene, ends, replace(synchronous, timing="asynchronous"))
+    assert own.status.ok
+    assert own.report.certified
+    assert own.report.duration <= common.report.duration
+    note = next(stage.note for stage in own.info.stages if stage.name == "asynchronous")
+    assert own.trajectory is not None
+    if own.trajectory == common.trajectory:
+        assert "synchronous" in note

@@ -8,16 +8,16 @@ Nothing found is an answer too: which pair blocks, where, by how much, and what 
 
 import numpy as np
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
 
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.regional.answer import MovementPlan
+from ir_planner.regional.asynchronous import with_own_laws
 from ir_planner.regional.exploration import Path, Searches, first_paths
 from ir_planner.regional.refusal import refusal
-from ir_planner.regional.safeguards import Exploration, best_found, not_worse_than_baseline
+from ir_planner.regional.safeguards import DIRECT, Exploration, best_found, not_worse_than_baseline
 from ir_planner.request import Context
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
@@ -45,6 +45,16 @@ def search_regional(
     """The best movement found, with the status that says so or says why not; start (n,), goals (n,) or
     (G, n).
     """
+    if context.options.timing == "asynchronous":
+        synchronous = context.with_timing("synchronous")
+        return with_own_laws(context, lambda: _search(start, goals, synchronous, searches))
+    return _search(start, goals, context, searches)
+
+
+def _search(
+    start: FloatArray, goals: FloatArray, context: Context, searches: Searches
+) -> tuple[Status, Movement | None]:
+    """The best synchronous movement found."""
     ends = Ends(start, np.atleast_2d(goals))
     space = FreeSpace.of(context.scene, context.safety_distance, context.work)
     blocked = end_in_collision(start, ends.goals[0], space, context.safety_distance)
@@ -55,7 +65,7 @@ def search_regional(
         return refusal(start, ends.goals[0], space, context.journal), None
     there = np.abs(ends.goals - start).max(axis=1).min() < STILL
     best, shortest = None, np.inf
-    if not there and not _straight_steps_only(context.options):
+    if not there and context.options.planner_id != DIRECT:
         best, shortest = best_found(Exploration(ends, paths, space, searches), context)
     if context.options.planner_id == "" and not there:
         best = not_worse_than_baseline(best, paths, context)
@@ -67,13 +77,6 @@ def search_regional(
         return refusal(start, ends.goals[0], space, context.journal), None
     context.journal.planner_id, movement = best
     return Status.success(), movement
-
-
-def _straight_steps_only(options: PlanOptions) -> bool:
-    """Whether the movement is to keep to straight steps: PTP by name, or joints with a time each of their
-    own.
-    """
-    return options.planner_id == "direct" or options.timing == "asynchronous"
 
 
 def _in_straight_steps(

@@ -5,18 +5,21 @@ the cheapest movement of free duration too, and where nothing else is left by th
 The movements of least W have few turns: some of them are faster than what the descent for time ends in.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 
 from ir_planner.checks import FreeSpace
+from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.regional.exploration import Path, Searches, improve
 from ir_planner.request import Context
 from ir_planner.search import Ends
-from ir_planner.timing import DURATION_SLACK, Movement, baseline
+from ir_planner.timing import DURATION_SLACK, Movement, baseline, straight_steps
 
 Answer = tuple[str, Movement]  # the search that found it
 DIRECT = "direct"  # the search that finds straight segments
@@ -56,8 +59,8 @@ def _companions(options: PlanOptions) -> tuple[str, ...]:
 
 
 def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Context) -> Answer | None:
-    """The best answer, or a baseline movement that costs less: to the goal of the best answer, or to the
-    first goal with a free straight segment. None where there is neither.
+    """The best answer, or a movement along a free straight segment that costs less: to the goal of the best
+    answer, or to the first goal that has one. None where there is neither.
     """
     straight = [path for _, path in paths if len(path) == 2]
     if best is not None:
@@ -65,13 +68,27 @@ def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Con
         straight = [path for path in straight if np.array_equal(path[-1], reached)] or straight
     for path in straight[:1]:
         with context.journal.stage("baseline") as notes:
-            movement = baseline(path[0], path[1], context)
-            if movement is None or not movement.certified:
-                notes.append("the straight segment can't be moved along as asked")
-            elif best is None or movement.cost < best[1].cost:
-                notes.append("the baseline movement costs less" if best else "the baseline movement")
-                return DIRECT, movement
+            better = [
+                movement
+                for movement in _along(path, context, hurried=best is None)
+                if movement.certified and (best is None or movement.cost < best[1].cost)
+            ]
+            notes.append("costs less" if better else "costs more, or can't be done")
+            if better:
+                return DIRECT, min(better, key=lambda movement: movement.cost)
     return best
+
+
+def _along(segment: FloatArray, context: Context, *, hurried: bool) -> Iterator[Movement]:
+    """The baseline along a segment (2, n), and where time is short also the fastest law that there is."""
+    common = baseline(segment[0], segment[1], context)
+    if common is not None:
+        yield common
+    if hurried or context.options.objective == "time":
+        try:
+            yield straight_steps(segment, context)
+        except (TimingError, RequestError) as error:
+            context.journal.reject(f"straight segment: {error}")
 
 
 def _improved(exploration: Exploration, context: Context) -> tuple[Answer | None, float]:

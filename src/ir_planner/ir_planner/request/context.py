@@ -54,6 +54,10 @@ class Context:
         """The same with another objective and requested duration [s], 0: free."""
         return replace(self, options=replace(self.options, objective=objective, duration=duration))
 
+    def with_timing(self, timing: str) -> "Context":
+        """The same with "synchronous" or "asynchronous" joints."""
+        return replace(self, options=replace(self.options, timing=timing))
+
     def at(self, station: str) -> "Context":
         """The same with the allowed contacts of a station."""
         return replace(self, station=station)

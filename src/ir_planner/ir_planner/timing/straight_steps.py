@@ -18,7 +18,7 @@ from ir_planner.checks import SLACK, Violation, clearance_violation
 from ir_planner.curves import extremes
 from ir_planner.request import Context
 from ir_planner.scene import STILL, Dynamics, MotionLimits
-from ir_planner.timing.asynchronous import own_laws
+from ir_planner.timing.asynchronous import farthest_from_line, joining, own_laws
 from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing
 from ir_planner.timing.durations import at_best_duration
 from ir_planner.timing.level_timing import fastest
@@ -95,18 +95,44 @@ def _fastest(
     waypoints: FloatArray, limits: MotionLimits, law: MakeLaw, context: Context
 ) -> tuple[JointTrajectory, str]:
     """The fastest trajectory in one shape, and a note where its timing is not the one that was asked for."""
-    dynamics = context.scene.dynamics
-    steps = list(itertools.pairwise(waypoints))
-    note = ""
-    if context.options.timing == "asynchronous":
-        own = tuple(own_laws(a, b, limits, dynamics) for a, b in steps)
-        trajectory = blended(TimedPath(waypoints, own, (0,) * (len(own) - 1)), context.joint_names)
+    common = [law(a, b, limits, context.scene.dynamics) for a, b in itertools.pairwise(waypoints)]
+    synchronous = context.options.timing == "synchronous"
+    found = None if synchronous else _each_joint_alone(waypoints, common, limits, context)
+    if found is not None:
+        return found
+    note = "" if synchronous else "neither torque nor clearance leaves a joint its own law: synchronous"
+    return _cut_corners(waypoints, tuple(StepLaws((one,)) for one in common), limits, context), note
+
+
+def _each_joint_alone(
+    waypoints: FloatArray, common: list[Law], limits: MotionLimits, context: Context
+) -> tuple[JointTrajectory, str] | None:
+    """Joints with a law each, and a note which of them keep to the `common` laws (one per step); None where
+    all have to.
+    """
+    deltas, names = np.diff(waypoints, axis=0), context.joint_names
+    found = [
+        own_laws(start, delta, law, limits, context.scene.dynamics)
+        for start, delta, law in zip(waypoints[:-1], deltas, common, strict=True)
+    ]
+    laws, joined = [own for own, _ in found], [joints for _, joints in found]
+    while True:
+        context.work.check()
+        path = TimedPath(waypoints, tuple(laws), (0,) * (len(laws) - 1))
+        trajectory = blended(path, names)
         blocked = _blocked(trajectory, context)
         if blocked is None:
-            return trajectory, note
-        note = f"asynchronous timing is not free ({blocked.sentence}), so the timing is synchronous"
-    laws = tuple(StepLaws((law(a, b, limits, dynamics),)) for a, b in steps)
-    return _cut_corners(waypoints, laws, limits, context), note
+            break
+        at = int(blocked.time / GRID_S)
+        k = int(np.searchsorted(path.starts, at, side="right")) - 1
+        joint = farthest_from_line(laws[k], common[k], deltas[k], at - int(path.starts[k]), joined[k])
+        if joint is None:
+            return None
+        laws[k], joined[k] = joining(laws[k], common[k], joint), joined[k] | {joint}
+    if sum(len(joints) for joints in joined) == int((np.abs(deltas) >= STILL).sum()):
+        return None
+    kept = ", ".join(names[j] for j in sorted({j for joints in joined for j in joints}))
+    return trajectory, f"keep to the synchronous law for torque or clearance: {kept}" if kept else ""
 
 
 def _blocked(trajectory: JointTrajectory, context: Context) -> Violation | None:
