@@ -163,17 +163,22 @@ class Chains:
             return 0.0
         key = (node.line.points.tobytes(), self._asked(), b"in" if entry else b"out")
         if key not in self.known:
-            name = self.route.name(place if entry else place - 1)
-            journal = _journal(self.planner, self.options, 1)
-            context = Context(self.route.arriving(place), self.options, journal).at(name)
-            try:
-                movement = timed_service(node.line, entry, context)
-            except TimingError:
-                self.known[key] = np.inf
-            else:
-                free = movement.violation is None
-                self.known[key] = cost_of(movement.report, self.options) if free else np.inf
+            report = self.line(place, node, entry=entry)
+            self.known[key] = np.inf if report is None else cost_of(report, self.options)
         return self.known[key]
+
+    def line(self, place: int, node: Node, *, entry: bool) -> TrajectoryReport | None:
+        """The service line into the stop of a place or out of the one before it; None: none, or not free."""
+        if len(node.line.points) < 2:
+            return None
+        name = self.route.name(place if entry else place - 1)
+        journal = _journal(self.planner, self.options, 1)
+        context = Context(self.route.arriving(place), self.options, journal).at(name)
+        try:
+            movement = timed_service(node.line, entry, context)
+        except TimingError:
+            return None
+        return movement.report if movement.violation is None else None
 
     def _asked(self) -> bytes:
         o = self.options

@@ -1,0 +1,152 @@
+"""What does a program cost over its cycle time, and what does it save against the common program?
+
+    python benchmarks/cycle.py [--cell FILE]... [--points N] [--seeds N] [--quick] [--json FILE]
+
+The stations of a cell in turn and back to the posture park, without pauses. Cycle times from the shortest to
+twice the free one; E is the mains energy over the whole cycle, the wait to its end included. The law: a cycle
+that is d longer costs at most d of standing on motors more, and the drive energy of the movements alone never
+rises. Then the planner has the time of the common program: synchronous S-curves at full speed through the
+same stations, each in the configuration nearest to the last one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import time
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from _common_program import common_program
+from _program_chains import CEILING, Chains
+from _results import Claim, at_least, at_most, command_line, finish, line_of
+
+from ir_msgs_py.options import PlanOptions
+from ir_planner import Planner, RequestError
+
+CELL = "demo"
+TOLERANCE = 1e-3  # of E: what two plans may differ by although the law holds
+
+
+@dataclass(frozen=True)
+class Row:
+    """One program: cycle time [s], mains energy over the cycle [J], drive energy of its movements [J]."""
+
+    cell: str
+    seed: int
+    what: str
+    cycle: float
+    energy: float
+    drive_energy: float
+    certified: bool
+    planning_s: float
+
+
+class Programs:
+    """Programs of one cell through all of its stations."""
+
+    def __init__(self, cell: str, seed: int) -> None:
+        self.cell, self.seed = cell, seed
+        self.planner = Planner(time.monotonic)
+        self.planner.set_cell("", cell)
+        self.stops = (*(station.name for station in self.planner.cell.stations), "park")
+        self.start = np.array(self.planner.cell.park)
+
+    def options(self, objective: str = "energy") -> PlanOptions:
+        """A request under a ceiling that work never reaches."""
+        return PlanOptions(objective=objective, seed=self.seed, planning_time=CEILING)
+
+    def planned(self, what: str, cycle: float, objective: str = "energy") -> Row:
+        """The program in a cycle time [s], 0: free. A refused one costs nan."""
+        begin = time.perf_counter()
+        try:
+            plan = self.planner.plan_program(self.stops, cycle, self.options(objective), self.start)
+        except RequestError:
+            return Row(self.cell, self.seed, what, cycle, float("nan"), float("nan"), False, float("nan"))
+        took = time.perf_counter() - begin
+        reports = [movement.report for movement in plan.movements if not movement.is_pause]
+        drives = sum(report.energy - report.base_energy for report in reports)
+        certified = bool(reports) and all(report.certified for report in reports)
+        lasting = sum(movement.duration for movement in plan.movements)
+        return Row(self.cell, self.seed, what, lasting, plan.report.energy, drives, certified, took)
+
+    def over_cycle_times(self, points: int) -> list[Row]:
+        """From the shortest cycle to twice the free one."""
+        shortest = self.planned("shortest", 0.0, "time")
+        free = self.planned("free", 0.0)
+        cycles = np.linspace(1.01 * shortest.cycle, 2.0 * free.cycle, points)
+        return [self.planned("cycle", float(cycle)) for cycle in cycles]
+
+    def against_common(self) -> tuple[list[Row], float]:
+        """The common program and the planner's in the same time, and the share of segments not free."""
+        chains = Chains.of(self.planner, self.stops, self.start, self.options(), {})
+        common = common_program(chains, self.planner, self.options())
+        base = self.planner.scene().base_watts * common.duration
+        E = common.drive_energy
+        plain = Row(self.cell, self.seed, "common", common.duration, E + base, E, True, 0.0)
+        return [plain, self.planned("at the common time", common.duration)], common.not_free
+
+    @property
+    def waiting(self) -> float:
+        """Mains power [W] of standing on motors at the end."""
+        return self.planner.standby(60.0, self.start, "").alternatives[0].power
+
+
+def excess(rows: list[Row], waiting: float) -> tuple[float, float]:
+    """By how much [%] the law and the fall of the drive energy are missed at worst, from point to point."""
+    law, rise = [-100.0], [-100.0]
+    for before, after in itertools.pairwise([row for row in rows if np.isfinite(row.energy)]):
+        allowed = before.energy + waiting * (after.cycle - before.cycle)
+        law.append(100.0 * (after.energy / allowed - 1.0))
+        rise.append(100.0 * (after.drive_energy / before.drive_energy - 1.0))
+    return max(law), max(rise)
+
+
+def claims_of(cell: str, rows: list[Row], pair: list[Row], waiting: float, not_free: float) -> list[Claim]:
+    """What one cell is held to."""
+    law, rise = excess(rows, waiting)
+    refused = sum(not np.isfinite(row.energy) for row in rows)
+    uncertified = sum(not row.certified for row in rows if np.isfinite(row.energy))
+    drives = 100.0 * (1.0 - pair[1].drive_energy / pair[0].drive_energy)
+    mains = 100.0 * (1.0 - pair[1].energy / pair[0].energy)
+    bound = 100.0 * TOLERANCE
+    return [
+        at_most(f"{cell}: cycle times that are refused, of {len(rows)}", refused, "", 0),
+        at_most(f"{cell}: programs with a movement that is not certified", uncertified, "", 0),
+        at_most(f"{cell}: E(T + d) above E(T) + P_wait d, worst", law, "%", bound),
+        at_most(f"{cell}: rise of the movements' drive energy, worst", rise, "%", bound),
+        at_least(f"{cell}: drive energy saved against the common program", drives, "%", 20.0),
+        at_least(f"{cell}: mains energy saved against the common program", mains, "%", 0.0),
+        at_most(f"{cell}: segments of the common program that are not free", 100 * not_free, "%", 100.0),
+    ]
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = command_line(__doc__, (CELL,), 1, "3 cycle times")
+    parser.add_argument("--points", type=int, default=12, help="cycle times; default: 12")
+    given = parser.parse_args()
+    if given.quick:
+        given.points = min(given.points, 3)
+    return given
+
+
+def main() -> None:
+    """Measure, print, write."""
+    given = arguments()
+    rows: list[Row] = []
+    claims: list[Claim] = []
+    for cell in given.cell or (CELL,):
+        for seed in range(given.seeds):
+            programs = Programs(cell, seed)
+            points = programs.over_cycle_times(given.points)
+            pair, not_free = programs.against_common()
+            for row in (*points, *pair):
+                print(line_of(asdict(row)), flush=True)
+            rows += [*points, *pair]
+            claims += claims_of(cell, points, pair, programs.waiting, not_free)
+    finish(given.json, [asdict(row) for row in rows], claims)
+
+
+if __name__ == "__main__":
+    main()
