@@ -2,6 +2,18 @@
 
 from ir_planner.program.program import plan_program
 from ir_planner.program.request import ProgramPlan, ProgramRequest
+from ir_planner.program.saving_request import SavingPlan, plan_savings
+from ir_planner.program.savings import Saving, Savings
 from ir_planner.program.standby import Standby, plan_standby
 
-__all__ = ["ProgramPlan", "ProgramRequest", "Standby", "plan_program", "plan_standby"]
+__all__ = [
+    "ProgramPlan",
+    "ProgramRequest",
+    "Saving",
+    "SavingPlan",
+    "Savings",
+    "Standby",
+    "plan_program",
+    "plan_savings",
+    "plan_standby",
+]

@@ -1,21 +1,18 @@
 """The steps of a program as they are sent: movements with what is held, pauses with their power mode."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.report import MovementKind, PlannedMovement
 
-from ir_planner.program.standby import BRAKES, MOTORS, late_start, pause_energy, plan_standby
+from ir_planner.program.pauses import Pause
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
 from ir_planner.program.steps import PlacedStep, Scenes, signal_text
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
 
-AUTO = "AUTO"
 _KINDS = {
     LEAVE: MovementKind.SERVICE_EXIT,
     ACROSS: MovementKind.REGIONAL,
@@ -40,6 +37,7 @@ class Leg:
 
 
 Legs = dict[int, Leg]  # by the step they belong to
+MakePause = Callable[[Pause], PlannedMovement]
 
 
 def legs_of(route: Route, hops: list[list[Part]], movements: Mapping[Part, Movement]) -> Legs:
@@ -55,21 +53,14 @@ def legs_of(route: Route, hops: list[list[Part]], movements: Mapping[Part, Movem
     }
 
 
-def wait_at_end(
-    seconds: float, here: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
-) -> PlannedMovement:
-    """The wait that fills a cycle, in the mode of least energy at q (n,)."""
-    return _pause(here, seconds, AUTO, q, scene, times)
-
-
 def assembled(  # long: what a step does, in its order
     steps: tuple[PlacedStep, ...],
     legs: Legs,
     scenes: Scenes,
-    times: TransitionTimes,
     start: FloatArray,
+    pause: MakePause,
 ) -> tuple[PlannedMovement, ...]:
-    """Movements and pauses in order. `legs`: by the step they belong to. `times`: of the power modes.
+    """Movements and pauses in order. `legs`: by the step they belong to. pause: how pauses are spent.
 
     A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
     """
@@ -92,10 +83,10 @@ def assembled(  # long: what a step does, in its order
         if step.dwell > 0.0 or (not moves and (handling or waiting)):
             late = not moves
             scene = scenes.of(placed.after if moves else placed.before)
-            pause = _pause(here, step.dwell, step.power_mode, q, scene, times)
+            standing = pause(Pause(here, step.dwell, step.power_mode, q, scene))
             result.append(
                 replace(
-                    pause,
+                    standing,
                     wait_for=waiting if late else (),
                     attach=step.attach if late else "",
                     detach=step.detach if late else "",
@@ -122,27 +113,3 @@ def _moves(leg: Leg) -> list[PlannedMovement]:
             )
         )
     return moves
-
-
-def _pause(
-    here: str, duration: float, requested: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
-) -> PlannedMovement:
-    mode = requested
-    if duration > 0.0 and requested == AUTO:
-        mode = plan_standby(duration, q, scene, times).chosen.name
-    elif requested == AUTO:
-        mode = ""
-    elif not requested and late_start(duration, scene, times) > 0.0:
-        mode = BRAKES  # the controller closes them anyway: asked for, they are open again in time
-    energy = pause_energy(mode or MOTORS, duration, q, scene, times) if duration > 0.0 else 0.0
-    if not np.isfinite(energy):  # asked for by name though it is too short: the runner stands on motors
-        energy = pause_energy(MOTORS, duration, q, scene, times)
-    return PlannedMovement(
-        kind=MovementKind.PAUSE,
-        from_station=here,
-        to_station=here,
-        duration=duration,
-        power_mode=mode,
-        load=scene.load_text,
-        report=TrajectoryReport(duration=duration, energy=energy, base_energy=energy, certified=True),
-    )

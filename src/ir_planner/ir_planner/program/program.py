@@ -8,16 +8,16 @@ with what is held at that moment.
 import hashlib
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status
 
 from ir_planner.checks import total_report
-from ir_planner.program.assembly import Legs, assembled, legs_of, wait_at_end
+from ir_planner.program.assembly import Legs, assembled, legs_of
 from ir_planner.program.chain import cheapest_chain, layers_of, parts_of
 from ir_planner.program.cycle_plan import Cycle, timed_chain
 from ir_planner.program.movements import Failure, Movements
+from ir_planner.program.pauses import AUTO, Pause, planned_pause
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, Chain, Part
@@ -31,13 +31,8 @@ _CHOOSING = 8_000  # work of a movement while configurations are chosen; more of
 
 def plan_program(request: ProgramRequest, work: Work, progress: Progress) -> ProgramPlan:
     """Plan a program. Raises RequestError for a request that makes no sense, CancelledError when stopped."""
-    request.check()
-    cell, journal = request.cell, Journal(work, request.options.seed)
-    steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start())
-    bare = request.options.load == NO_LOAD
-    scenes = Scenes(cell, request.power, request.settings.braking_energy, bare)
-    route = Route.over(steps, scenes)
-    context = Context(scenes.of(cell.parts_at_start()), request.options, journal)
+    journal = Journal(work, request.options.seed)
+    route, context = prepared(request, journal)
     try:
         movements, status = _planned(request, route, context, progress), Status.success()
     except StageError as failed:
@@ -49,6 +44,16 @@ def plan_program(request: ProgramRequest, work: Work, progress: Progress) -> Pro
     elapsed = np.concatenate([[0.0], np.cumsum([movement.duration for movement in movements])[:-1]])
     report = total_report(tuple(movement.report for movement in movements), tuple(elapsed.tolist()))
     return ProgramPlan(status, info, program_hash(movements), movements, report)
+
+
+def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]:
+    """The route of a request and what its stages need to know. Raises RequestError for one without sense."""
+    request.check()
+    cell = request.cell
+    steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start())
+    settings, bare = request.settings, request.options.load == NO_LOAD
+    scenes = Scenes(cell, request.power, settings.braking_energy, bare)
+    return Route.over(steps, scenes), Context(scenes.of(cell.parts_at_start()), request.options, journal)
 
 
 def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
@@ -77,7 +82,10 @@ def _planned(
 
 
 def _assembled(request: ProgramRequest, route: Route, legs: Legs) -> tuple[PlannedMovement, ...]:
-    return assembled(route.steps, legs, route.scenes, request.settings.transitions, request.start)
+    times = request.settings.transitions
+    return assembled(
+        route.steps, legs, route.scenes, request.start, lambda pause: planned_pause(pause, times)
+    )
 
 
 def _within_cycle(
@@ -87,22 +95,20 @@ def _within_cycle(
     route, times = movements.route, request.settings.transitions
     last, end = route.name(len(route) - 1), route.scenes.of(route.steps[-1].after)
 
-    def waiting_place(chain: Chain) -> FloatArray:
-        return movements.layers[-1][chain.chosen[-1]].interaction
-
-    def waiting(chain: Chain, seconds: float) -> float:
-        return wait_at_end(seconds, last, waiting_place(chain), end, times).report.energy
+    def wait(chain: Chain, seconds: float) -> PlannedMovement:
+        q = movements.layers[-1][chain.chosen[-1]].interaction
+        return planned_pause(Pause(last, seconds, AUTO, q, end), times)
 
     free = _movements_of(movements, chain, improvement, progress)
     planned = _assembled(request, route, legs_of(route, parts_of(chain, movements), free))
     standing = sum(movement.duration for movement in planned if movement.is_pause)
-    cycle = Cycle(request.cycle_time, standing, waiting)
+    cycle = Cycle(request.cycle_time, standing, lambda chain, left: wait(chain, left).report.energy)
     chain, timed = timed_chain(cycle, movements, chain, improvement, progress)
     planned = _assembled(request, route, legs_of(route, parts_of(chain, movements), timed.movements))
     if timed.wait <= 0.0:
         return planned
-    wait = request.cycle_time - sum(movement.duration for movement in planned)
-    return (*planned, wait_at_end(wait, last, waiting_place(chain), end, times))
+    left = request.cycle_time - sum(movement.duration for movement in planned)
+    return (*planned, wait(chain, left))
 
 
 def _improve(movements: Movements, chain: Chain, improvement: int) -> None:

@@ -1,0 +1,95 @@
+"""The common program: what a commissioned robot would do at the same stations, to hold savings against.
+
+Baseline movements (straight joint segments as synchronous S-curves at full speed) through the same stations,
+at each stop the configuration that is nearest to the one before by W, turns included; the same service lines,
+as fast as they can; the same pauses, left to the controller's own timers. Where a segment is not free, the
+movement runs along the planner's path in straight steps with blended corners; `around` counts these.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from ir_msgs_py.report import PlannedMovement
+
+from ir_planner.errors import TimingError
+from ir_planner.program.assembly import assembled, legs_of
+from ir_planner.program.chain import parts_of
+from ir_planner.program.movements import Failure, Movements
+from ir_planner.program.pauses import pause_by_itself
+from ir_planner.program.request import ProgramRequest, StageError
+from ir_planner.program.station_graph import ACROSS, Chain, Part
+from ir_planner.scene import movement_cost
+from ir_planner.timing import Movement, baseline, straight_steps
+
+
+@dataclass(frozen=True, eq=False)
+class CommonProgram:
+    """Movements and pauses in order; `around` of its `across` regional movements run around bodies."""
+
+    movements: tuple[PlannedMovement, ...]
+    across: int
+    around: int
+
+
+def common_program(request: ProgramRequest, movements: Movements) -> CommonProgram:
+    """The common program through the layers of `movements`, which move as fast as they can.
+
+    Raises StageError where it has a movement that isn't found.
+    """
+    chain = nearest_chain(movements)
+    hops = parts_of(chain, movements)
+    parts = [part for hop in hops for part in hop]
+    chosen: dict[Part, Movement] = {}
+    around = 0
+    for part in parts:
+        plain = _plain(part, movements)
+        if plain is None:
+            plain, by_path = _planned(part, movements), part.kind == ACROSS
+            around += by_path
+        chosen[part] = plain
+    route = movements.route
+    times = request.settings.transitions
+    steps = assembled(
+        route.steps,
+        legs_of(route, hops, chosen),
+        route.scenes,
+        request.start,
+        lambda pause: pause_by_itself(pause, times),
+    )
+    return CommonProgram(steps, sum(part.kind == ACROSS for part in parts), around)
+
+
+def nearest_chain(movements: Movements) -> Chain:
+    """At each stop the configuration nearest to the one before by W."""
+    chosen, total = [0], 0.0
+    for hop in range(len(movements.route)):
+        weights = movements.route.arriving(hop).weights
+        here = movements.layers[hop][chosen[-1]].outside
+        there = np.array([node.outside for node in movements.layers[hop + 1]])
+        costs = movement_cost(weights, here, there)
+        chosen.append(int(np.argmin(costs)))
+        total += float(costs.min())
+    return Chain(chosen, total, total)
+
+
+def _plain(part: Part, movements: Movements) -> Movement | None:
+    """The baseline movement of a part across, None where it isn't certified."""
+    if part.kind != ACROSS:
+        return None
+    first, second = movements.ends(part)
+    found = baseline(first, second, movements.context.inside(movements.route.arriving(part.hop)))
+    return found if found is not None and found.certified else None
+
+
+def _planned(part: Part, movements: Movements) -> Movement:
+    """The service movement of a part, or the movement along the planner's path."""
+    found = movements.plan([part], 0)[0]
+    if isinstance(found, Failure):
+        raise StageError(found.status)
+    if part.kind != ACROSS:
+        return found
+    try:
+        along = straight_steps(found.path, found.context)
+    except TimingError:
+        return found
+    return along if along.certified else found
