@@ -73,9 +73,7 @@ def test_a_movement_of_the_common_program_is_a_straight_segment_at_full_speed(
         along = q[-1] - q[0]
         share = (q - q[0]) @ along / (along @ along)
         assert np.abs(q - q[0] - share[:, None] * along).max() < 1e-6  # all joints at once
-        ratios = (movement.report.velocity_ratio, movement.report.torque_ratio)
-        tops = [*(float(np.max(r)) for r in ratios), float(np.max(movement.report.acceleration_ratio))]
-        assert max(tops) > 0.9
+        assert float(np.max(movement.report.torque_ratio)) > 0.93  # of the share 0.98 or the next one, 0.95
 
 
 def test_both_programs_last_equally_long_and_the_planned_one_costs_less(

@@ -20,6 +20,8 @@ from ir_planner.timing.torque_shares import within_torque
 
 _ROUNDS = 25  # gravity doesn't fall with speed: a load near the envelope takes several
 _BELOW = 1.0005  # a little slower than asked for, so that few rounds end it
+_NEAR = 0.99  # of the torque's share: nearer isn't looked for
+_REFINEMENTS = 8  # one to three are enough but for kinks of the torque envelope
 
 
 def baseline(start: FloatArray, goal: FloatArray, context: Context) -> Movement | None:
@@ -43,11 +45,35 @@ def baseline(start: FloatArray, goal: FloatArray, context: Context) -> Movement 
 
 
 def _quickest(ends: FloatArray, limits: MotionLimits, context: Context) -> JointTrajectory | None:
+    """The law at the limits, uniformly slowed by no more than its torque asks for."""
     law = free_law(path_limits(ends[1] - ends[0], limits))
-    trajectory = blended(TimedPath(ends, (StepLaws((law,)),), ()), context.joint_names)
+    at_limits = blended(TimedPath(ends, (StepLaws((law,)),), ()), context.joint_names)
+
+    def use_at(factor: float) -> float:
+        trajectory = stretched(at_limits, factor)
+        return float(torque_per_segment(trajectory, context.scene.dynamics).max()) / limits.torque_share
+
+    fast, beyond = 1.0, use_at(1.0)  # too fast, and the use of torque there
+    if beyond <= 1.0:
+        return at_limits
     for _ in range(_ROUNDS):
-        use = torque_per_segment(trajectory, context.scene.dynamics).max() / limits.torque_share
+        slow = fast * float(np.sqrt(beyond)) * _BELOW
+        within = use_at(slow)
+        if within <= 1.0:
+            break
+        fast, beyond = slow, within
+    else:
+        return None
+    for k in range(_REFINEMENTS):
+        if within >= _NEAR:
+            break
+        # torque is about a constant and a part that falls with the square of the factor; its envelope has
+        # kinks, so that every second time the middle is taken
+        share = 0.5 if k % 2 else (1.0 - within) / (beyond - within)
+        factor = float((slow**-2 + share * (fast**-2 - slow**-2)) ** -0.5) * _BELOW
+        use = use_at(factor)
         if use <= 1.0:
-            return trajectory
-        trajectory = stretched(trajectory, float(np.sqrt(use)) * _BELOW)
-    return None
+            slow, within = min(factor, slow), use
+        else:
+            fast, beyond = factor, use
+    return stretched(at_limits, slow)
