@@ -4,11 +4,11 @@ Every request takes one immutable snapshot of the cell; changing the cell meanwh
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import PlannedMovement, PlanningInfo, PlanningStage, TrajectoryReport
+from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 
@@ -23,7 +23,15 @@ from ir_planner.configurations import (
     no_configuration,
 )
 from ir_planner.current_cell import CurrentCell
-from ir_planner.program import ProgramPlan, ProgramRequest, Standby, plan_program, plan_standby
+from ir_planner.program import (
+    ProgramPlan,
+    ProgramRequest,
+    SavingPlan,
+    Standby,
+    plan_program,
+    plan_savings,
+    plan_standby,
+)
 from ir_planner.regional import MovementPlan, plan_regional
 from ir_planner.request import (
     Clock,
@@ -34,6 +42,7 @@ from ir_planner.request import (
     bounded,
     checked_options,
     chosen,
+    noted,
     safety_distance,
     within_limits,
 )
@@ -47,20 +56,13 @@ from ir_planner.service import (
     plan_service,
 )
 from ir_planner.settings import PlannerSettings
-from ir_planner.store import Store
+from ir_planner.store import Store, StoredProgram
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 
 PAIRS_MAX = 1000
-_NEVER: Callable[[], bool] = lambda: False  # noqa: E731 - a default argument
-
-
-@dataclass(frozen=True, eq=False)
-class StoredProgram:
-    """A planned program."""
-
-    program_id: str
-    movements: tuple[PlannedMovement, ...]
-    report: TrajectoryReport
+Cancelled = Callable[[], bool]
+Stations = tuple[str, ...]
+_NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 
 
 class Planner:
@@ -70,10 +72,7 @@ class Planner:
     """
 
     def __init__(
-        self,
-        clock: Clock,
-        settings: PlannerSettings | None = None,
-        power: PowerData | None = None,
+        self, clock: Clock, settings: PlannerSettings | None = None, power: PowerData | None = None
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
@@ -85,8 +84,6 @@ class Planner:
         self.programs: Store[StoredProgram] = Store(
             "program", self.settings.stored_programs, lambda program: program.program_id
         )
-
-    # -- the cell --------------------------------------------------------------------------------------------
 
     @property
     def cell(self) -> Cell:
@@ -114,8 +111,6 @@ class Planner:
         tool.
         """
         return self._current.scene(load)
-
-    # -- questions -------------------------------------------------------------------------------------------
 
     def check_state(
         self, q: FloatArray, margin: float, max_pairs: int, load: str, station: str
@@ -162,10 +157,8 @@ class Planner:
             pause, scene.cell.machine_home if q is None else q, scene, self.settings.transitions
         )
 
-    # -- plans -----------------------------------------------------------------------------------------------
-
     def plan_regional(
-        self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER
+        self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Cancelled = _NEVER
     ) -> MovementPlan:
         """Movement from start (n,) to a goal; a pose is reached in the configuration that serves best."""
         options, note = self._checked(options)
@@ -195,7 +188,7 @@ class Planner:
         near: FloatArray,
         max_candidates: int,
         options: PlanOptions,
-        cancelled: Callable[[], bool] = _NEVER,
+        cancelled: Cancelled = _NEVER,
     ) -> ServicePlan:
         """Movements out of a station or into it. configuration (n,): there, None: the best; near (n,):
         where its cost counts from.
@@ -215,10 +208,10 @@ class Planner:
         for candidate in plan.candidates:
             if candidate.trajectory is not None:
                 self.trajectories.add(candidate.trajectory)
-        return replace(plan, info=_noted(plan.info, note))
+        return replace(plan, info=noted(plan.info, note))
 
     def plan_trajectory(
-        self, reference: Reference, options: PlanOptions, cancelled: Callable[[], bool] = _NEVER
+        self, reference: Reference, options: PlanOptions, cancelled: Cancelled = _NEVER
     ) -> MovementPlan:
         """Trajectory through points."""
         options, note = self._checked(options)
@@ -229,7 +222,7 @@ class Planner:
         self,
         trajectory: JointTrajectory,
         options: PlanOptions | None = None,
-        cancelled: Callable[[], bool] = _NEVER,
+        cancelled: Cancelled = _NEVER,
     ) -> OptimizationPlan:
         """A trajectory made cheaper between its end points, with the trade of time for energy."""
         options, note = self._checked(options or PlanOptions())
@@ -241,7 +234,7 @@ class Planner:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
-        return replace(plan, info=_noted(plan.info, note))
+        return replace(plan, info=noted(plan.info, note))
 
     def plan_program(
         self,
@@ -250,47 +243,59 @@ class Planner:
         options: PlanOptions,
         start: FloatArray,
         progress: Callable[[str, int, int, float], None] = lambda phase, done, total, cost: None,
-        cancelled: Callable[[], bool] = _NEVER,
+        cancelled: Cancelled = _NEVER,
     ) -> ProgramPlan:
         """The cell's program, or a visit of stations, from start (n,)."""
+        request, work, note = self._asked(stations, cycle_time, options, start, cancelled)
+        return self._program_kept(plan_program(request, work, progress), note)
+
+    def plan_savings(
+        self,
+        stations: tuple[str, ...],
+        options: PlanOptions,
+        start: FloatArray,
+        cancelled: Cancelled = _NEVER,
+    ) -> SavingPlan:
+        """The program in the common program's time, and what it saves; from start (n,)."""
+        request, work, note = self._asked(stations, 0.0, options, start, cancelled)
+        found = plan_savings(request, work)
+        return replace(found, plan=self._program_kept(found.plan, note))
+
+    def _asked(
+        self,
+        stations: tuple[str, ...],
+        cycle: float,
+        options: PlanOptions,
+        start: FloatArray,
+        stop: Cancelled,
+    ) -> tuple[ProgramRequest, Work, str]:
         options, note = self._checked(options)
         cell = self.cell
         start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
-        request = ProgramRequest(
-            cell,
-            self.power,
-            stations,
-            start,
-            options,
-            bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s"),
-            self.settings,
-        )
+        cycle = bounded(cycle, 0.0, 604_800.0, "cycle_time", "s")
+        request = ProgramRequest(cell, self.power, stations, start, options, cycle, self.settings)
         movements = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
-        plan = plan_program(request, self._work(options, cancelled, movements), progress)
+        return request, self._work(options, stop, movements), note
+
+    def _program_kept(self, plan: ProgramPlan, note: str) -> ProgramPlan:
         if plan.status.ok:
             for movement in plan.movements:
                 if movement.trajectory is not None:
                     self.trajectories.add(movement.trajectory)
             self.programs.add(StoredProgram(plan.program_id, plan.movements, plan.report))
-        return replace(plan, info=_noted(plan.info, note))
+        return replace(plan, info=noted(plan.info, note))
 
     def _kept(self, plan: MovementPlan, note: str) -> MovementPlan:
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
-        return replace(plan, info=_noted(plan.info, note))
+        return replace(plan, info=noted(plan.info, note))
 
     def _checked(self, options: PlanOptions) -> tuple[PlanOptions, str]:
         chosen(options.planner_id, ("", *self.settings.searches), "planner_id")
         return checked_options(options)
 
-    def _work(self, options: PlanOptions, cancelled: Callable[[], bool], movements: int = 1) -> Work:
+    def _work(self, options: PlanOptions, cancelled: Cancelled, movements: int = 1) -> Work:
         most = (options.max_iterations or self.settings.max_iterations) * movements
         improvement = options.max_iterations or self.settings.improvement_iterations
         deadline = self.clock() + options.planning_time * movements
         return Work(most, deadline, self.clock, cancelled, improvement)
-
-
-def _noted(info: PlanningInfo, note: str) -> PlanningInfo:
-    if not note:
-        return info
-    return replace(info, stages=(*info.stages, PlanningStage("options", 0.0, note)))

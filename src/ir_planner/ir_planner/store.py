@@ -2,14 +2,25 @@
 
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Lock
 from typing import Generic, TypeVar
 
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 
 from ir_planner.errors import RequestError
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class StoredProgram:
+    """A planned program."""
+
+    program_id: str
+    movements: tuple[PlannedMovement, ...]
+    report: TrajectoryReport
 
 
 class Store(Generic[T]):

@@ -24,7 +24,7 @@ from ir_description import Cell, Station
 from ir_planner.checks import Evaluation
 from ir_planner.checks import StateCheck
 from ir_planner.configurations import IkAnswer
-from ir_planner.planner import StoredProgram
+from ir_planner.store import StoredProgram
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
 from ir_planner.service import ServicePlan

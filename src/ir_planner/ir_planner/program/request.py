@@ -56,6 +56,10 @@ class ProgramRequest:
             )
 
 
+def nobody(phase: str, done: int, total: int, cost: float) -> None:
+    """Progress that nobody asks for."""
+
+
 class StageError(Exception):
     """A stage of the program found nothing; carries the status of the answer."""
 

@@ -6,7 +6,7 @@ from ir_planner.program.chain import layers_of
 from ir_planner.program.common_program import common_program
 from ir_planner.program.movements import Movements
 from ir_planner.program.program import plan_program, prepared
-from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError
+from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
 from ir_planner.program.savings import Savings, savings_of
 from ir_planner.request import Journal, Work
 from ir_planner.service import exit_searches
@@ -20,7 +20,7 @@ class SavingPlan:
     savings: Savings | None
 
 
-def plan_savings(request: ProgramRequest, work: Work, progress: Progress) -> SavingPlan:
+def plan_savings(request: ProgramRequest, work: Work, progress: Progress = nobody) -> SavingPlan:
     """Plan a program at the common program's time. The request's own cycle time is not used.
 
     Raises RequestError for a request that makes no sense, CancelledError when stopped.

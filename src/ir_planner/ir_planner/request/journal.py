@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from ir_msgs_py.arrays import FloatArray
@@ -59,3 +59,8 @@ class Journal:
             stages=tuple(self.stages),
             rejected=tuple(Rejection(reason, count) for reason, count in sorted(self.rejected.items())),
         )
+
+
+def noted(info: PlanningInfo, note: str) -> PlanningInfo:
+    """The record with a remark on the options ("": none)."""
+    return replace(info, stages=(*info.stages, PlanningStage("options", 0.0, note))) if note else info
