@@ -270,12 +270,11 @@ class Planner:
         stop: Cancelled,
     ) -> tuple[ProgramRequest, Work, str]:
         options, note = self._checked(options)
-        cell = self.cell
-        start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
+        start = within_limits(start, cell := self.cell, "start", StatusCode.START_STATE_INVALID)
         cycle = bounded(cycle, 0.0, 604_800.0, "cycle_time", "s")
         request = ProgramRequest(cell, self.power, stations, start, options, cycle, self.settings)
-        movements = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
-        return request, self._work(options, stop, movements), note
+        stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
+        return request, self._work(options, stop, stops), note
 
     def _program_kept(self, plan: ProgramPlan, note: str) -> ProgramPlan:
         if plan.status.ok:
