@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
+from ir_recorder import RecorderError, analyse, findings
 from ir_recorder.errors import ReadError
+from ir_recorder.read.raw import read_raw
 from ir_recorder.read.reader import read_recording
+from ir_recorder.report import report_html
 
 
 def test_a_truncated_file_gives_what_is_left(demo_file: Path, tmp_path: Path) -> None:
@@ -53,3 +58,43 @@ def test_what_is_no_recording_is_refused_with_a_sentence(tmp_path: Path, content
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ReadError, match="No such file"):
         read_recording(tmp_path / "none.mcap")
+
+
+def test_a_message_from_the_far_future_costs_only_itself(tmp_path: Path) -> None:
+    path = tmp_path / "future.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/text", "cdr", schema)
+        for time in (1, 2**63, 2**64 - 1, 2):
+            writer.add_message(channel, time, b"\0\1\0\0", time)
+        writer.finish()
+    raw = read_raw(path)
+    assert raw.channel("/text").log_time.tolist() == [1, 2]
+    assert "2 messages have a time after the year 2260" in raw.problems
+
+
+def test_mutilated_recordings_are_read_or_refused(demo_file: Path, tmp_path: Path) -> None:
+    """Bytes changed, dropped and put in at random: a page, or a sentence."""
+    generator, whole = np.random.default_rng(0), demo_file.read_bytes()
+    path = tmp_path / "m.mcap"
+    for _ in range(40):
+        data = bytearray(whole)
+        for _ in range(int(generator.choice([1, 3, 30]))):
+            at = int(generator.integers(len(data)))
+            kind = generator.integers(4)
+            if kind == 0:
+                data[at] = int(generator.integers(256))
+            elif kind == 1:
+                data[at : at + 8] = b"\xff" * 8
+            elif kind == 2:
+                del data[at : at + int(generator.integers(1, 100))]
+            else:
+                data[at:at] = bytes(int(generator.integers(1, 50)))
+        path.write_bytes(data)
+        try:
+            analysis = analyse(read_recording(path))
+        except RecorderError:
+            continue
+        assert report_html(analysis, findings(analysis))

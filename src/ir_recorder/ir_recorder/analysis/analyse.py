@@ -72,7 +72,7 @@ class _Analyser:
             return None
         try:
             return cell_from_yaml(self.recording.cell_yaml, "the attached cell")
-        except DescriptionError as error:
+        except (DescriptionError, InvalidValueError, RecursionError) as error:
             self.problems.append(f"the attached cell can't be read: {error}")
             return None
 
@@ -98,7 +98,8 @@ class _Analyser:
             own = self.data.mode(mode)
             return own.time_to_pause + own.regular_time_to_operate
 
-        return unshortened_cycle(results, fact, change, watts, meter)
+        timer = self.data.motors_to_brakes_in_program
+        return unshortened_cycle(results, fact, change, timer, watts, meter)
 
     def _resting(self, mode: str, step: ExecutedStep, cell: Cell | None) -> float:
         """W at rest where a step begins, by the data; NaN where posture or cell are missing."""

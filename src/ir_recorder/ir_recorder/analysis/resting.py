@@ -9,7 +9,8 @@ from ir_kernels import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
 
 MOTORS = "STAND_ON_MOTORS"
-_BUS_UP = (MOTORS, "STAND_ON_BRAKES")  # modes in which the drive bus feeds the tool
+BRAKES = "STAND_ON_BRAKES"
+_BUS_UP = (MOTORS, BRAKES)  # modes in which the drive bus feeds the tool
 
 
 def resting_watts(mode: str, q: FloatArray, cell: Cell, loads: tuple[Load, ...], data: PowerData) -> float:
@@ -24,11 +25,16 @@ def resting_watts(mode: str, q: FloatArray, cell: Cell, loads: tuple[Load, ...],
     return float(watts + data.drives_and_brake_release + model.axis_power(still, held).sum())
 
 
-def pause_joules(watts: float, motors: float, seconds: float, change: float) -> float:
-    """J of a pause of `seconds` in a mode of `watts`; `change` [s] of it, in and out, at `motors` [W].
+def left_alone_joules(motors: float, brakes: float, seconds: float, timer: float, change: float) -> float:
+    """J of a pause on motors: after `timer` [s] the controller closes the brakes by itself.
 
-    A pause too short for the mode is spent with motors on.
+    motors, brakes [W]: at rest in the two modes; change [s]: closing and opening, at `motors`.
     """
-    if seconds < change:
+    if seconds <= timer + change:
         return motors * seconds
+    return motors * (timer + change) + brakes * (seconds - timer - change)
+
+
+def pause_joules(watts: float, motors: float, seconds: float, change: float) -> float:
+    """J of a pause of `seconds` in a mode of `watts`; `change` [s] of it, in and out, at `motors` [W]."""
     return motors * change + watts * (seconds - change)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from ir_recorder.analysis.meter import Meter
-from ir_recorder.analysis.resting import MOTORS, pause_joules
+from ir_recorder.analysis.resting import BRAKES, MOTORS, left_alone_joules, pause_joules
 from ir_recorder.analysis.results import NAN, ProgramTotals, Share, StepResult, Unshortened
 
 Watts = Callable[[str, StepResult], float]
@@ -33,12 +33,17 @@ def program_totals(
 
 
 def unshortened_cycle(
-    results: Sequence[StepResult], fact: str, change: Callable[[str], float], watts: Watts, meter: Meter
+    results: Sequence[StepResult],
+    fact: str,
+    change: Callable[[str], float],
+    timer: float,
+    watts: Watts,
+    meter: Meter,
 ) -> Unshortened | None:
     """The cycle with its pauses at full length, computed from what was measured; None where none is shorter.
 
     fact: full lengths of the pauses in a power mode, in their order ("180 s, 1800 s"). change: seconds into
-    a mode and back by the data.
+    a mode and back by the data. timer: seconds after which the controller closes the brakes by itself.
     """
     lengths = [float(number) for number in re.findall(r"\d+(?:\.\d+)?(?=\s*s\b)", fact)]
     if not lengths:
@@ -50,7 +55,11 @@ def unshortened_cycle(
     energy, seconds = meter.energy(start, end), end - start
     for result, length in zip(pauses, lengths, strict=True):
         mode = result.step.movement.power_mode
-        full = pause_joules(watts(mode, result), watts(MOTORS, result), length, change(mode))
+        motors = watts(MOTORS, result)
+        if mode == MOTORS or length < change(mode):
+            full = left_alone_joules(motors, watts(BRAKES, result), length, timer, change(BRAKES))
+        else:
+            full = pause_joules(watts(mode, result), motors, length, change(mode))
         energy, seconds = energy + full - result.energy, seconds + length - result.seconds
     return Unshortened(seconds, energy, sum(r.seconds for r in pauses), sum(lengths))
 

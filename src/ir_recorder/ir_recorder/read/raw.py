@@ -23,6 +23,8 @@ from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.errors import ReadError
 from ir_recorder.read.chunks import ChunkReader, ReadLimits, TooLargeError
 
+LATEST = 2**63 - 1  # ns: the last time that an int64 holds
+
 
 @dataclass(frozen=True)
 class RawChannel:
@@ -84,11 +86,14 @@ class _Collector:
         self.facts: list[tuple[str, str]] = []
         self.problems: list[str] = []
         self.orphans = 0
+        self.timeless = 0
         self.complete = False
 
     def add(self, record: McapRecord) -> None:
         if isinstance(record, Message):
-            if record.channel_id in self.channels:
+            if record.log_time > LATEST:
+                self.timeless += 1
+            elif record.channel_id in self.channels:
                 self.times[record.channel_id].append(record.log_time)
                 self.data[record.channel_id].append(record.data)
             else:
@@ -139,6 +144,8 @@ def read_raw(path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits |
     messages = sum(len(data) for data in found.data.values())
     if found.orphans:
         found.problems.append(f"{found.orphans} messages belong to channels that were lost")
+    if found.timeless:
+        found.problems.append(f"{found.timeless} messages have a time after the year 2260")
     if not found.complete:
         found.problems.append(f"the file ends early; {messages} messages were read up to there")
     if not messages and not found.attachments and not found.facts:

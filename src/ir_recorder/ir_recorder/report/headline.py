@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.format.contents import OWN_FACTS, VERSION
-from ir_recorder.report.words import DASH, joules, millimetres, number, percent, seconds, text, watts
+from ir_recorder.report.words import DASH, joules, millimetres, number, percent, seconds, share, text, watts
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
 
@@ -31,7 +31,7 @@ class Tile:
 def subtitle(analysis: Analysis) -> str:
     """File, start, length and energy of the whole recording."""
     recording = analysis.recording
-    start = datetime.fromtimestamp(recording.start_ns * 1e-9, UTC)
+    start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=recording.start_ns * 1e-9)
     version = recording.fact(VERSION)
     return text(
         f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, recorded {seconds(recording.duration)}, "
@@ -115,15 +115,15 @@ def _parts(program: ProgramTotals) -> list[Tile]:
         _part("pauses", program.pauses, program.planned_pauses, program.whole),
     ]
     waiting = program.waiting
-    share = f"{percent(waiting.energy / program.whole.energy).lstrip('+')} of the run"
-    lines = (f"{seconds(waiting.seconds)}, {share}", "signals and answers; in no plan")
+    of_run = share(waiting.energy, program.whole.energy)
+    lines = (f"{seconds(waiting.seconds)}, {of_run} of the run", "signals and answers; in no plan")
     return [*parts, Tile("waiting between steps", joules(waiting.energy), lines)]
 
 
 def _part(name: str, measured: Share, planned: Share, whole: Share) -> Tile:
-    share = f"{percent(measured.energy / whole.energy).lstrip('+')} of the run"
+    of_run = share(measured.energy, whole.energy)
     against = f"planned {joules(planned.energy)}, {_against(measured.energy, planned.energy)}"
-    return Tile(name, joules(measured.energy), (f"{seconds(measured.seconds)}, {share}", against))
+    return Tile(name, joules(measured.energy), (f"{seconds(measured.seconds)}, {of_run} of the run", against))
 
 
 def _against(measured: float, planned: float) -> str:

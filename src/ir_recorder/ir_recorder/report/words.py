@@ -44,6 +44,11 @@ def percent(value: float) -> str:
     return "0.00 %" if shown in ("+0.00", "-0.00") else f"{shown} %"
 
 
+def share(part: float, whole: float) -> str:
+    """A part of a whole as a percentage."""
+    return percent(part / whole).lstrip("+") if whole > 0.0 else DASH
+
+
 def number(value: float, unit: str) -> str:
     """A number with its unit: lengths in mm, the rest with four significant digits."""
     if not math.isfinite(value):
