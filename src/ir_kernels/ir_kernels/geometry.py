@@ -88,7 +88,25 @@ def _known(name: str, names: Sequence[str], argument: str) -> None:
         raise InputError(f"{argument} names {name!r}: known are {listed}")
 
 
-def geometry(  # long: the pairs of one model, of both kinds
+def _self_pairs(
+    pairs: Iterable[tuple[str, str]], names: tuple[str, ...], ignored: set[frozenset[str]]
+) -> list[tuple[int, int]]:
+    """Numbers of the capsules of each pair that is not ignored."""
+    index = {name: k for k, name in enumerate(names)}
+    own = []
+    for first, second in pairs:
+        _known(first, names, "self_pairs")
+        _known(second, names, "self_pairs")
+        if first == second:
+            raise InputError(
+                f"self_pairs holds ({first!r}, {second!r}): a capsule has no distance from itself"
+            )
+        if frozenset((first, second)) not in ignored:
+            own.append((index[first], index[second]))
+    return own
+
+
+def geometry(
     chain: Chain,
     items: Sequence[CapsuleLike],
     bodies: Sequence[BodyLike],
@@ -102,11 +120,10 @@ def geometry(  # long: the pairs of one model, of both kinds
     unknown names.
     """
     robot, environment = capsules(items, chain.n), scene(bodies)
-    known = {*robot.names, *environment.names}
     ignored = {frozenset(pair) for pair in ignored_pairs}
-    for name in (name for pair in ignored for name in pair):
-        if name not in known:
-            _known(name, (*robot.names, *environment.names), "ignored_pairs")
+    known = (*robot.names, *environment.names)
+    for name in sorted({name for pair in ignored for name in pair}.difference(known)):
+        _known(name, known, "ignored_pairs")
     kept = [
         (a, b)
         for a, capsule in enumerate(robot.names)
@@ -114,17 +131,7 @@ def geometry(  # long: the pairs of one model, of both kinds
         for b, body in enumerate(environment.names)
         if not ignored or frozenset((capsule, body)) not in ignored
     ]
-    index = {name: k for k, name in enumerate(robot.names)}
-    own = []
-    for first, second in self_pairs:
-        _known(first, robot.names, "self_pairs")
-        _known(second, robot.names, "self_pairs")
-        if first == second:
-            raise InputError(
-                f"self_pairs holds ({first!r}, {second!r}): a capsule has no distance from itself"
-            )
-        if frozenset((first, second)) not in ignored:
-            own.append((index[first], index[second]))
+    own = _self_pairs(self_pairs, robot.names, ignored)
     return Geometry(
         chain,
         robot,

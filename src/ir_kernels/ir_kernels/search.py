@@ -58,11 +58,8 @@ class BidirectionalTree:
             raise InputError(f"seed is {seed}: expected at least 0 and less than 2^64")
         limits = collision._per_pair(threshold, "threshold")
         first, last = checked("start", start, n), checked("goals", goals, None, n)
-        lines = [np.empty((0, n))] * len(last) if goal_lines is None else list(goal_lines)
-        if len(lines) != len(last):
-            raise InputError(f"goal_lines has {len(lines)} lines: expected {len(last)}, one per goal")
         line = _line("start_line", np.empty((0, n)) if start_line is None else start_line, n)
-        lines = [_line(f"goal_lines[{g}]", value, n) for g, value in enumerate(lines)]
+        lines = _goal_lines(goal_lines, len(last), n)
         for name, rows in (
             ("start", first[None]),
             ("goals", last),
@@ -135,6 +132,14 @@ def _core() -> compiled.Core:
 
         return Search
     return compiled.MODULE.BidirectionalSearch
+
+
+def _goal_lines(given: Sequence[ArrayLike] | None, goals: int, n: int) -> list[FloatArray]:
+    """A line (M, n) for each goal, empty where none is given."""
+    lines = [np.empty((0, n))] * goals if given is None else list(given)
+    if len(lines) != goals:
+        raise InputError(f"goal_lines has {len(lines)} lines: expected {goals}, one per goal")
+    return [_line(f"goal_lines[{g}]", value, n) for g, value in enumerate(lines)]
 
 
 def _line(name: str, value: ArrayLike, n: int) -> FloatArray:

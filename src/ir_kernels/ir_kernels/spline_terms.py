@@ -45,13 +45,9 @@ def _copy(value: ArrayLike) -> ArrayLike:
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
-def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:  # long: one check per term
-    """The terms as contiguous arrays and floats, or InputError naming the one that makes no sense."""
-    names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
-    arrays: dict[str, FloatArray] = {
-        name: data.array(_copy(getattr(terms, name)), f"terms.{name}", (n,)) for name in names
-    }
-    for name in names[:3]:
+def _check_bounds(arrays: dict[str, FloatArray]) -> None:
+    """Raise InputError for bounds that no motion can keep."""
+    for name in ("velocity", "acceleration", "jerk"):
         if (arrays[name] <= 0.0).any():
             raise InputError(f"terms.{name} holds {arrays[name].min()}: bounds have to be above 0")
     if (arrays["low"] > arrays["high"]).any():
@@ -59,6 +55,15 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:  # lon
         raise InputError(f"terms.low[{j}] is {arrays['low'][j]}, above terms.high[{j}] {arrays['high'][j]}")
     if (arrays["travel"] < 0.0).any():
         raise InputError(f"terms.travel holds {arrays['travel'].min()}: a cost per rad can't be negative")
+
+
+def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
+    """The terms as contiguous arrays and floats, or InputError naming the one that makes no sense."""
+    names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
+    arrays: dict[str, FloatArray] = {
+        name: data.array(_copy(getattr(terms, name)), f"terms.{name}", (n,)) for name in names
+    }
+    _check_bounds(arrays)
     if terms.regeneration not in REGENERATIONS:
         raise InputError(
             f"terms.regeneration is {terms.regeneration!r}: known are {', '.join(REGENERATIONS)}"

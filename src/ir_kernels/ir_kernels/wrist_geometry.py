@@ -50,15 +50,8 @@ def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
     return np.asarray(point)
 
 
-def wrist_geometry(chain: Chain) -> WristGeometry:  # long: every condition with its sentence
-    """Derive the constants of `chain`; InputError names the condition that it breaks, with the value."""
-    if chain.n != 6:
-        raise InputError(f"chain has {chain.n} joints, the closed form needs 6")
-    to_base = np.linalg.inv(chain.base_pose)
-    links = to_base @ chain.link_poses(np.zeros((1, 6)))[0]
-    frames = links[1:]
-    z = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.joint_axis)
-    o = frames[:, :3, 3]
+def _check_axes(z: FloatArray) -> None:
+    """Raise InputError where the directions (6, 3) of the axes are not those of the closed form."""
     conditions = {
         "axes 1 and 2 are not perpendicular: z1.z2": z[0] @ z[1],
         "axes 2 and 3 are not parallel: |z2 x z3|": np.linalg.norm(np.cross(z[1], z[2])),
@@ -68,6 +61,18 @@ def wrist_geometry(chain: Chain) -> WristGeometry:  # long: every condition with
     for sentence, value in conditions.items():
         if abs(value) > ANGLE_TOLERANCE:
             raise InputError(f"chain: {sentence} = {value:.3g} (at most {ANGLE_TOLERANCE})")
+
+
+def wrist_geometry(chain: Chain) -> WristGeometry:
+    """Derive the constants of `chain`; InputError names the condition that it breaks, with the value."""
+    if chain.n != 6:
+        raise InputError(f"chain has {chain.n} joints, the closed form needs 6")
+    to_base = np.linalg.inv(chain.base_pose)
+    links = to_base @ chain.link_poses(np.zeros((1, 6)))[0]
+    frames = links[1:]
+    z = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.joint_axis)
+    o = frames[:, :3, 3]
+    _check_axes(z)
     centre = _meeting_point(o[3:], z[3:])
     plane = np.stack([np.cross(z[1], z[0]), z[1], z[0]])
     foot = o[0] + z[0] * (z[0] @ (o[1] - o[0]))

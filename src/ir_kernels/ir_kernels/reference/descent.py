@@ -19,6 +19,7 @@ FIRST_STEP = 0.3  # at most, in every coordinate, while nothing is known of the 
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
 Solve = Callable[[FloatArray], FloatArray]
 Pairs = list[tuple[FloatArray, FloatArray]]
+Point = tuple[FloatArray, float, FloatArray]  # x, value, gradient
 
 
 def bending_metric(m: int, holding: float) -> FloatArray:
@@ -44,7 +45,32 @@ def direction(gradient: FloatArray, pairs: Pairs, solve: Solve) -> FloatArray:
     return d
 
 
-def descend(  # long: line for line what descent.hpp does
+def line_search(
+    function: Function, at: tuple[FloatArray, float, FloatArray, float], step: float, tries: int
+) -> tuple[Point | None, int]:
+    """The best step found from x (N,) along -d that gains enough, or None; and the evaluations it took.
+
+    at: x, the value there, d (N,), the slope along -d.
+    """
+    x, value, d, slope = at
+    low, high, kept, used = 0.0, np.inf, None, 0
+    while used < tries:
+        there = x - step * d
+        at_step, by_step = function(there)
+        used += 1
+        if not at_step <= value + SUFFICIENT * step * slope:
+            high = step
+            if kept is not None:
+                break
+        else:
+            low, kept = step, (there, at_step, by_step)
+            if -float(by_step @ d) >= FLATTER * slope:
+                break
+        step = 2.0 * low if np.isinf(high) else 0.5 * (low + high)
+    return kept, used
+
+
+def descend(
     x: FloatArray, function: Function, solve: Solve, evaluations: int, tolerance: float
 ) -> tuple[FloatArray, float, int]:
     """Where the descent from `x` (N,) ends, the value there, and how many evaluations it took.
@@ -64,24 +90,9 @@ def descend(  # long: line for line what descent.hpp does
                 break
             pairs = []
             continue
-        low, high = 0.0, np.inf
         step = 1.0 if pairs else min(1.0, FIRST_STEP / max(float(np.abs(d).max()), 1e-12))
-        kept = None  # a step that gains enough
-        for _ in range(TRIES):
-            if used >= evaluations:
-                break
-            there = x - step * d
-            at_step, by_step = function(there)
-            used += 1
-            if not at_step <= value + SUFFICIENT * step * slope:
-                high = step
-                if kept is not None:
-                    break
-            else:
-                low, kept = step, (there, at_step, by_step)
-                if -float(by_step @ d) >= FLATTER * slope:
-                    break
-            step = 2.0 * low if np.isinf(high) else 0.5 * (low + high)
+        kept, tried = line_search(function, (x, value, d, slope), step, min(TRIES, evaluations - used))
+        used += tried
         if kept is None:
             if not pairs:
                 break

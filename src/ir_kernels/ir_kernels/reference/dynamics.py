@@ -28,15 +28,15 @@ from ir_kernels.reference.vectors import (
 from ir_msgs_py.arrays import FloatArray
 
 
-def rigid_body_torque(  # long: the recursion out and back, step by step
+def _outward(
     data: DynamicsData,
     sin: Sequence[Number],
     cos: Sequence[Number],
     qd: Sequence[Number],
     qdd: Sequence[Number],
-    with_gravity: bool = True,
-) -> list[Number]:
-    """H qdd + h per joint, for any kind of number (arrays, complex steps, intervals)."""
+    with_gravity: bool,
+) -> tuple[list[Matrix], list[Vector], list[Vector]]:
+    """Rotation of each link in the one before, and force and moment that its motion takes, in its frame."""
     zero = qd[0] * 0.0
     spin: Vector = (zero, zero, zero)
     spin_rate: Vector = (zero, zero, zero)
@@ -62,7 +62,20 @@ def rigid_body_torque(  # long: the recursion out and back, step by step
         rotations.append(R)
         forces.append(force)
         moments.append(add(moment, cross(com, force)))
-    torque: list[Number] = [zero] * data.n
+    return rotations, forces, moments
+
+
+def rigid_body_torque(
+    data: DynamicsData,
+    sin: Sequence[Number],
+    cos: Sequence[Number],
+    qd: Sequence[Number],
+    qdd: Sequence[Number],
+    with_gravity: bool = True,
+) -> list[Number]:
+    """H qdd + h per joint, for any kind of number (arrays, complex steps, intervals)."""
+    rotations, forces, moments = _outward(data, sin, cos, qd, qdd, with_gravity)
+    torque: list[Number] = [qd[0] * 0.0] * data.n
     for i in reversed(range(data.n)):
         axis, arm = vector(data.axis[i]), vector(data.origin[i, :3, 3])
         torque[i] = axis[0] * moments[i][0] + axis[1] * moments[i][1] + axis[2] * moments[i][2]

@@ -7,12 +7,13 @@ directions n of support(n) - min(n.p0, n.p1), for which a polytope needs only th
 cross products of its edges with the segment, and a cylinder those of its caps, its side, and its rims.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from ir_kernels.scene import Hull
-from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 RIM_SAMPLES = 256
 GOLDEN_STEPS = 60
@@ -109,9 +110,19 @@ def depth_box(p0: FloatArray, p1: FloatArray, half: FloatArray) -> Depth:
     return _shallowest(direction, np.abs(direction) @ half, p0, p1)
 
 
-def depth_cylinder(  # long: the cases of one closed form
-    p0: FloatArray, p1: FloatArray, radius: float, half_length: float
-) -> Depth:
+def _golden_section(overlap: Callable[[FloatArray], FloatArray], best: IntArray) -> FloatArray:
+    """Angles (N, 1) of least overlap within a sample of the best (N,) of RIM_SAMPLES."""
+    low = (best[:, None] - 1.0) * (2.0 * np.pi / RIM_SAMPLES)
+    high = (best[:, None] + 1.0) * (2.0 * np.pi / RIM_SAMPLES)
+    for _ in range(GOLDEN_STEPS):
+        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        smaller = overlap(left) < overlap(right)
+        low, high = np.where(smaller, low, left), np.where(smaller, right, high)
+    middle: FloatArray = (low + high) / 2.0
+    return middle
+
+
+def depth_cylinder(p0: FloatArray, p1: FloatArray, radius: float, half_length: float) -> Depth:
     """Penetration of segments (N, 3), (N, 3) into the cylinder about z."""
 
     def support(direction: FloatArray) -> FloatArray:
@@ -141,14 +152,6 @@ def depth_cylinder(  # long: the cases of one closed form
         result: FloatArray = support(n) - ahead
         return result
 
-    best = overlap(angle).argmin(axis=1)
-    low = (best[:, None] - 1.0) * (2.0 * np.pi / RIM_SAMPLES)
-    high = (best[:, None] + 1.0) * (2.0 * np.pi / RIM_SAMPLES)
-    for _ in range(GOLDEN_STEPS):
-        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        smaller = overlap(left) < overlap(right)
-        low, high = np.where(smaller, low, left), np.where(smaller, right, high)
-    direction = np.concatenate(
-        [caps, radial[:, None], -radial[:, None], on_circle((low + high) / 2.0)], axis=1
-    )
+    closest = _golden_section(overlap, overlap(angle).argmin(axis=1))
+    direction = np.concatenate([caps, radial[:, None], -radial[:, None], on_circle(closest)], axis=1)
     return _shallowest(direction, support(direction), p0, p1)
