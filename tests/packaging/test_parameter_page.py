@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from rclpy.node import Node
 
 from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.settings import setting
 from ir_planner import PlannerSettings
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.search import SEARCHES, Ends, Found
 from ir_program_runner.parameters import declare_parameters
 from ir_recorder.parameters import declared_settings
 from ir_sim_driver.node.parameters import DriverParameters
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "parameters.md"
+TOOL = ROOT / "tools" / "parameter_reference.py"
 DECLARE: dict[str, Callable[[Node], object]] = {
     "ir_planner": lambda node: Parameters(node, PlannerSettings),
     "ir_sim_driver": lambda node: DriverParameters(node, lambda: "", lambda settings: None),
@@ -34,3 +42,25 @@ def test_the_page_lists_what_the_node_declares(name: str, ros_node: Node) -> Non
     assert set(rows) == set(declared)
     fixed = {each for each, row in rows.items() if row.endswith("Fixed at start. |")}
     assert fixed == {each for each, described in declared.items() if described.read_only}
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Answers with nothing."""
+
+    tries: int = setting(3, "How often it guesses.", minimum=1, maximum=9)
+
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        return Found([])
+
+
+def test_a_registered_search_is_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SEARCHES, "guess", Guess())
+    spec = importlib.util.spec_from_file_location("parameter_reference", TOOL)
+    assert spec is not None
+    assert spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    page = tool.page()
+    assert "| `guess` | Answers with nothing. |" in page
+    assert "| `guess.tries` | 3 |  | 1 .. 9 | How often it guesses. |" in page
