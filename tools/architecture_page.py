@@ -82,15 +82,13 @@ def part(package: str) -> str:
     stack = floors(known)
     rows = [f"| `{room}` | {first_words(files[room])} |" for floor in stack for room in floor]
     drawn = [f"  {room} --> {near}" for room in sorted(known) for near in sorted(direct(known)[room])]
-    count = sum(len(others) for others in known.values())
     return "\n".join(
         (
             "| name | content |",
             "| --- | --- |",
             *rows,
             "",
-            f"{len(files)} rooms on {len(stack)} floors, {count} arrows, no cycle. "
-            "Drawn without those that follow from others:",
+            f"{len(files)} rooms on {len(stack)} floors, no cycle. Imports, without those that follow from others:",
             "",
             "```mermaid",
             "graph TD",
