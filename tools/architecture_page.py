@@ -88,7 +88,8 @@ def part(package: str) -> str:
             "| --- | --- |",
             *rows,
             "",
-            f"{len(files)} rooms on {len(stack)} floors, no cycle. Imports, without those that follow from others:",
+            f"{len(files)} rooms on {len(stack)} floors, no cycle. "
+            "Imports, without those that follow from others:",
             "",
             "```mermaid",
             "graph TD",
