@@ -86,7 +86,7 @@ class Supervision:
         self._speed = robot.velocity_max * (1.0 + settings.speed_margin)
         self._change = robot.acceleration_max * (1.0 + settings.acceleration_margin) * (PERIOD * _WINDOW * dt)
         self._saturation_looks = max(1, round(settings.saturation_time / (PERIOD * dt)))
-        self._allowed_low, self._allowed_high = self._low, self._high
+        self._allow(self._low, self._high)
         self._speeds: deque[FloatArray] = deque(maxlen=_WINDOW + 1)
         self._saturated = 0
         self._seen: FloatArray | None = None
@@ -94,10 +94,15 @@ class Supervision:
     def recovered(self, q: FloatArray) -> None:
         """Begin anew at q (n,): who is outside may stay there and come back, but go no farther out."""
         margin = self._settings.range_margin
-        self._allowed_low = np.minimum(self._low, q - margin)
-        self._allowed_high = np.maximum(self._high, q + margin)
+        self._allow(np.minimum(self._low, q - margin), np.maximum(self._high, q + margin))
         self._speeds.clear()
         self._saturated = 0
+
+    def _allow(self, low: FloatArray, high: FloatArray) -> None:
+        """Positions (n,) from now on; all bounds in one row are compared four times as fast as one by one."""
+        self._allowed_low, self._allowed_high = low, high
+        speed, change = self._speed, self._change
+        self._bounds = np.concatenate((high, -low, speed, speed, change, change))
 
     def look(self, backend: Backend, command: Command, braking: bool) -> Fault | None:
         """What is wrong now. command: of the last step; braking: nobody follows it, the brakes close."""
@@ -108,14 +113,27 @@ class Supervision:
             return None
         self._seen = q
         qd = backend.qd
-        fault = self._left_range(q) or self._too_fast(qd)
+        change = self._change_of(qd, braking)
+        everything = np.concatenate((q, -q, qd, -qd, change, -change))
+        fault = None if (everything <= self._bounds).all() else self._exceeded(q, qd, change)
+        if braking:
+            return fault
+        return fault or self._left_tube(q, command) or self._saturation(backend)
+
+    def _change_of(self, qd: FloatArray, braking: bool) -> FloatArray:
+        """Change (n,) of the speed over the window; zero while it is not full."""
         if braking:
             self._speeds.clear()
-            return fault
-        return fault or self._left_tube(q, command) or self._too_hard(qd) or self._saturation(backend)
+            return np.zeros(len(qd))
+        self._speeds.append(qd)
+        return qd - self._speeds[0] if len(self._speeds) > _WINDOW else np.zeros(len(qd))
+
+    def _exceeded(self, q: FloatArray, qd: FloatArray, change: FloatArray) -> Fault | None:
+        """Which of range, speed and acceleration is exceeded."""
+        return self._left_range(q) or self._too_fast(qd) or self._too_hard(change)
 
     def _left_range(self, q: FloatArray) -> Fault | None:
-        if not ((q < self._allowed_low) | (q > self._allowed_high)).any():
+        if ((q >= self._allowed_low) & (q <= self._allowed_high)).all():
             return None
         robot = self._robot
         beyond = np.maximum(q - robot.position_max, robot.position_min - q)
@@ -142,11 +160,7 @@ class Supervision:
             return None
         return self._worst("moves at", qd, self._robot.velocity_max, "rad/s")
 
-    def _too_hard(self, qd: FloatArray) -> Fault | None:
-        self._speeds.append(qd)
-        if len(self._speeds) <= _WINDOW:
-            return None
-        change = qd - self._speeds[0]
+    def _too_hard(self, change: FloatArray) -> Fault | None:
         if (np.abs(change) <= self._change).all():
             return None
         limit = self._robot.acceleration_max
