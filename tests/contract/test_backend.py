@@ -148,6 +148,18 @@ def test_brakes_stop_every_joint_without_motor_torque(backend: Backend, cell: Ce
     assert not backend.work().torque.any()
 
 
+def test_coasting_takes_no_torque_and_lets_the_arm_sag(backend: Backend, cell: Cell) -> None:
+    drive(backend, np.tile(home(cell), (10, 1)))
+    backend.work()
+    for _ in range(50):
+        backend.coast()
+    sag = backend.q - home(cell)
+    assert 1e-3 < sag[1] < 0.1  # A2 turns downwards
+    assert not backend.torque.any()
+    assert not backend.saturated
+    assert not backend.work().torque.any()
+
+
 def test_closed_brakes_hold_the_robot_exactly(backend: Backend, cell: Cell) -> None:
     q = np.array(backend.q)
     for _ in range(10):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ir_msgs_py.modes import Mode
+from ir_sim_driver.controller import SupervisionSettings
 from ir_sim_driver.controller.diagnostics import report
 from ir_sim_driver.errors import BackendError, RequestRefusedError
 from ir_sim_driver.motion.goal import ErrorCode
@@ -39,11 +40,11 @@ def test_the_robot_stops_faster_than_along_the_path_and_the_goal_ends(stopped):
 
 def test_the_distance_from_the_path_is_published(stopped):
     stopped.run(0.5)
-    assert 1e-5 < stopped.emergency.excursion < 0.05
+    assert 1e-5 < stopped.safety.emergency.excursion < 0.05
     controller = {entry.name: entry for entry in report(stopped, 0.0)}["ir_sim_driver: controller"]
     assert controller.level == 2
     published = float(controller.values["emergency stop left the path by [mm]"])
-    assert published == pytest.approx(stopped.emergency.excursion * 1e3, abs=0.01)
+    assert published == pytest.approx(stopped.safety.emergency.excursion * 1e3, abs=0.01)
 
 
 def test_brakes_take_no_motor_power_and_hold_against_gravity(stopped):
@@ -104,15 +105,44 @@ def test_goals_are_refused_until_recovered_and_run_from_where_the_robot_stands(
     assert run_out(stopped).code == ErrorCode.SUCCESSFUL
 
 
-def test_pressing_it_at_rest_only_closes_the_brakes(make):
-    simulation = make("pybullet")
+@pytest.mark.parametrize(("load", "least", "most"), [("none", 1e-4, 5e-3), ("cell", 5e-3, 3e-2)])
+def test_pressing_it_at_rest_lets_the_arm_sag_until_the_brakes_hold_it(make, load, least, most):
+    simulation = make("pybullet", load)
     simulation.run(0.1)
+    before = simulation.tool.position(simulation.backend.q)
+    simulation.plc.set_bit("emergency_stop", True)
+    simulation.run(0.3)
+    assert simulation.modes.mode is Mode.EMERGENCY_STOP
+    sag = before - simulation.tool.position(simulation.backend.q)
+    assert least < sag[2] < most
+    assert np.linalg.norm(sag) == pytest.approx(simulation.safety.emergency.excursion, rel=1e-6)
+    assert not simulation.backend.qd.any()
+    assert not simulation.outputs().alarm_stop
+
+
+def test_closed_brakes_don_t_sag(make):
+    simulation = make("pybullet")
+    simulation.plc.set_bit("drives_off", True)
+    simulation.run(2.0)
+    assert simulation.modes.mode is Mode.STAND_ON_BRAKES
     q = simulation.backend.q.copy()
     simulation.plc.set_bit("emergency_stop", True)
     simulation.run(0.2)
     assert simulation.modes.mode is Mode.EMERGENCY_STOP
-    assert np.abs(simulation.backend.q - q).max() < 1e-9
-    assert not simulation.outputs().alarm_stop
+    assert np.array_equal(simulation.backend.q, q)
+
+
+def test_brakes_that_act_at_once_stop_sooner(make, plan, start, home):
+    stops = []
+    for reaction in (0.0, 0.05):
+        simulation = make("pybullet", supervision=SupervisionSettings(brake_reaction=reaction))
+        start(simulation, plan(2.5, home, home + np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0])))
+        simulation.run(1.25)
+        q, speed = simulation.backend.q[0], simulation.backend.qd[0]
+        simulation.plc.set_bit("emergency_stop", True)
+        simulation.run(1.0)
+        stops.append(simulation.backend.q[0] - q)
+    assert stops[1] - stops[0] == pytest.approx(0.05 * speed, rel=0.2)  # friction brakes a little meanwhile
 
 
 def test_physics_that_fail_stop_the_robot_and_recover_starts_them_again(make, plan, start, home, monkeypatch):

@@ -97,7 +97,7 @@ def test_beyond_a_limit_it_is_stopped_and_can_only_be_driven_back(beyond: float)
     outside = simulation.backend.q.copy()
     outside[0] = robot.position_max[0] + beyond
     moved_to(simulation, outside)
-    simulation.run(0.05)
+    simulation.run(0.3)
     assert "joint_a1 is at" in simulation.fault
     assert is_stopped(simulation)
     simulation.recover()

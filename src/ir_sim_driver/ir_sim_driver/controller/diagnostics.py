@@ -62,7 +62,7 @@ def _controller(simulation: Simulation) -> Entry:
             "mode": mode.name,
             "operating mode": simulation.plc.operating_mode.name,
             "time to target [s]": f"{simulation.modes.time_to_target:.3f}",
-            "emergency stop left the path by [mm]": f"{simulation.emergency.excursion * 1e3:.2f}",
+            "emergency stop left the path by [mm]": f"{simulation.safety.emergency.excursion * 1e3:.2f}",
         },
     )
 

@@ -1,6 +1,7 @@
-"""The emergency stop: brakes with all they have, off the path if need be, and how far off it was.
+"""The emergency stop (STOP 0): motors off, then brakes with all they have, off the path if need be.
 
-Nobody follows the command any more; afterwards it is where the robot stands, so nothing can jump or resume.
+Between the two lies the brakes' reaction time, in which the arm rolls on and sags. Nobody follows the command
+any more; afterwards it is where the robot stands, so nothing can jump or resume.
 """
 
 from __future__ import annotations
@@ -16,32 +17,47 @@ _STANDS = 1e-9  # rad/s; the brakes bring the speed to zero within a step
 
 
 class EmergencyStop:
-    """Stops `backend` and drops what `executor` does. excursion [m]: how far the last stop left its path."""
+    """Stops `backend` and drops what `executor` does; reaction: steps until the brakes act.
 
-    def __init__(self, backend: Backend, executor: Executor, tool: ToolPoint, notices: Notices) -> None:
+    excursion [m]: how far the tool left its path, or its place, in the last stop.
+    """
+
+    def __init__(
+        self, backend: Backend, executor: Executor, tool: ToolPoint, notices: Notices, reaction: int
+    ) -> None:
         self._backend, self._executor, self._tool, self._notices = backend, executor, tool, notices
+        self._reaction, self._open = reaction, 0
         self._running: Excursion | None = None
         self.excursion = 0.0
 
-    def start(self, sentence: str, standing: bool) -> None:
-        """Close the brakes; the goal that runs ends with this sentence."""
+    def start(self, sentence: str, braked: bool) -> None:
+        """Switch the motors off; the goal ends with this sentence. braked: the brakes are closed."""
         executor, q = self._executor, self._backend.q
-        self._running = None if standing else Excursion(self._tool, executor.path, executor.path_parameter, q)
+        self._running = None if braked else Excursion(self._tool, executor.path, executor.path_parameter, q)
+        self._open = 0 if braked else self._reaction
         executor.drop(sentence)
-        if standing:
-            executor.hold(q)
+        executor.hold(q)
 
     def step(self) -> None:
-        """Make a step of dt with the brakes."""
+        """Make a step of dt: coast while the brakes react, brake, then rest."""
         backend = self._backend
-        if not backend.qd.any():
+        if self._open > 0:
+            self._open -= 1
+            backend.coast()
+            self._visit()
+        elif backend.qd.any():
+            backend.brake()
+            self._visit()
+            if np.abs(backend.qd).max() < _STANDS:
+                self._stopped()
+        else:
             backend.rest()
-            return
-        backend.brake()
+            if self._running is not None:
+                self._stopped()
+
+    def _visit(self) -> None:
         if self._running is not None:
-            self._running.add(backend.q)
-        if np.abs(backend.qd).max() < _STANDS:
-            self._stopped()
+            self._running.add(self._backend.q)
 
     def _stopped(self) -> None:
         self._backend.reset(self._backend.q)

@@ -5,11 +5,13 @@ A stop is latched: it lasts until somebody recovers, who moves and resumes nothi
 
 from __future__ import annotations
 
+from ir_description import RobotModel
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.emergency import EmergencyStop
+from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.supervision import Command, Fault, Supervision
 from ir_sim_driver.errors import BackendError, RequestRefusedError
-from ir_sim_driver.motion import ErrorCode, Executor
+from ir_sim_driver.motion import ErrorCode, Executor, ToolPoint
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend
 from ir_sim_driver.plc import Plc
@@ -20,15 +22,18 @@ class Safety:
 
     def __init__(
         self,
+        robot: RobotModel,
         backend: Backend,
         executor: Executor,
+        tool: ToolPoint,
         plc: Plc,
-        emergency: EmergencyStop,
-        supervision: Supervision,
         notices: Notices,
+        settings: SimulationSettings,
     ) -> None:
         self._backend, self._executor, self._plc, self._notices = backend, executor, plc, notices
-        self._supervision, self._emergency = supervision, emergency
+        self._supervision = Supervision(robot, settings.dt, settings.supervision)
+        reaction = round(settings.supervision.brake_reaction / settings.dt)
+        self.emergency = EmergencyStop(backend, executor, tool, notices, reaction)
         self._broken = False  # the physics gave up: only `recover` touches them
         self.fault = ""
 
@@ -47,11 +52,11 @@ class Safety:
         if self._broken:
             self._backend.rest()
         else:
-            self._emergency.step()
+            self.emergency.step()
 
-    def entered(self, standing: bool) -> None:
-        """The controller is in EMERGENCY_STOP from now on."""
-        self._emergency.start(self.fault or "emergency stop", standing)
+    def entered(self, braked: bool) -> None:
+        """The controller is in EMERGENCY_STOP from now on; braked: the brakes are closed already."""
+        self.emergency.start(self.fault or "emergency stop", braked)
 
     def supervise(self, motors_on: bool, tube: float) -> None:
         """Look at the robot after a step; tube [m]: how far the tool may be from its command."""

@@ -13,15 +13,14 @@ import numpy as np
 from ir_description import Cell, PowerData
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
+from ir_msgs_py.modes import OFF_THE_NETWORK, READY, Mode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
-from ir_sim_driver.controller.emergency import EmergencyStop
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.controller.supervision import PERIOD, Supervision
+from ir_sim_driver.controller.supervision import PERIOD
 from ir_sim_driver.controller.vetting import VettedGoal, vet
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion import (
@@ -67,9 +66,7 @@ class Simulation:
         self.modes, self.pauses = self.control.modes, self.control.pauses
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
         self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)
-        self.emergency = EmergencyStop(backend, self.executor, self.tool, self.notices)
-        supervision = Supervision(self.robot, settings.dt, settings.supervision)
-        self.safety = Safety(backend, self.executor, self.plc, self.emergency, supervision, self.notices)
+        self.safety = Safety(self.robot, backend, self.executor, self.tool, self.plc, self.notices, settings)
         self._carry(load)
         self.steps = 0
         self.speed_scaling = 1.0
@@ -271,7 +268,7 @@ class Simulation:
 
     def _mode_changed(self, before: Mode, now: Mode) -> None:
         if now is Mode.EMERGENCY_STOP:
-            self.safety.entered(self._standing())
+            self.safety.entered(before not in READY)
         elif before is Mode.EMERGENCY_STOP:
             self.executor.hold(self.backend.q)
         if now in OFF_THE_NETWORK:

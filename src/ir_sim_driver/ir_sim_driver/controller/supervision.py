@@ -57,6 +57,15 @@ class SupervisionSettings:
         read_only=True,
     )
 
+    brake_reaction: float = setting(
+        0.05,
+        "How long the brakes take to act when the motors are switched off (an estimate).",
+        unit="s",
+        minimum=0.0,
+        maximum=0.5,
+        read_only=True,
+    )
+
     def __post_init__(self) -> None:
         check_settings(self)
 

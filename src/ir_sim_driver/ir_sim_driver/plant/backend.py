@@ -1,7 +1,7 @@
 """The port between the controller and a robot, and what a robot did with its motors.
 
-Three kinds of steps of length dt: the motors follow a command (`track`), the mechanical brakes act
-(`brake`), or the brakes are closed and nothing moves (`rest`).
+Four kinds of steps of length dt: the motors follow a command (`track`), nothing but gravity and friction acts
+(`coast`), the mechanical brakes act (`brake`), or the brakes are closed and nothing moves (`rest`).
 """
 
 from __future__ import annotations
@@ -59,6 +59,9 @@ class Backend(Protocol):
 
     def track(self, q_next: FloatArray) -> None:
         """Make a step of dt: the motors follow the command, which is q_next (n,) at the end of the step."""
+
+    def coast(self) -> None:
+        """Make a step of dt without motor torque, the mechanical brakes still open."""
 
     def brake(self) -> None:
         """Make a step of dt without motor torque, the mechanical brakes closing."""

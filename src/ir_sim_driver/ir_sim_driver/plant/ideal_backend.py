@@ -69,6 +69,12 @@ class IdealBackend:
         """Be at q_next after the step."""
         self._go(q_next, True)
 
+    def coast(self) -> None:
+        """Fall and roll on as gravity, friction and counterbalance will have it."""
+        speed = (self.q - self._before) / self._dt
+        free = self._dynamics.forward_dynamics(self.q[None], speed[None], np.zeros((1, len(speed))))[0]
+        self._go(self.q + self._dt * (speed + self._dt * free), False)
+
     def brake(self) -> None:
         """Slow every joint down by what its brake can do in one step."""
         speed = (self.q - self._before) / self._dt

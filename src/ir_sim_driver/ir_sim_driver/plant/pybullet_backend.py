@@ -133,6 +133,15 @@ class PyBulletBackend:
         self.torque, self.saturated = torque, cut
         self._advance(links)
 
+    def coast(self) -> None:
+        """Fall and roll on as gravity, friction and counterbalance will have it."""
+        if self._stale:
+            self._write_state()
+        links, _ = self._driven(self._still, self._drives.resistance(self.q, self._speed))
+        self.torque, self.saturated = self._still, False
+        self._advance(links)
+        self._follower.reset(self.q)
+
     def brake(self) -> None:
         """Take the torque that stops each joint within this step, as far as its brake can."""
         resistance = self._drives.resistance(self.q, self._still)
