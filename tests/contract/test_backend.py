@@ -154,7 +154,8 @@ def test_coasting_takes_no_torque_and_lets_the_arm_sag(backend: Backend, cell: C
     for _ in range(50):
         backend.coast()
     sag = backend.q - home(cell)
-    assert 1e-3 < sag[1] < 0.1  # A2 turns downwards
+    assert (sag[1:3] > 5e-4).all()  # both turn downwards
+    assert np.abs(sag).max() < 0.1
     assert not backend.torque.any()
     assert not backend.saturated
     assert not backend.work().torque.any()
