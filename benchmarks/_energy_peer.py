@@ -86,7 +86,7 @@ class EnergyPeer:
         return np.concatenate([states, jerk, np.repeat(bus, 2, axis=0).ravel()])
 
     def _power_function(self) -> Any:
-        """(q, qd, qdd) -> what the axes take together [W], and each joint's use of its torque (n,)."""
+        """(q, qd, qdd) -> what the axes take together [W], and shares of torque (2n,), up and down."""
         n, data, robot = self._n, self._scene.dynamics.data, self._scene.cell.robot
         q, qd, qdd = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd"))
         sin, cos = [ca.sin(q[i]) for i in range(n)], [ca.cos(q[i]) for i in range(n)]
@@ -100,7 +100,9 @@ class EnergyPeer:
             if spring is not None and spring.joint == i:
                 torque = torque - counterbalance_torque(spring, sin[i], cos[i], ca.sqrt, ca.power)
             power += torque * qd[i] + robot.copper_loss[i] * (torque / robot.gear_ratio[i]) ** 2
-            use.append(torque / self._envelope(i, speed))
+            unsure = data.coulomb[i] * (SMOOTHING / speed) ** 2  # sign(qd) is more than its smoothed value
+            limit = self._envelope(i, speed)
+            use += [(torque + unsure) / limit, (unsure - torque) / limit]
         return ca.Function("power", [q, qd, qdd], [power, ca.vertcat(*use)])
 
     def _envelope(self, joint: int, speed: Any) -> Any:
@@ -137,12 +139,16 @@ class EnergyPeer:
             "g": ca.vertcat(equal, uses),
         }
         zeros, share = np.zeros(int(equal.numel())), np.full(int(uses.numel()), TORQUE_SHARE)
-        bounds = {"lbg": np.concatenate([zeros, -share]), "ubg": np.concatenate([zeros, share])}
+        bounds = {"lbg": np.concatenate([zeros, -np.inf * share]), "ubg": np.concatenate([zeros, share])}
         return ca.nlpsol("peer", "ipopt", problem, _OPTIONS), self._box() | bounds
 
     def _along(self, X: Any, U: Any, h: Any) -> tuple[Any, Any]:
-        """Power (1, 2 MESH) W of all axes at the points of the mesh, and use of torque, one long column."""
-        powers, uses = [], []
+        """Power (1, 2 MESH) W of all axes at the points of the mesh, and use of torque there and where the
+        jerk changes, one long column.
+        """
+        n = self._n
+        _, use = self._power.map(MESH - 1)(X[:n, 1:-1], X[n : 2 * n, 1:-1], X[2 * n :, 1:-1])
+        powers, uses = [], [ca.vec(use)]
         for point in _GAUSS:
             power, use = self._power.map(MESH)(*_moved(X[:, :-1], U, point * h))
             powers.append(power)
