@@ -227,3 +227,11 @@ def test_the_page_of_interfaces_names_everything_that_the_nodes_offer() -> None:
     named = {f"{node}/{name}" for node, text in sections for name in re.findall(r"`~/(\w+)`", text)}
     offered = {value for key, value in vars(names).items() if key.isupper() and "/" in str(value)}
     assert named == {value for value in offered if not value.startswith("/")} - NOT_OFFERED_YET
+
+
+def test_decisions_are_numbered_without_a_gap_or_a_double() -> None:
+    decisions = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    numbers = [int(path.name[:4]) for path in decisions]
+    assert numbers == list(range(1, len(decisions) + 1))
+    for path in decisions:
+        assert path.read_text("utf-8").startswith(f"# {int(path.name[:4])}. ")
