@@ -18,6 +18,7 @@ from ir_planner.optimize.fixed_path import FixedPath
 from ir_planner.optimize.passing import Passing
 from ir_planner.optimize.path_timing import PathTiming, along_its_path
 from ir_planner.optimize.profile_descent import _Descent
+from ir_planner.optimize.rescaling import KEPT
 from ir_planner.optimize.terms import spline_cost
 from ir_planner.regional.regional import MovementPlan
 from ir_planner.request.context import Context
@@ -27,7 +28,7 @@ from ir_planner.timing.blending import stretched
 from ir_planner.timing.objective import objective_weights
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.torque_shares import TORQUE_SHARES
-from ir_planner.trajectories.through_points import KEPT, Reference, plan_through
+from ir_planner.trajectories.through_points import Reference, plan_through
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]

@@ -2,16 +2,20 @@
 
 from ir_planner.optimize.descents import Descents, path_of
 from ir_planner.optimize.movement_over import movement_over
-from ir_planner.optimize.path_timing import PathTiming, along_its_path
+from ir_planner.optimize.path_timing import QUICK_TIMING, PathTiming, TimingEffort, along_its_path
 from ir_planner.optimize.portfolio import Portfolio
 from ir_planner.optimize.refinement import Refinement
+from ir_planner.optimize.rescaling import rescaled
 
 __all__ = [
+    "QUICK_TIMING",
     "Descents",
     "PathTiming",
     "Portfolio",
     "Refinement",
+    "TimingEffort",
     "along_its_path",
     "movement_over",
     "path_of",
+    "rescaled",
 ]

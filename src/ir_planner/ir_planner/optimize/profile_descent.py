@@ -21,7 +21,6 @@ from ir_planner.timing import objective_weights
 
 Function = Callable[[Any], tuple[float, FloatArray]]  # Any: SciPy hands over vectors of its own type
 _SPARSE = 40  # places of the path for the weight of an objective
-_EVALUATIONS = 250
 _MEMORY = 16  # pairs of L-BFGS: more of them gain nothing here
 _PATIENCE, _GAIN = 10, 1e-5  # so many steps must gain so much of the value together
 _BENDING = 0.03  # weight of the jerk of s in the metric
@@ -30,21 +29,29 @@ _FARTHEST = 10.0  # scales of s, and of the logarithm of the duration, in one de
 
 
 def optimised_profile(
-    path: FixedPath, s: FloatArray, duration: float, limits: MotionLimits, stiffness: float, context: Context
+    path: FixedPath,
+    s: FloatArray,
+    duration: float,
+    limits: MotionLimits,
+    effort: tuple[float, int],
+    context: Context,
 ) -> tuple[FloatArray, float, int]:
     """s (count - 3,) at the inner knots, duration [s] and evaluations, from a profile s and its duration,
-    which stays where the request has one. stiffness: of penalties, against the power that the objective is
-    about.
+    which stays where the request has one. effort: stiffness of penalties, against the power that the
+    objective is about, and evaluations.
     """
     descent = _Descent(path, s, duration, context.options.duration > 0.0)
     weights = objective_weights(context, path.q[::_SPARSE])
+    stiffness, most = effort
     cost = spline_cost(context, limits, weights, stiffness * weights.power)
-    x, evaluations = _minimised(lambda x: descent.value(x, cost), np.zeros(len(s) + 1))
+    x, evaluations = _minimised(lambda x: descent.value(x, cost), np.zeros(len(s) + 1), most)
     return *descent.at(x), evaluations
 
 
-def _minimised(function: Function, x: FloatArray) -> tuple[FloatArray, int]:
-    """The lowest point (N,) that L-BFGS-B finds from x (N,), and its evaluations."""
+def _minimised(function: Function, x: FloatArray, most: int) -> tuple[FloatArray, int]:
+    """The lowest point (N,) that L-BFGS-B finds from x (N,) in at most so many evaluations, and their
+    number.
+    """
     values: list[float] = []
 
     def gains(intermediate_result: OptimizeResult) -> None:
@@ -61,8 +68,8 @@ def _minimised(function: Function, x: FloatArray) -> tuple[FloatArray, int]:
         callback=gains,
         options={
             "maxcor": _MEMORY,
-            "maxfun": _EVALUATIONS,
-            "maxiter": _EVALUATIONS,
+            "maxfun": most,
+            "maxiter": most,
             "ftol": 0.0,
             "gtol": 0.0,
         },

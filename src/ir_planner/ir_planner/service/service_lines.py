@@ -14,7 +14,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_description import Station
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
-from ir_planner.optimize import movement_over
+from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import Movement, best_stretch, stretched, time_spline, within_torque
@@ -117,4 +117,5 @@ def timed_service(line: ServiceLine, entry: bool, context: Context) -> Movement:
         return movement_over(points, context)
     if violation is not None and violation.what != "torque":
         raise TimingError(violation.sentence, 0)
-    return movement
+    better = rescaled(movement, context, QUICK_TIMING)
+    return better if better is not None and better.cost < movement.cost else movement

@@ -17,7 +17,7 @@ from ir_msgs_py.status import Status, StatusCode
 
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.errors import RequestError, TimingError
-from ir_planner.optimize import along_its_path
+from ir_planner.optimize import rescaled
 from ir_planner.regional import MovementPlan
 from ir_planner.request import DURATION_MAX, Context, Work, bounded, within_limits
 from ir_planner.scene import MotionLimits, PlanningScene
@@ -35,7 +35,6 @@ from ir_planner.timing import (
 )
 
 POINTS_MAX = 1000
-KEPT = 1e-3  # rad by which a time scaling may leave its path
 _AT_STOPS = ("clearance", "position")  # violations that straight steps avoid
 
 
@@ -149,41 +148,18 @@ def _best_along(points: FloatArray, context: Context, notes: list[str]) -> Movem
     by_rules = _in_proportion(points, None, hurry)
     if by_rules.violation is not None:
         return by_rules
-    quickest = _rescaled(by_rules, hurry)
+    quickest = rescaled(by_rules, hurry)
     best = by_rules
     if quickest is not None and quickest.trajectory.duration < by_rules.trajectory.duration:
         notes.append(_note(by_rules, quickest))
         best = quickest
     best = Movement(points, at_best_duration(best.trajectory, context), context)
     if context.options.duration > 0.0 or context.options.objective in ("energy", "time_and_energy"):
-        rescaled = _rescaled(by_rules, context)
-        if rescaled is not None and rescaled.coarse_energy_cost < best.coarse_energy_cost:
-            notes.append(_note(best, rescaled))
-            best = rescaled
+        better = rescaled(by_rules, context)
+        if better is not None and better.coarse_energy_cost < best.coarse_energy_cost:
+            notes.append(_note(best, better))
+            best = better
     return best
-
-
-def _rescaled(movement: Movement, context: Context) -> Movement | None:
-    """The certified movement with the best time scaling along a movement's path; None where there is none, or
-    no work left for it.
-    """
-    journal = context.journal
-
-    def along(limits: MotionLimits) -> Movement | None:
-        if context.work.exhausted:
-            return None
-        found = along_its_path(movement.trajectory, movement.path, limits, context)
-        if found is None or found.deviation > KEPT:
-            journal.reject("no better time scaling along the path")
-            return None
-        kept = f"within {found.deviation * 1e3:.2f} mrad of its path"
-        return Movement(movement.path, found.trajectory, context, kept)
-
-    found = within_torque(along, context)
-    if found is not None and found.violation is not None:
-        journal.reject(f"a time scaling along the path isn't certified: {found.violation.what}")
-        return None
-    return found
 
 
 def _note(before: Movement, after: Movement) -> str:
