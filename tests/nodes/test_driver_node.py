@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from pymodbus.client import ModbusTcpClient
+from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
@@ -20,6 +21,7 @@ from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, Sta
 from ir_msgs_py import names
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.node import SimDriver
@@ -277,3 +279,23 @@ def test_faster_than_real_time_the_driver_is_the_clock(make_driver, listen, wait
     assert (np.diff(stamps) == 2_000_000).all()
     ticks = {msg.clock.sec * 1_000_000_000 + msg.clock.nanosec for msg in clock}
     assert len(ticks & set(stamps.tolist())) > 100
+
+
+def test_a_movement_whose_client_has_gone_is_stopped_on_its_path(
+    make_driver, ros_node, ros_executor, wait_for, listen
+):
+    driver = make_driver(client_timeout=0.3)
+    diagnostics = listen(names.DIAGNOSTICS, DiagnosticArray)
+    client = ros_executor.run(lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY))
+    wait_for(client.server_is_ready, timeout=20.0)
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(step=0.4, duration=20.0)))
+    accepted = ros_executor.run(lambda: client.send_goal_async(goal))
+    wait_for(accepted.done, timeout=20.0)
+    wait_for(lambda: driver._driver.moving, timeout=20.0)
+    ros_executor.run(client.destroy)
+    wait_for(lambda: not driver._driver.moving, timeout=15.0, what="the movement stops")
+
+    def said():
+        return any("no client" in status.message for msg in diagnostics for status in msg.status)
+
+    wait_for(said, timeout=20.0)

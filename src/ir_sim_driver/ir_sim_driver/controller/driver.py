@@ -106,6 +106,13 @@ class Driver:
         with self._lock:
             self._goals.cancel(ticket)
 
+    def abandon(self, ticket: int, sentence: str) -> None:
+        """Stop a goal along its path, if it runs, because its sender has gone."""
+        with self._lock:
+            if self._goals.runs(ticket):
+                self._simulation.notices.add(Level.WARN, sentence)
+                self._simulation.abort(f"{sentence}; stopped on the path")
+
     def abort(self, sentence: str) -> None:
         """Stop whatever runs along its path, with this warning."""
         with self._lock:

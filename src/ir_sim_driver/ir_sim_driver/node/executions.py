@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
 
@@ -22,18 +23,41 @@ class Executing(Protocol):
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""
 
+    def count_subscribers(self, topic: str) -> int:
+        """Subscriptions to a topic in the graph."""
+
     def now_msg(self) -> Any:
         """Present time of the node's clock, as a message."""
+
+
+class ClientWatch:
+    """Whether the clients of an action have been gone for `timeout` [s]; 0: never."""
+
+    def __init__(self, timeout: float) -> None:
+        self._timeout, self._seen = timeout, time.monotonic()
+
+    def gone(self, clients: int) -> bool:
+        """Look at the number of clients now."""
+        if clients > 0:
+            self._seen = time.monotonic()
+        return 0.0 < self._timeout < time.monotonic() - self._seen
 
 
 FEEDBACK_PERIOD = 0.05  # s: 20 Hz, enough for a person or a progress bar
 
 
 class Executions:
-    """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, on `driver`."""
+    """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, called `name`, on `driver`.
 
-    def __init__(self, driver: Driver, node: Executing, action_type: Any) -> None:
+    client_timeout [s]: how long a movement goes on when the action has no client any more; 0: to its end.
+    """
+
+    def __init__(
+        self, driver: Driver, node: Executing, action_type: Any, name: str, client_timeout: float
+    ) -> None:
         self._driver, self._node, self._type = driver, node, action_type
+        self._feedback_topic = f"{name}/_action/feedback"  # every client subscribes to it
+        self._client_timeout = client_timeout
         self._tickets: dict[bytes, int] = {}
         self._canceled: set[bytes] = set()
 
@@ -51,7 +75,15 @@ class Executions:
         self._tickets[key] = ticket
         if key in self._canceled:  # before it was submitted
             self._driver.cancel(ticket)
-        end_feedback = self._node.every(FEEDBACK_PERIOD, lambda: self._publish_feedback(handle, ticket))
+        watch = ClientWatch(self._client_timeout)
+
+        def report() -> None:
+            self._publish_feedback(handle, ticket)
+            if watch.gone(self._node.count_subscribers(self._feedback_topic)):
+                seconds = self._client_timeout
+                self._driver.abandon(ticket, f"the action has had no client for {seconds:g} s")
+
+        end_feedback = self._node.every(FEEDBACK_PERIOD, report)
         outcome: Outcome = await _awaitable(done)
         end_feedback()
         self._tickets.pop(key, None)

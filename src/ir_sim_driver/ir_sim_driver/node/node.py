@@ -137,7 +137,9 @@ class SimDriver(Node):
         self.create_service(SetLoad, names.SET_LOAD, answers.set_load)
 
     def _serve_action(self, action_type: Any, name: str) -> ActionServer:
-        executions = Executions(self._driver, self, action_type)
+        executions = Executions(
+            self._driver, self, action_type, name, self._configuration.node.client_timeout
+        )
 
         def cancel(handle: Any) -> CancelResponse:
             executions.cancel(handle)

@@ -37,6 +37,14 @@ class NodeSettings:
         maximum=1000,
         read_only=True,
     )
+    client_timeout: float = setting(
+        2.0,
+        "How long a movement goes on when no client of its action is left in the graph; 0: to its end.",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+        read_only=True,
+    )
     real_time_factor: float = setting(
         1.0,
         "How much faster than real time the plant runs; other than 1, the node publishes /clock.",
