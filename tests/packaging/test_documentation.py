@@ -235,3 +235,15 @@ def test_decisions_are_numbered_without_a_gap_or_a_double() -> None:
     assert numbers == list(range(1, len(decisions) + 1))
     for path in decisions:
         assert path.read_text("utf-8").startswith(f"# {int(path.name[:4])}. ")
+
+
+def test_extending_names_every_promise_that_a_contract_asks_for() -> None:
+    """Tests of the suites themselves (`..._is_noticed`, `..._notices_...`) promise nothing."""
+    page = (ROOT / "docs" / "extending.md").read_text("utf-8")
+    asked = {
+        f"{path.name}::{test}"
+        for path in (ROOT / "tests" / "contract").glob("test_*.py")
+        for test in re.findall(r"^def (test_\w+)", path.read_text("utf-8"), re.MULTILINE)
+        if "notice" not in test
+    }
+    assert {each for each in asked if each not in page} == set()
