@@ -17,7 +17,8 @@ MODULES = {
     names.PLANNER: ["ir_planner.node"],
     names.SIM_DRIVER: ["ir_sim_driver.node", "--ros-args", "-p", "cell:=open", "-p", "wake_port:=0"],
     names.PROGRAM_RUNNER: ["ir_program_runner.node"],
-    names.RECORDER: ["ir_recorder.node", "FILE", "--root", "/"],
+    names.RECORDER: ["ir_recorder.node"],
+    "ir_record": ["ir_recorder.node", "FILE", "--root", "/"],
     "ir_play": ["ir_recorder.play.node", "FILE", "--root", "/", "--loop", "--delay", "60"],
 }
 INT, TERM = signal.SIGINT, signal.SIGTERM
@@ -68,7 +69,7 @@ def test_a_node_that_is_asked_to_end_ends_well(name, signals, recording, tmp_pat
         process.kill()
         assert process.stderr is not None
         process.stderr.close()
-    if name == names.RECORDER:
+    if name == "ir_record":
         from ir_recorder.read.raw import read_raw
 
         assert read_raw(file).problems == ()

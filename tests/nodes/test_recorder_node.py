@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import rclpy
 import yaml
+from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -277,3 +281,50 @@ def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wai
     assert process.returncode == 0, said
     assert read_raw(path).problems == ()
     assert read_raw(path).fact("version")
+
+
+def test_ir_record_ends_with_1_when_the_disk_is_full(
+    tmp_path: Path, ros_domain_id: int, wait_for: Any
+) -> None:
+    """A limit on the size of files stands for the full disk."""
+    path = tmp_path / "full.mcap"
+    environment = {
+        **os.environ,
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": str(ros_domain_id),
+    }
+    command = [
+        sys.executable,
+        "-m",
+        "ir_recorder.node",
+        str(path),
+        "--root",
+        str(tmp_path),
+        "--topics",
+        "/text",
+    ]
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain_id)
+    node = Node("talker", context=context)
+    publisher = node.create_publisher(String, "/text", 10)
+    process = subprocess.Popen(
+        command,
+        env=environment,
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
+    )
+    text = "".join(chr(33 + int(k)) for k in np.random.default_rng(0).integers(0, 90, 400_000))
+    try:
+        wait_for(lambda: publisher.get_subscription_count() or process.poll() is not None, timeout=30.0)
+        assert node.get_service_names_and_types_by_node("ir_record", "/")
+        offered = [name for name, _ in node.get_service_names_and_types_by_node("ir_record", "/")]
+        assert "/ir_record/start" not in offered
+        wait_for(lambda: publisher.publish(String(data=text)) or process.poll() is not None, timeout=30.0)
+        _, errors = process.communicate(timeout=20.0)
+    finally:
+        process.kill()
+        node.destroy_node()
+        context.try_shutdown()
+    assert process.returncode == 1
+    assert b"File too large" in errors
+    assert b"Traceback" not in errors

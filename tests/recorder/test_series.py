@@ -24,3 +24,8 @@ def test_quantised_numbers_keep_half_a_step() -> None:
     values = np.linspace(-6.2, 6.2, 1001)
     back = np.frombuffer(base64.b64decode(quantised(values, 2e-4)), dtype="<i2") * 2e-4
     assert np.abs(back - values).max() <= 1.0001e-4
+
+
+def test_values_beyond_the_range_are_clipped() -> None:
+    back = np.frombuffer(base64.b64decode(quantised([np.inf, -1e308, np.nan, 2.0], 1e-3)), dtype="<i2")
+    assert back.tolist() == [32767, -32768, 0, 2000]

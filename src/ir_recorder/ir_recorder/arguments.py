@@ -11,3 +11,14 @@ def add_roots(parser: argparse.ArgumentParser) -> None:
     """Adds --root: the folders below which files are read and written."""
     where = f"folder below which files may be (repeatable; else {ENVIRONMENT}, else the working folder)"
     parser.add_argument("--root", action="append", default=[], dest="roots", metavar="DIR", help=where)
+
+
+def record_parser() -> argparse.ArgumentParser:
+    """Arguments of `ir-record`."""
+    parser = argparse.ArgumentParser(prog="ir-record", description="Records a cell into one MCAP file.")
+    parser.add_argument("path", nargs="?", default="", help="file to write; none: wait for ~/start")
+    parser.add_argument("--overwrite", action="store_true", help="replace a recording")
+    parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
+    parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
+    add_roots(parser)
+    return parser

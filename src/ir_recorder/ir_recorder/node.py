@@ -7,7 +7,6 @@ the node.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -21,7 +20,7 @@ from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import StatusCode
-from ir_recorder.arguments import add_roots
+from ir_recorder.arguments import record_parser
 from ir_recorder.diagnose.node import RecorderDiagnostics
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
 from ir_recorder.format import contents
@@ -35,6 +34,7 @@ from ir_recorder.write.cell_files import files_of_cell
 from ir_recorder.write.session import CellFiles, RecordingSession
 from ir_recorder.write.writer import RecordingSummary, RecordingWriter
 
+COMMAND_NODE = "ir_record"  # beside the cell's own recorder
 POLL_PERIOD = 0.02  # s: 10 joint states at a time; waking for each takes a third of a core
 OpenWriter = Callable[[str, bool, FileRoots], RecordingWriter]
 
@@ -48,9 +48,13 @@ class RecorderNode(Node):
     """Records while a session is open; looks for new topics several times a second."""
 
     def __init__(
-        self, settings: RecorderSettings | None = None, writer: OpenWriter = open_writer, **options: Any
+        self,
+        settings: RecorderSettings | None = None,
+        writer: OpenWriter = open_writer,
+        name: str = names.RECORDER,
+        **options: Any,
     ) -> None:
-        super().__init__(names.RECORDER, **options)
+        super().__init__(name, **options)
         self._settings = settings or declared_settings(self)
         self._open_writer = writer
         self._session: RecordingSession | None = None
@@ -63,8 +67,9 @@ class RecorderNode(Node):
             self, lambda name, text: self._write(lambda session: session.attach(name, text, self._now()))
         )
         self._diagnostics = RecorderDiagnostics(self)
-        self.create_service(StartRecording, "~/start", self._on_start)
-        self.create_service(StopRecording, "~/stop", self._on_stop)
+        if name == names.RECORDER:  # a command's own recording is no service of the cell
+            self.create_service(StartRecording, "~/start", self._on_start)
+            self.create_service(StopRecording, "~/stop", self._on_stop)
         self.create_timer(self._settings.discovery_period, self._discover)
         self.create_timer(POLL_PERIOD, self._collect)
         self.create_timer(1.0, self._each_second)
@@ -269,16 +274,12 @@ def _without_publisher(topics: Sequence[str], when: str) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """`ir-record PATH [--overwrite] [--topics ...] [--cell NAME]`: records until SIGINT or SIGTERM."""
     everything = sys.argv[1:] if arguments is None else list(arguments)
-    parser = argparse.ArgumentParser(prog="ir-record", description="Records a cell into one MCAP file.")
-    parser.add_argument("path", nargs="?", default="", help="file to write; none: wait for ~/start")
-    parser.add_argument("--overwrite", action="store_true", help="replace the file")
-    parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
-    parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
-    add_roots(parser)
-    options = parser.parse_args(remove_ros_args(["ir-record", *everything])[1:])
+    options = record_parser().parse_args(remove_ros_args(["ir-record", *everything])[1:])
+
+    recorders: list[RecorderNode] = []
 
     def start() -> RecorderNode:
-        node = RecorderNode()
+        recorders.append(node := RecorderNode(name=COMMAND_NODE) if options.path else RecorderNode())
         try:
             if options.path:
                 roots = FileRoots.of(options.roots) if options.roots else None
@@ -288,7 +289,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         return node
 
-    return run_node("ir-record", start, everything, refusals=(RecorderError, MsgsError))
+    def fails() -> bool:
+        return bool(options.path) and any(node.failure for node in recorders)
+
+    refusals = (RecorderError, MsgsError)
+    code = run_node("ir-record", start, everything, refusals=refusals, goes_on=lambda node: not fails())
+    return 1 if fails() else code
 
 
 if __name__ == "__main__":

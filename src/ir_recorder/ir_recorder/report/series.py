@@ -41,8 +41,8 @@ def floats(values: ArrayLike) -> str:
 
 def quantised(values: ArrayLike, step: float) -> str:
     """An array (...) as int16 multiples of `step`, little endian, in base64; clipped to its range."""
-    counts = np.clip(np.rint(np.nan_to_num(np.asarray(values, dtype=float)) / step), -32768, 32767)
-    return _base64(counts.astype("<i2"))
+    kept = np.clip(np.nan_to_num(np.asarray(values, dtype=float)), -32768 * step, 32767 * step)
+    return _base64(np.rint(kept / step).astype("<i2"))
 
 
 def indices(values: ArrayLike) -> str:
