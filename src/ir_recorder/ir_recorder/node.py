@@ -55,8 +55,7 @@ class RecorderNode(Node):
         **options: Any,
     ) -> None:
         super().__init__(name, **options)
-        self._settings = settings or declared_settings(self)
-        self._open_writer = writer
+        self._settings, self._open_writer = settings or declared_settings(self), writer
         self._session: RecordingSession | None = None
         self._selection = TopicSelection()
         self._listener = Listener(self, self._settings.depth)
