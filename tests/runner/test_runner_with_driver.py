@@ -44,7 +44,7 @@ def client(ros_context, ros_executor):
         driver = driver_executor.add_node(SimDriver(context=ros_context, parameter_overrides=settings))
 
         def send(packet, address, port):
-            send_packet(packet, address, driver.wake_port)
+            send_packet(packet, address, driver.port_of("wake_on_lan"))
 
         runner = ProgramRunnerNode(send, context=ros_context)
         ros_executor.add_node(runner)
