@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ir_kernels import DynamicsModel, Gradients
 from ir_msgs_py.arrays import FloatArray
 
 
@@ -169,4 +170,16 @@ def random_chain(rng: np.random.Generator, n: int) -> RobotLiteral:
         copper_loss=np.full(n, 0.5),
         envelope_speed=np.tile([1.0, 2.0], (n, 1)),
         envelope_torque=np.tile([1000.0, 900.0, 500.0], (n, 1)),
+    )
+
+
+def power_gradients(model: DynamicsModel, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Gradients:
+    """Derivatives (N, n, n) of the axes' power at the DC bus along a motion (N, n)."""
+    torque, of = model.inverse_dynamics(q, qd, qdd), model.torque_gradients(q, qd, qdd)
+    data = model.data
+    per_torque = (qd + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)[:, :, None]
+    return Gradients(
+        per_torque * of.q,
+        per_torque * of.qd + torque[:, :, None] * np.eye(model.n),
+        per_torque * of.qdd,
     )

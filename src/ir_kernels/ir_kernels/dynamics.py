@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
-from ir_kernels.arguments import checked, finite, same_length, shaped
+from ir_kernels.arguments import finite, same_length, shaped
 from ir_kernels.dynamics_data import STANDARD_GRAVITY, dynamics_data
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
@@ -125,18 +125,6 @@ class DynamicsModel:
         constant.
         """
         return Gradients(*self._run("torque_gradients", q=q, qd=qd, qdd=qdd))
-
-    def power_gradients(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Gradients:
-        """Derivatives of `drive_power`, W per rad, rad/s, rad/s^2."""
-        torque = self.inverse_dynamics(q, qd, qdd)
-        of = self.torque_gradients(q, qd, qdd)
-        speed = checked("qd", qd, None, self.n)
-        per_torque = (speed + 2.0 * self.data.copper_loss / self.data.gear_ratio**2 * torque)[:, :, None]
-        return Gradients(
-            per_torque * of.q,
-            per_torque * of.qd + torque[:, :, None] * np.eye(self.n),
-            per_torque * of.qdd,
-        )
 
     def torque_bounds(
         self,

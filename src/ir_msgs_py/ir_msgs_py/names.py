@@ -12,9 +12,6 @@ JOINT_NAMES: Final = ("joint_a1", "joint_a2", "joint_a3", "joint_a4", "joint_a5"
 
 WORLD_FRAME: Final = "cell"
 BASE_FRAME: Final = "base_link"
-FLANGE_FRAME: Final = "flange"
-TOOL_FRAME: Final = "tool0"
-TCP_FRAME: Final = "tcp"
 
 PLANNER: Final = "ir_planner"
 SIM_DRIVER: Final = "ir_sim_driver"

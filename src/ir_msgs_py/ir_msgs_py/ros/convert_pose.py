@@ -24,7 +24,8 @@ NORM_TOLERANCE = 1e-3
 def pose_to_msg(T: FloatArray) -> Pose:
     """Pose (4, 4) [m]; the quaternion has w >= 0."""
     pose = read_only(T, "pose", (4, 4))
-    x, y, z, w = (float(value) for value in Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True))
+    rotation = Rotation.from_matrix(pose[:3, :3].copy())  # SciPy before 1.12 refuses read-only arrays
+    x, y, z, w = (float(value) for value in rotation.as_quat(canonical=True))
     return Pose(position=point_to_msg(pose[:3, 3]), orientation=Quaternion(x=x, y=y, z=z, w=w))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_cases import COLUMNS, OPEN, Body, box
-from robots import RobotLiteral, kr210
+from robots import RobotLiteral, kr210, power_gradients
 from spline_cases import (
     MIDDLE,
     WORKING,
@@ -140,7 +140,7 @@ def test_torque_adjoint_is_the_transpose_of_the_torque_gradients(core: Any, n: i
     found = SplineCost(collision, dynamics, t, core=core).value(control, interval)
     at = sample_times(10, interval)
     motions = [np.ascontiguousarray(along(control, interval, at, k)) for k in range(3)]
-    of = dynamics.power_gradients(*motions)
+    of = power_gradients(dynamics, *motions)
     drawn = np.where(dynamics.drive_power(*motions) > 0.0, interval / 2.0, 0.0)
     weights = [along(np.eye(10), interval, at, k) for k in range(3)]
     parts = [
