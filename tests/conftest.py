@@ -17,7 +17,7 @@ from ir_msgs_py.ros.network import apply_network
 DOMAINS = 100  # 1 to 100: the ports of higher domains lie among those that Linux hands out to clients
 
 
-# The same examples in every run, however long one takes: a red test is a change of the code, never luck or load.
+# The same examples in every run, however long one takes: a red test is a change of the code, never luck.
 # To look for new examples:
 # pytest --hypothesis-profile=default --hypothesis-seed=N
 settings.register_profile("repeatable", derandomize=True, deadline=None)
