@@ -94,7 +94,7 @@ def body_shapes(body: Body, namespace: str, colour: Colour) -> tuple[Shape, ...]
 
 
 def station_shapes(name: str, pose: FloatArray) -> tuple[Shape, ...]:
-    """The approach direction as a line, and the name."""
+    """The approach direction of a pose (4, 4) as a line, and the name."""
     tip = np.asarray(pose)[:3, 3]
     back = tip - 0.15 * np.asarray(pose)[:3, 0]
     line = Shape("stations", "line", np.eye(4), np.array([0.01, 0.0, 0.0]), PATH, np.stack([back, tip]))

@@ -41,7 +41,7 @@ def state_check(
 def end_in_collision(
     start: FloatArray, goal: FloatArray, space: FreeSpace, safety_distance: float
 ) -> Status | None:
-    """The status for a start or goal that is not free; None where both are."""
+    """The status for a start or goal (n,) that is not free; None where both are."""
     for q, what, code in (
         (start, "start", StatusCode.START_STATE_IN_COLLISION),
         (goal, "goal", StatusCode.GOAL_IN_COLLISION),

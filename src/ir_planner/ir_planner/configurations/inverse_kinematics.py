@@ -64,7 +64,7 @@ def _least_lacking(scene: PlanningScene, closest: MinDistance, threshold: FloatA
 
 
 def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configurations, what: str) -> Status:
-    """The status for a pose that no configuration reaches, or none that is free."""
+    """The status for a pose (4, 4) that no configuration reaches, or none that is free."""
     x, y, z = (float(v) for v in np.asarray(pose)[:3, 3])
     place = f"{what} at ({x:.3f}, {y:.3f}, {z:.3f}) m"
     if found.reached == 0:

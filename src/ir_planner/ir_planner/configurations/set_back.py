@@ -12,7 +12,7 @@ SECANT, LITERAL = "secant", "literal"
 
 
 def increments(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Eq. (4): dd_z [m], how much each metric distance grew in a step."""
+    """Eq. (4): dd_z (Z,) [m], how much each metric distance (Z,) grew in a step."""
     return np.asarray(after - before)
 
 

@@ -35,7 +35,7 @@ MEASURED = 9  # decimals of rad: finer than any encoder, and less than what coun
 
 @dataclass
 class LastState:
-    """The last joint_states, and when it came [s on the node's clock]; written and read by different
+    """The last joint_states (n,), and when it came [s on the node's clock]; written and read by different
     threads. look: takes what has come since the last look.
     """
 

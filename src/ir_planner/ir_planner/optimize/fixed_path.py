@@ -20,7 +20,7 @@ _NEAREST = 8  # samples per interval for the deviation
 
 
 class FixedPath:
-    """p(s), s in [0, 1], from the places that a trajectory passes."""
+    """p(s), s in [0, 1], from the points (N, n) that a trajectory passes."""
 
     def __init__(self, given: JointTrajectory, points: FloatArray) -> None:
         begin, span = float(given.times[0]), given.duration - float(given.times[0])

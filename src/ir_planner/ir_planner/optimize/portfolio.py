@@ -97,7 +97,7 @@ class Portfolio:
         return None
 
     def in_straight_steps(self, paths: list[tuple[str, FloatArray]]) -> tuple[str, Movement] | None:
-        """Straight steps with blended corners: for asynchronous joints, and where no descent was
+        """Straight steps (M, n) with blended corners: for asynchronous joints, and where no descent was
         certified.
         """
         best: tuple[str, Movement] | None = None

@@ -102,7 +102,7 @@ class Refinement:
         return self._optimised(Solution(spline, 0, np.inf, self._kept, speed), path, evaluations)
 
     def refined(self, solution: Solution, path: FloatArray, effort: Effort = QUICK) -> Movement | None:
-        """The movement that a coarse solution becomes, clearance and torque proved; None if none can be."""
+        """The movement that a coarse solution on a path (M, n) becomes, proved; None if none can be."""
         found = self._refined(solution, path, effort)
         if self.context.options.duration > 0.0:
             for speed in SPEED_MARGINS[1:]:

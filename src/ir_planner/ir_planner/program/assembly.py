@@ -60,7 +60,8 @@ def assembled(  # long: what a step does, in its order
     start: FloatArray,
     pause: MakePause,
 ) -> tuple[PlannedMovement, ...]:
-    """Movements and pauses in order. `legs`: by the step they belong to. pause: how pauses are spent.
+    """Movements and pauses in order, from start (n,). `legs`: by the step they belong to. pause: how pauses
+    are spent.
 
     A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
     """

@@ -51,8 +51,8 @@ class Standby:
 
 
 def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
-    """Mains power [W] in a mode: controller, tool (its bus share while the drive bus is up), holding
-    torque.
+    """Mains power [W] in a mode at q (n,): controller, tool (its bus share while the drive bus is up),
+    holding torque.
     """
     if name == MOTORS:
         return holding_watts(q, scene)
@@ -66,7 +66,7 @@ def pause_energy(
 ) -> float:
     """Energy [J] of a pause [s] in a mode until the next movement can start, inf when it is too short for it.
 
-    On motors: with what the controller does by itself.
+    The robot stands at q (n,). On motors: with what the controller does by itself.
     """
     if name == MOTORS:
         return _energy_by_itself(pause, q, scene, times)
@@ -138,8 +138,8 @@ def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
 
 
 def break_even(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
-    """Pause [s] from which a mode saves against the next shallower one, both entered from motors; inf:
-    never.
+    """Pause [s] at q (n,) from which a mode saves against the next shallower one, both entered from motors;
+    inf: never.
     """
     k = REST_MODES.index(name)
     if k == 0:

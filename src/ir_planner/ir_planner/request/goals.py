@@ -42,7 +42,7 @@ def one_goal(
     cell: Cell,
     forms: tuple[str, ...] = ("goal", "goal_state", "goal_pose"),
 ) -> Goal:
-    """The goal that a request gives in exactly one of its `forms`."""
+    """The goal that a request gives in exactly one of its `forms`: configuration (n,), pose (4, 4)."""
     given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not None),
                                       ("goal_pose", pose is not None)) if there]  # fmt: skip
     if len(given) != 1:

@@ -47,7 +47,7 @@ class Journal:
             self.rejected[reason] += count
 
     def info(self, start: FloatArray | None, joint_names: tuple[str, ...]) -> PlanningInfo:
-        """The record as it goes into the answer."""
+        """The record of a request from start (n,), as it goes into the answer."""
         return PlanningInfo(
             planner_id=self.planner_id,
             seed=self.seed,

@@ -139,8 +139,8 @@ def _without_repeats(points: FloatArray) -> FloatArray:
 
 
 def different(paths: list[FloatArray], most: int, difference: float) -> list[FloatArray]:
-    """The first `most` paths that differ somewhere by more than `difference` rad at the same share of their
-    length.
+    """The first `most` paths (M, n) that differ somewhere by more than `difference` rad at the same share of
+    their length.
     """
     chosen: list[FloatArray] = []
     shown: list[FloatArray] = []

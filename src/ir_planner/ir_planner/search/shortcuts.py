@@ -44,7 +44,7 @@ def fewest_corners(
 
 
 def densified(path: FloatArray, count: int) -> FloatArray:
-    """The path with points added in its longest steps until there are `count`."""
+    """The path (M, n) with points added in its longest steps until there are `count`."""
     points = np.array(path)
     while len(points) < count:
         k = int(np.argmax(np.square(np.diff(points, axis=0)).sum(axis=1)))
@@ -54,7 +54,8 @@ def densified(path: FloatArray, count: int) -> FloatArray:
 
 
 def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray:
-    """The path with every inner waypoint moved towards the straight line as far as certified edges allow.
+    """The path (M, n) with every inner waypoint moved towards the straight line as far as certified edges
+    allow.
 
     W of eq. (9) only asks that a joint does not turn back: so each joint is also moved alone into the range
     of the neighbours.

@@ -39,8 +39,8 @@ def own_laws(
 def farthest_from_line(
     laws: StepLaws, common: Law, delta: FloatArray, step: int, joined: frozenset[int]
 ) -> int | None:
-    """The joint that is farthest from where the `common` law has it at grid step `step`, of those that
-    haven't `joined` it; None where none is left.
+    """The joint of delta (n,) that is farthest from where the `common` law has it at grid step `step`, of
+    those that haven't `joined` it; None where none is left.
     """
     s, _, _ = laws.at(np.array([step]))
     on_line, _, _ = common.at(np.array([step]))

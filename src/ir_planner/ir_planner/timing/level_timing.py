@@ -20,7 +20,7 @@ _LOWEST = 0.02  # of the acceleration limit
 def fastest(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics: Dynamics) -> Law:
     """The shorter of the fastest law with one level per ramp and the fastest with several.
 
-    Raises TimingError when some joint's torque does not suffice however slowly.
+    start, goal (n,) [rad]. Raises TimingError when some joint's torque does not suffice however slowly.
     """
     plain = fastest_law(start, goal, limits, dynamics)
     delta = np.asarray(goal) - np.asarray(start)

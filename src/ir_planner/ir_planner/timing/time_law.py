@@ -207,7 +207,7 @@ class StepLaws:
         return self.laws[0].ramp_down if len(self.laws) == 1 else 0
 
     def switches(self) -> IntArray:
-        """Grid steps at which a phase of any joint starts or ends, ascending without doubles."""
+        """Grid steps (K,) at which a phase of any joint starts or ends, ascending without doubles."""
         return np.unique(np.concatenate([law.switches() for law in self.laws]))
 
     def at(self, steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -12,8 +12,8 @@ _SAMPLES = 400  # one every 5 ms: a chord of them leaves the path by less than 0
 
 
 class Excursion:
-    """Collects configurations while the robot stops; `distance` is the farthest the tool was from the path
-    ahead.
+    """Collects configurations (n,) while the robot stops; `distance` is the farthest the tool was from the
+    path ahead.
     """
 
     def __init__(self, tool: ToolPoint, path: Path | None, s: float, q: FloatArray) -> None:

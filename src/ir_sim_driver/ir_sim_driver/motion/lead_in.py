@@ -47,7 +47,8 @@ def route_onto(
 ) -> Route:
     """Path from the commanded motion `now` onto and along what is executed of the trajectory.
 
-    delay [s]: until time 0 of the trajectory; a robot at rest waits for it. Raises TrajectoryRefusedError.
+    acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory; a robot at rest waits for it.
+    Raises TrajectoryRefusedError.
     """
     moving = bool(now.qd.any())
     first = float(trajectory.times[0]) + (delay if moving else 0.0)

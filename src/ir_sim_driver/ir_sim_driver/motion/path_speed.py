@@ -19,8 +19,8 @@ _TINY = 1e-12
 class PathSpeed:
     """Speed sd of the path time, from 0 to 1 and towards `target`.
 
-    dynamics: an ir_kernels DynamicsModel (torques along the path); stop_time [s]: the shortest stop from
-    full speed.
+    dynamics: an ir_kernels DynamicsModel (torques along the path); acceleration_max (n,); stop_time [s]: the
+    shortest stop from full speed.
     """
 
     def __init__(

@@ -59,7 +59,7 @@ def _label(text: str) -> str:
 
 
 def fill_joint_state(msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, torque: FloatArray) -> None:
-    """Write a state into a message that is used again and again."""
+    """Write a state, each (n,), into a message that is used again and again."""
     msg.header.stamp.sec, msg.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
     msg.position = float_array(q)
     msg.velocity = float_array(qd)

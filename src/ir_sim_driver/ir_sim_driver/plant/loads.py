@@ -66,8 +66,8 @@ def carried(cell: Cell, text: str) -> Carried:
 def custom_load(
     cell: Cell, mass: float, com: FloatArray, inertia: FloatArray, always: float, drive_bus: float
 ) -> Carried:
-    """A load from numbers [kg, m, kg m^2 (ixx ixy ixz iyy iyz izz or none), W]. Raises
-    RequestRefusedError.
+    """A load from numbers [kg, m, kg m^2, W], com (3,), inertia (6,) (ixx ixy ixz iyy iyz izz) or none.
+    Raises RequestRefusedError.
     """
     limit = cell.robot.rated_payload
     if not (math.isfinite(mass) and 0.0 <= mass <= limit):
