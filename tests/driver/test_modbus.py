@@ -94,6 +94,13 @@ def test_pause_and_operating_mode_are_registers(make, serve):
     assert refused.exception_code == 3
 
 
+def test_registers_are_written_all_or_none(make, serve):
+    _, client, _ = serve(make())
+    refused = client.write_registers(OPERATING_MODE, [1, 60])  # no pause in T1
+    assert refused.exception_code == 3
+    assert client.read_holding_registers(0, count=2).registers == [4, 0]
+
+
 def test_coils_read_back_what_topic_or_service_have_set(make, serve):
     driver, client, _ = serve(make())
     driver.press("service", "drives_off", True)
@@ -110,6 +117,9 @@ def test_coils_read_back_what_topic_or_service_have_set(make, serve):
         (lambda c: c.read_input_registers(INPUT_REGISTERS, count=1), 2),
         (lambda c: c.write_register(2, 1), 2),
         (lambda c: c.read_discrete_inputs(40, count=4), 2),
+        (lambda c: c.read_coils(len(COILS), count=1), 2),
+        (lambda c: c.read_coils(0, count=len(COILS) + 1), 2),
+        (lambda c: c.read_discrete_inputs(0, count=len(DISCRETE_INPUTS) + 1), 2),
     ],
 )
 def test_addresses_that_aren_t_there_are_exception_02(make, serve, request_, code):

@@ -7,6 +7,7 @@ also for what the controller refuses; 04 says that the controller is off the net
 from __future__ import annotations
 
 import asyncio
+import struct
 import threading
 from collections.abc import Sequence
 from typing import Any
@@ -37,6 +38,8 @@ _WRITE_COILS, _WRITE_HOLDING = (5, 15), (6, 16)
 _FUNCTIONS = (_READ_COILS, _READ_DISCRETE, _READ_HOLDING, _READ_INPUT, *_WRITE_COILS, *_WRITE_HOLDING)
 _FUNCTION, _REFUSAL = 7, 0x80  # place of the function in a frame, mark of a refusal
 _STOP = COILS.index(STOP_BIT)
+_BITS_OF = {_READ_COILS: len(COILS), _READ_DISCRETE: len(DISCRETE_INPUTS)}
+_MOST_BITS = 2000  # of one request; beyond, it is exception 03
 _BITS = 16  # coils live in registers of 16
 
 
@@ -127,12 +130,12 @@ class ModbusServer:
                 return self._write_holding(address, values or [])
         except DriverError:
             return ExcCodes.ILLEGAL_VALUE
+        if function in _BITS_OF and address >= _BITS_OF[function]:
+            return ExcCodes.ILLEGAL_ADDRESS
         if function == _READ_COILS:
             registers[0] = _packed([*self._levels(), False])
         elif function == _READ_DISCRETE:
             registers[0] = _packed(discrete_inputs(readout))
-            if address >= len(DISCRETE_INPUTS):
-                return ExcCodes.ILLEGAL_ADDRESS
         elif function == _READ_HOLDING:
             registers[OPERATING_MODE] = int(self._controller.inputs().operating_mode)
             registers[PAUSE] = self._pause
@@ -169,35 +172,58 @@ class ModbusServer:
         return None
 
     def _write_holding(self, address: int, values: Sequence[int | bool]) -> ExcCodes | None:
-        for k, value in enumerate(values, start=address):
-            if k == OPERATING_MODE:
-                if not OperatingMode.T1 <= value <= OperatingMode.EXT:
-                    return ExcCodes.ILLEGAL_VALUE
-                self._controller.write_operating_mode(MODBUS, OperatingMode(value))
-            else:
-                self._controller.request_pause(float(value))
-                self._pause = int(value)
+        """Write mode switch and pause; when the second is refused, the first is taken back."""
+        wanted = dict(enumerate(map(int, values), start=address))
+        mode, pause = wanted.get(OPERATING_MODE), wanted.get(PAUSE)
+        before = self._controller.inputs().operating_mode
+        if mode is not None:
+            if not OperatingMode.T1 <= mode <= OperatingMode.EXT:
+                return ExcCodes.ILLEGAL_VALUE
+            self._controller.write_operating_mode(MODBUS, OperatingMode(mode))
+        if pause is not None:
+            try:
+                self._controller.request_pause(float(pause))
+            except DriverError:
+                if mode is not None:
+                    self._controller.write_operating_mode(MODBUS, before)
+                raise
+            self._pause = pause
         return None
 
 
 class _Mender:
-    """Names the function in refusals of requests that pymodbus could not read: it answers all with 80 01.
+    """Refusals that pymodbus gets wrong.
 
-    Such an answer is sent while its request is being received, so the last packet is the one that is meant.
+    It answers requests that it could not read with 80 01, whatever their function; and it reads bits in
+    registers of 16, also those that are not defined. An answer is sent while its request is being received,
+    so the last packet is the one that is meant.
     """
 
     def __init__(self) -> None:
         self._function = 0
+        self._beyond = b""  # transaction of a request for bits beyond those that are defined
 
     def mend(self, sending: bool, packet: bytes) -> bytes:
         """Return the packet as it goes on."""
         if not sending:
             self._function = packet[_FUNCTION] if len(packet) > _FUNCTION else 0
+            self._beyond = packet[:2] if _reads_beyond(packet) else b""
+        elif self._beyond and packet[:2] == self._beyond:
+            refusal = bytes((_REFUSAL | self._function, ExcCodes.ILLEGAL_ADDRESS))
+            return packet[:4] + len(packet[6:7] + refusal).to_bytes(2, "big") + packet[6:7] + refusal
         elif len(packet) == _FUNCTION + 2 and packet[_FUNCTION] == _REFUSAL:
             known = self._function in _FUNCTIONS
             reason = ExcCodes.ILLEGAL_VALUE if known else ExcCodes.ILLEGAL_FUNCTION
             return packet[:_FUNCTION] + bytes((_REFUSAL | self._function, reason))
         return packet
+
+
+def _reads_beyond(packet: bytes) -> bool:
+    """Whether a request asks for bits beyond those that are defined."""
+    if len(packet) < _FUNCTION + 5 or packet[_FUNCTION] not in _BITS_OF:
+        return False
+    start, count = struct.unpack_from(">HH", packet, _FUNCTION + 1)
+    return bool(0 < count <= _MOST_BITS and start + count > _BITS_OF[packet[_FUNCTION]])
 
 
 def _packed(levels: list[bool]) -> int:
