@@ -13,8 +13,8 @@ from typing import Any
 _MODULES = {
     "Planner": ("ir_planner", "ir_planner.planner"),
     "Goal": ("ir_planner", "ir_planner.goals"),
-    "parse_goal": ("ir_planner", "ir_planner.goals", "ir_planner.scene.goals"),
-    "Reference": ("ir_planner", "ir_planner.following", "ir_planner.optimize.following"),
+    "parse_goal": ("ir_planner", "ir_planner.goals"),
+    "Reference": ("ir_planner", "ir_planner.following"),
     "RequestError": ("ir_planner", "ir_planner.errors"),
 }
 
