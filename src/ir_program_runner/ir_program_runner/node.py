@@ -32,6 +32,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.driver import Driver
 from ir_msgs_py.ros.planner import Planner
+from ir_msgs_py.ros.quality import ACTION_SERVICES
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
@@ -91,6 +92,7 @@ class ProgramRunnerNode(Node):
             "~/run_program",
             self._run,
             cancel_callback=lambda goal: CancelResponse.ACCEPT,
+            **ACTION_SERVICES,
         )
 
         self.get_logger().info("ready to run programs")

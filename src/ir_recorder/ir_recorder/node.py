@@ -18,6 +18,7 @@ from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
+from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import StatusCode
 from ir_recorder.arguments import record_parser
@@ -67,8 +68,8 @@ class RecorderNode(Node):
         )
         self._diagnostics = RecorderDiagnostics(self)
         if name == names.RECORDER:  # a command's own recording is no service of the cell
-            self.create_service(StartRecording, "~/start", self._on_start)
-            self.create_service(StopRecording, "~/stop", self._on_stop)
+            self.create_service(StartRecording, "~/start", self._on_start, qos_profile=SERVICE)
+            self.create_service(StopRecording, "~/stop", self._on_stop, qos_profile=SERVICE)
         self.create_timer(self._settings.discovery_period, self._discover)
         self.create_timer(POLL_PERIOD, self._collect)
         self.create_timer(1.0, self._each_second)

@@ -23,7 +23,7 @@ from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.ros.conversions import power_mode_from_msg, status_from_msg, trajectory_to_msg
-from ir_msgs_py.ros.quality import SERVICE
+from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -59,7 +59,7 @@ class Driver:
         self._plc = node.create_client(SetPlcInputSrv, f"{name}/set_plc_input", qos_profile=SERVICE)
         self._load = node.create_client(SetLoadSrv, f"{name}/set_load", qos_profile=SERVICE)
         self._modes = node.create_client(QueryModes, f"{name}/query_modes", qos_profile=SERVICE)
-        self._execute = ActionClient(node, ExecuteTrajectory, f"{name}/execute_trajectory")
+        self._execute = ActionClient(node, ExecuteTrajectory, f"{name}/execute_trajectory", **ACTION_SERVICES)
         heard_from_all = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
         node.create_subscription(PowerStateMsg, f"{name}/power_state", self._read_meter, heard_from_all)
 

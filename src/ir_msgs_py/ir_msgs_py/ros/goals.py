@@ -11,6 +11,7 @@ from rclpy.task import Future
 
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.ros.quality import ACTION_SERVICES
 from ir_msgs_py.ros.types import owner_of
 from ir_msgs_py.status import StatusCode
 
@@ -69,5 +70,5 @@ class GoalSender:
     def _client(self, action: str, action_type: Any) -> ActionClient:
         key = (action, action_type)
         if key not in self._clients:
-            self._clients[key] = ActionClient(self._node, action_type, action)
+            self._clients[key] = ActionClient(self._node, action_type, action, **ACTION_SERVICES)
         return self._clients[key]

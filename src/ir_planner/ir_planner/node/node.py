@@ -33,7 +33,7 @@ from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
-from ir_msgs_py.ros.quality import LATCHED, SERVICE
+from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -129,6 +129,7 @@ class PlannerNode(Node):
             handle_accepted_callback=self._goals.accepted,
             cancel_callback=self._goals.cancel,
             callback_group=ReentrantCallbackGroup(),
+            **ACTION_SERVICES,
         )
 
     def _execute_plan(self, goal: ServerGoalHandle) -> Plan.Result:

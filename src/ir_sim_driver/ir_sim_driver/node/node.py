@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -33,6 +34,7 @@ from ir_msgs_py.ros.conversions import (
     power_state_to_msg,
     time_to_msg,
 )
+from ir_msgs_py.ros.quality import ACTION_SERVICES, COMMANDS, REQUESTS_WAITING, SERVICE
 from ir_msgs_py.ros.running import run_node
 from ir_sim_driver.controller import Driver, Entry, Frame, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError, PlantStoppedError
@@ -116,7 +118,9 @@ class SimDriver(Node):
         self._joint_state = JointState(name=list(self._driver.joint_names))
         self._joint_state.header.frame_id = names.BASE_FRAME
         self.create_subscription(JointTrajectory, names.COMMANDED_TRAJECTORY, self._on_trajectory, 10)
-        self.create_subscription(PlcInputsMsg, names.PLC_INPUTS, self._on_plc_inputs, _LATCHED)
+        self._plc_messages: deque[tuple[int, PlcInputsMsg]] = deque(maxlen=REQUESTS_WAITING)
+        for quality in COMMANDS:
+            self.create_subscription(PlcInputsMsg, names.PLC_INPUTS, self._on_plc_inputs, quality)
         self.create_subscription(
             Float64, names.SPEED_SCALING, lambda msg: self._driver.set_speed_scaling(float(msg.data)), 10
         )
@@ -129,12 +133,12 @@ class SimDriver(Node):
         if FollowJointTrajectory is not None:
             self._actions.append(self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY))
         answers = Services(self._driver, self.get_name(), self._publish_description)
-        self.create_service(SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input)
-        self.create_service(StartPause, names.START_PAUSE, answers.start_pause)
-        self.create_service(EndPause, names.END_PAUSE, answers.end_pause)
-        self.create_service(QueryModes, names.QUERY_MODES, answers.query_modes)
-        self.create_service(Recover, names.RECOVER, answers.recover)
-        self.create_service(SetLoad, names.SET_LOAD, answers.set_load)
+        self.create_service(SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input, qos_profile=SERVICE)
+        self.create_service(StartPause, names.START_PAUSE, answers.start_pause, qos_profile=SERVICE)
+        self.create_service(EndPause, names.END_PAUSE, answers.end_pause, qos_profile=SERVICE)
+        self.create_service(QueryModes, names.QUERY_MODES, answers.query_modes, qos_profile=SERVICE)
+        self.create_service(Recover, names.RECOVER, answers.recover, qos_profile=SERVICE)
+        self.create_service(SetLoad, names.SET_LOAD, answers.set_load, qos_profile=SERVICE)
 
     def _serve_action(self, action_type: Any, name: str) -> ActionServer:
         executions = Executions(
@@ -146,7 +150,13 @@ class SimDriver(Node):
             return CancelResponse.ACCEPT
 
         return ActionServer(
-            self, action_type, name, executions.execute, cancel_callback=cancel, result_timeout=_RESULT_KEPT
+            self,
+            action_type,
+            name,
+            executions.execute,
+            cancel_callback=cancel,
+            result_timeout=_RESULT_KEPT,
+            **ACTION_SERVICES,
         )
 
     def _open_links(self) -> dict[str, OpenLink]:
@@ -238,7 +248,11 @@ class SimDriver(Node):
         if outcome.code is not ErrorCode.SUCCESSFUL:
             self._driver.warn(f"trajectory of the topic: {outcome.sentence} ({outcome.code.name})")
 
-    def _on_plc_inputs(self, msg: PlcInputsMsg) -> None:
+    def _on_plc_inputs(self, msg: PlcInputsMsg, info: dict[str, int]) -> None:
+        heard = (info["source_timestamp"], msg)
+        if heard in self._plc_messages:  # by the other subscription
+            return
+        self._plc_messages.append(heard)
         try:
             self._driver.plc.write_all_inputs(TOPIC, plc_inputs_from_msg(msg))
         except (MsgsError, DriverError) as error:

@@ -1,0 +1,101 @@
+"""Bursts over ROS: a press that is taken back at once counts, and every request and goal is answered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from rclpy.action import ActionClient
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import PlcInputs, PowerMode, PowerState
+from ir_msgs.srv import QueryModes, SetPlcInput
+from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
+from ir_sim_driver.node import SimDriver
+
+PRESSED = PlcInputs(emergency_stop=True, move_enable=True)
+RELEASED = PlcInputs(move_enable=True)
+
+
+@pytest.fixture
+def modes(ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any) -> list[int]:
+    """A standing driver; the modes that its power_state shows."""
+    overrides = [Parameter("cell", value="open"), Parameter("backend", value="ideal")]
+    overrides += [Parameter("wake_port", value=0), Parameter("plc.startup_window", value=0.0)]
+    ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+    heard: list[int] = []
+    ros_executor.run(
+        lambda: ros_node.create_subscription(
+            PowerState, "/ir_sim_driver/power_state", lambda msg: heard.append(msg.mode), 100
+        )
+    )
+    wait_for(lambda: len(heard) > 10, timeout=20.0, what="the driver publishes")
+    assert PowerMode.EMERGENCY_STOP not in heard
+    return heard
+
+
+@pytest.mark.parametrize("durability", [DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE])
+def test_a_press_by_topic_that_is_taken_back_at_once_is_latched(
+    modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any, durability: DurabilityPolicy
+) -> None:
+    quality = QoSProfile(depth=10, durability=durability)
+    topic = "/ir_sim_driver/plc_inputs"
+    publisher = ros_executor.run(lambda: ros_node.create_publisher(PlcInputs, topic, quality))
+    matched = 1 if durability == DurabilityPolicy.VOLATILE else 2
+    wait_for(lambda: publisher.get_subscription_count() == matched, what="the driver listens")
+
+    def press() -> None:
+        publisher.publish(PRESSED)
+        for _ in range(5):
+            publisher.publish(RELEASED)
+
+    ros_executor.run(press)
+    wait_for(lambda: PowerMode.EMERGENCY_STOP in modes, what="the stop is latched")
+    del modes[:]
+    wait_for(lambda: len(modes) > 50, what="the driver goes on publishing")
+    assert set(modes) == {PowerMode.EMERGENCY_STOP}
+
+
+def test_a_press_by_service_counts_in_a_burst_and_all_are_answered(
+    modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any
+) -> None:
+    client = ros_executor.run(
+        lambda: ros_node.create_client(SetPlcInput, "/ir_sim_driver/set_plc_input", qos_profile=SERVICE)
+    )
+    wait_for(client.service_is_ready, what="set_plc_input is offered")
+    requests = [SetPlcInput.Request(name="emergency_stop", value=k == 0) for k in range(200)]
+    futures = ros_executor.run(lambda: [client.call_async(request) for request in requests])
+    wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+    wait_for(lambda: PowerMode.EMERGENCY_STOP in modes, what="the stop is latched")
+
+
+def test_four_hundred_requests_are_answered(
+    modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any
+) -> None:
+    client = ros_executor.run(
+        lambda: ros_node.create_client(QueryModes, "/ir_sim_driver/query_modes", qos_profile=SERVICE)
+    )
+    wait_for(client.service_is_ready, what="query_modes is offered")
+    futures = ros_executor.run(lambda: [client.call_async(QueryModes.Request()) for _ in range(400)])
+    wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+
+
+def test_forty_goals_are_all_answered_with_a_result(
+    modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Callable[..., Any]
+) -> None:
+    client = ros_executor.run(
+        lambda: ActionClient(
+            ros_node, ExecuteTrajectory, "/ir_sim_driver/execute_trajectory", **ACTION_SERVICES
+        )
+    )
+    wait_for(client.server_is_ready, what="execute_trajectory is offered")
+    sent = ros_executor.run(lambda: [client.send_goal_async(ExecuteTrajectory.Goal()) for _ in range(40)])
+    wait_for(lambda: all(future.done() for future in sent), timeout=60.0, what="all goals are taken")
+    goals = [future.result() for future in sent]
+    results = ros_executor.run(lambda: [goal.get_result_async() for goal in goals if goal.accepted])
+    wait_for(lambda: all(future.done() for future in results), timeout=60.0, what="all goals end")
+    assert len(results) == 40
+    assert all(future.result().result.error_string for future in results)
