@@ -1,4 +1,6 @@
-"""The movements of a program: out of one stop, across, into the next; each is planned once."""
+"""The movements of a program: out of one stop, across, into the next. Each is planned once, however often the
+program makes it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +19,9 @@ from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context
 from ir_planner.service import timed_service
 from ir_planner.timing import Movement
+
+
+Key = tuple[int, str, tuple[str, str], tuple[bytes, bytes]]  # scene, kind, names of the stops, ends
 
 
 def rates_of(context: Context) -> Rates:
@@ -44,7 +49,7 @@ class Movements:
 
     def __init__(self, route: Route, layers: list[list[Node]], context: Context, searches: Searches) -> None:
         self.route, self.layers, self.context, self.searches = route, layers, context, searches
-        self._found: dict[Part, Movement | Failure] = {}
+        self._found: dict[Key, Movement | Failure] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
         )
@@ -56,26 +61,35 @@ class Movements:
 
     def plan(self, parts: Sequence[Part], improvement: int) -> list[Movement | Failure]:
         """The movements of parts of hops; those that aren't known yet side by side."""
-        new = list(dict.fromkeys(part for part in parts if part not in self._found))
-
-        for part, found in zip(new, mapped(self._planned, new, self.context, improvement), strict=True):
-            self._found[part] = found
+        new = {key: part for part in parts if (key := self._key(part)) not in self._found}
+        planned = mapped(self._planned, list(new.values()), self.context, improvement)
+        for key, found in zip(new, planned, strict=True):
+            self._found[key] = found
             if isinstance(found, Failure):
                 self.unreachable = found.status
-        return [self._found[part] for part in parts]
+        return [self._found[self._key(part)] for part in parts]
 
     def better(self, parts: Sequence[Part], improvement: int) -> None:
         """Plan parts again with more work, and keep what is cheaper."""
         rates = rates_of(self.context)
-        known = {part: self._found.pop(part) for part in parts}
-        for part, again in zip(parts, self.plan(parts, improvement), strict=True):
-            before = known[part]
+        known = {key: self._found.pop(key) for key in dict.fromkeys(map(self._key, parts))}
+        self.plan(parts, improvement)
+        for key, before in known.items():
+            again = self._found[key]
             if (
                 isinstance(before, Failure)
                 or isinstance(again, Failure)
                 or cost_of(before.report, rates) <= cost_of(again.report, rates)
             ):
-                self._found[part] = before
+                self._found[key] = before
+
+    def _key(self, part: Part) -> Key:
+        """What two parts that are the same movement have in common."""
+        first, second = self.nodes(part)
+        names = self.route.name(part.hop - 1), self.route.name(part.hop)
+        lines = first.line.points.tobytes(), second.line.points.tobytes()
+        ends = lines if part.kind != ACROSS else (first.outside.tobytes(), second.outside.tobytes())
+        return id(self.route.arriving(part.hop)), part.kind, names, ends
 
     def nodes(self, part: Part) -> tuple[Node, Node]:
         """The configurations of a part; the same twice where it is a service movement."""

@@ -15,7 +15,7 @@ from ir_planner.request import Context
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ExitSearch, ServiceLine, lines_free, service_lines
 
-_MOST = 24  # configurations per station that take part: all 8 branches with the nearest turns
+_MOST = 64  # configurations per station that take part: 8 branches with all turns of A1, A4 and A6
 
 
 def posture_nodes(name: str, arriving: Context) -> tuple[list[Node], Status]:
