@@ -15,6 +15,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
 from ir_planner.program.cycle_time import Task, shared_out
+from ir_planner.program.front import POINTS, plan_front
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.standby import plan_standby
 from ir_planner.program.station_graph import Part
@@ -163,3 +164,27 @@ def test_too_short_a_cycle_names_the_shortest(planned: Callable[[float], Program
         planned(1.0)
     shortest = float(str(refused.value).split("the shortest is ")[1].split(" s")[0])
     assert planned(shortest + 1e-3).status.ok
+
+
+def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power: PowerData) -> None:
+    request = ProgramRequest(
+        demo_cell, power, ("home", "park"), np.array(demo_cell.park), PlanOptions(planning_time=60.0)
+    )
+    front = plan_front(request, Work(2_000_000, time.monotonic() + 300.0, time.monotonic))
+    assert len(front) == POINTS
+    assert len({plan.program_id for plan in front}) == POINTS
+    assert all(plan.report.certified for plan in front)
+    seconds, energy = ([getattr(plan.report, name) for plan in front] for name in ("duration", "energy"))
+    assert seconds == sorted(seconds)
+    assert energy[0] > 1.1 * min(energy)  # hurrying costs
+    scene, park = scene_with(demo_cell, load_text(demo_cell), power), np.array(demo_cell.park)
+    for a, b in itertools.combinations(range(POINTS), 2):
+        wait = plan_standby(seconds[b] - seconds[a], park, scene, TransitionTimes()).energy
+        assert energy[b] <= 1.005 * (energy[a] + wait)
+
+
+def test_a_front_says_why_there_is_no_program(demo_cell: Cell, power: PowerData) -> None:
+    shut = demo_cell.with_equipment("lathe", state="door_closed")
+    request = ProgramRequest(shut, power, ("lathe_work",), np.array(shut.park), PlanOptions())
+    (answer,) = plan_front(request, Work(100_000, np.inf, lambda: 0.0))
+    assert "lathe_work" in answer.status.message

@@ -1,5 +1,6 @@
 """Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
 
+from ir_planner.program.front import plan_front
 from ir_planner.program.program import plan_program
 from ir_planner.program.request import ProgramPlan, ProgramRequest
 from ir_planner.program.saving_request import SavingPlan, plan_savings
@@ -13,6 +14,7 @@ __all__ = [
     "SavingPlan",
     "Savings",
     "Standby",
+    "plan_front",
     "plan_program",
     "plan_savings",
     "plan_standby",

@@ -11,7 +11,7 @@ from ir_planner.program.chain import cheapest_chain, parts_of
 from ir_planner.program.cycle_time import Task, Timed, shared_out
 from ir_planner.program.movements import Movements
 from ir_planner.program.request import Progress
-from ir_planner.program.station_graph import Chain, Part
+from ir_planner.program.station_graph import Chain
 from ir_planner.program.time_values import FASTEST, TimeValues
 from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement
@@ -39,18 +39,18 @@ def timed_chain(
     Raises RequestError where the cycle is shorter than the fastest movements.
     """
     seconds = cycle.seconds - cycle.standing + _ROUNDING
-    values = TimeValues(movements, _flat(chain, movements), improvement)
+    values = values_of(chain, movements, improvement)
     with movements.context.journal.stage("cycle time") as notes:
         rung = values.bracket(seconds)
-        best = chain, shared_out(values, _task(cycle, chain, seconds))
+        best = chain, shared_out(values, task_of(cycle, chain, seconds))
         notes.append("too short for the chain" if best[1] is None else f"{best[1].energy:.0f} J")
     again = values.movements(rung)
     other = cheapest_chain(again, improvement, progress)
     if other.chosen != chain.chosen:
-        values = TimeValues(again, _flat(other, again), improvement)
+        values = values_of(other, again, improvement)
         with movements.context.journal.stage("cycle time") as notes:
             values.bracket(seconds)
-            timed = shared_out(values, _task(cycle, other, seconds))
+            timed = shared_out(values, task_of(cycle, other, seconds))
             if timed is not None and (best[1] is None or timed.energy < best[1].energy):
                 best = other, timed
             notes.append("too short for the chain" if timed is None else f"{timed.energy:.0f} J")
@@ -64,11 +64,14 @@ def timed_chain(
     return best[0], best[1]
 
 
-def _flat(chain: Chain, movements: Movements) -> list[Part]:
-    return [part for parts in parts_of(chain, movements) for part in parts]
+def values_of(chain: Chain, movements: Movements, improvement: int) -> TimeValues:
+    """The movements of a chain at the values of a second."""
+    parts = [part for hop in parts_of(chain, movements) for part in hop]
+    return TimeValues(movements, parts, improvement)
 
 
-def _task(cycle: Cycle, chain: Chain, seconds: float) -> Task:
+def task_of(cycle: Cycle, chain: Chain, seconds: float) -> Task:
+    """What is to be shared out over a chain's movements and the wait."""
     return Task(seconds, lambda left: cycle.waiting(chain, left), _slower)
 
 

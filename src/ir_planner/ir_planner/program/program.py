@@ -6,6 +6,7 @@ with what is held at that moment.
 """
 
 import hashlib
+from collections.abc import Mapping
 
 import numpy as np
 from ir_msgs_py.names import NO_LOAD
@@ -13,9 +14,10 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status
 
 from ir_planner.checks import total_report
-from ir_planner.program.assembly import Legs, assembled, legs_of
+from ir_planner.program.assembly import assembled, legs_of
 from ir_planner.program.chain import cheapest_chain, layers_of, parts_of
 from ir_planner.program.cycle_plan import Cycle, timed_chain
+from ir_planner.program.cycle_time import Timed
 from ir_planner.program.movements import Failure, Movements
 from ir_planner.program.pauses import AUTO, Pause, planned_pause
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError
@@ -37,8 +39,15 @@ def plan_program(request: ProgramRequest, work: Work, progress: Progress) -> Pro
         movements, status = _planned(request, route, context, progress), Status.success()
     except StageError as failed:
         movements, status = (), failed.status
-    journal.planner_id = "station graph"
-    info = journal.info(request.start, context.joint_names)
+    return finished(request, context, status, movements)
+
+
+def finished(
+    request: ProgramRequest, context: Context, status: Status, movements: tuple[PlannedMovement, ...]
+) -> ProgramPlan:
+    """The answer, with the report of all movements; without them where there are none."""
+    context.journal.planner_id = "station graph"
+    info = context.journal.info(request.start, context.joint_names)
     if not movements:
         return ProgramPlan(status, info)
     elapsed = np.concatenate([[0.0], np.cumsum([movement.duration for movement in movements])[:-1]])
@@ -66,49 +75,75 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
     return digest.hexdigest()[:16]
 
 
+def chosen_chain(
+    request: ProgramRequest, route: Route, context: Context, progress: Progress
+) -> tuple[Movements, Chain, int]:
+    """The chain of configurations with its movements, and the work that each of them had.
+
+    Raises StageError where there is none.
+    """
+    layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
+    movements = Movements(route, layers, context, request.settings.searches)
+    improvement = min(context.work.improvement, _CHOOSING)
+    return movements, cheapest_chain(movements, improvement, progress), improvement
+
+
 def _planned(
     request: ProgramRequest, route: Route, context: Context, progress: Progress
 ) -> tuple[PlannedMovement, ...]:
     """Movements and pauses in order. Raises StageError where a stage finds nothing."""
-    layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
-    movements = Movements(route, layers, context, request.settings.searches)
-    improvement = min(context.work.improvement, _CHOOSING)
-    chain = cheapest_chain(movements, improvement, progress)
-    if request.cycle_time > 0.0:
-        return _within_cycle(request, movements, chain, improvement, progress)
-    _improve(movements, chain, improvement)
+    movements, chain, improvement = chosen_chain(request, route, context, progress)
+    if request.cycle_time <= 0.0:
+        _improve(movements, chain, improvement)
+        found = _movements_of(movements, chain, improvement, progress)
+        return steps_along(request, movements, chain, found)
     found = _movements_of(movements, chain, improvement, progress)
-    return _assembled(request, route, legs_of(route, parts_of(chain, movements), found))
+    cycle = cycle_of(request, movements, chain, found)
+    chain, timed = timed_chain(cycle, movements, chain, improvement, progress)
+    return filled(request, movements, chain, timed, request.cycle_time)
 
 
-def _assembled(request: ProgramRequest, route: Route, legs: Legs) -> tuple[PlannedMovement, ...]:
-    times = request.settings.transitions
+def steps_along(
+    request: ProgramRequest, movements: Movements, chain: Chain, found: Mapping[Part, Movement]
+) -> tuple[PlannedMovement, ...]:
+    """The steps of the program with the movements of a chain's parts."""
+    route, times = movements.route, request.settings.transitions
+    legs = legs_of(route, parts_of(chain, movements), found)
     return assembled(
         route.steps, legs, route.scenes, request.start, lambda pause: planned_pause(pause, times)
     )
 
 
-def _within_cycle(
-    request: ProgramRequest, movements: Movements, chain: Chain, improvement: int, progress: Progress
+def cycle_of(
+    request: ProgramRequest, movements: Movements, chain: Chain, found: Mapping[Part, Movement]
+) -> Cycle:
+    """The request's cycle time with what pauses take of it, and what a wait at its end costs."""
+    standing = sum(step.duration for step in steps_along(request, movements, chain, found) if step.is_pause)
+    return Cycle(
+        request.cycle_time,
+        standing,
+        lambda chain, left: _wait(request, movements, chain, left).report.energy,
+    )
+
+
+def filled(
+    request: ProgramRequest, movements: Movements, chain: Chain, timed: Timed, cycle_time: float
 ) -> tuple[PlannedMovement, ...]:
-    """The program in its cycle time, with a wait at the end where that costs least."""
-    route, times = movements.route, request.settings.transitions
-    last, end = route.name(len(route) - 1), route.scenes.of(route.steps[-1].after)
-
-    def wait(chain: Chain, seconds: float) -> PlannedMovement:
-        q = movements.layers[-1][chain.chosen[-1]].interaction
-        return planned_pause(Pause(last, seconds, AUTO, q, end), times)
-
-    free = _movements_of(movements, chain, improvement, progress)
-    planned = _assembled(request, route, legs_of(route, parts_of(chain, movements), free))
-    standing = sum(movement.duration for movement in planned if movement.is_pause)
-    cycle = Cycle(request.cycle_time, standing, lambda chain, left: wait(chain, left).report.energy)
-    chain, timed = timed_chain(cycle, movements, chain, improvement, progress)
-    planned = _assembled(request, route, legs_of(route, parts_of(chain, movements), timed.movements))
+    """The steps of a program with the wait that fills its cycle [s]."""
+    planned = steps_along(request, movements, chain, timed.movements)
     if timed.wait <= 0.0:
         return planned
-    left = request.cycle_time - sum(movement.duration for movement in planned)
-    return (*planned, wait(chain, left))
+    left = cycle_time - sum(movement.duration for movement in planned)
+    return (*planned, _wait(request, movements, chain, left))
+
+
+def _wait(request: ProgramRequest, movements: Movements, chain: Chain, seconds: float) -> PlannedMovement:
+    """The wait at the end of a program, in the mode of least energy."""
+    route = movements.route
+    end = route.scenes.of(route.steps[-1].after)
+    q = movements.layers[-1][chain.chosen[-1]].interaction
+    pause = Pause(route.name(len(route) - 1), seconds, AUTO, q, end)
+    return planned_pause(pause, request.settings.transitions)
 
 
 def _improve(movements: Movements, chain: Chain, improvement: int) -> None:

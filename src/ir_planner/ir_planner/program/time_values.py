@@ -81,6 +81,11 @@ class TimeValues:
         found = self.at(rung).plan(self.parts, self.improvement)
         return sum(m.trajectory.duration for m in found if not isinstance(m, Failure))
 
+    def own_seconds(self) -> float:
+        """How long the movements of the chain's own request take [s]."""
+        found = self._own.plan(self.parts, self.improvement)
+        return sum(m.trajectory.duration for m in found if not isinstance(m, Failure))
+
     def _take(self, movements: Movements) -> None:
         for part, found in zip(self.parts, movements.plan(self.parts, self.improvement), strict=True):
             if not isinstance(found, Failure):
