@@ -1,4 +1,4 @@
-"""A program's energy at the mains over its cycle time, with its Pareto front: every point a certified program.
+"""A program's energy at the mains over its cycle time: every point a certified program.
 
 All points go along the chain of the free plan, which is not the cheapest for every cycle time; `plan_program`
 with a point's cycle time looks for a better one as well.
