@@ -16,7 +16,7 @@ def main(path: str = "out/demo.mcap") -> None:
     for share in analysis.modes:
         print(f"{share.name:32} {share.seconds:7.2f} s {share.energy:9.0f} J")
     for check in findings(analysis):
-        print(f"{'holds' if check.ok else 'FAILS'}: {check.name}")
+        print(f"{check.verdict}: {check.name}")
 
 
 if __name__ == "__main__":

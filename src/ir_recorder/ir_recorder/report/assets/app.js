@@ -75,13 +75,24 @@
     }
   }
 
-  /* paper: everything that is folded away, charts at the width of the page */
-  addEventListener("beforeprint", () => { for (const part of document.querySelectorAll("details")) part.open = true; });
+  /* paper: in light colours, with everything that is folded away */
+  const root = document.documentElement;
+  let theme = "";
+  addEventListener("beforeprint", () => {
+    theme = root.dataset.theme || "";
+    root.dataset.theme = "light";
+    for (const part of document.querySelectorAll("details")) part.open = true;
+    power.draw();
+    clearance.draw();
+  });
+  addEventListener("afterprint", () => {
+    if (theme) root.dataset.theme = theme; else delete root.dataset.theme;
+    repaint();
+  });
 
   /* light and dark */
   const repaint = () => { power.schedule(); clearance.schedule(); if (motion) motion.recolour(); };
   find("theme").addEventListener("click", () => {
-    const root = document.documentElement;
     const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
     root.dataset.theme = dark ? "light" : "dark";
     repaint();
