@@ -22,6 +22,7 @@ from ir_planner.search import Ends
 from ir_planner.timing import DURATION_SLACK, Movement, baseline, straight_steps
 
 Answer = tuple[str, Movement]  # the search that found it
+_WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
 DIRECT = "direct"  # the search that finds straight segments
 
 
@@ -71,7 +72,9 @@ def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Con
             better = [
                 movement
                 for movement in _along(path, context, hurried=best is None)
-                if movement.certified and (best is None or movement.cost < best[1].cost)
+                if (best is None or movement.coarse_cost < _WORTH_PROVING * best[1].cost)
+                and movement.certified
+                and (best is None or movement.cost < best[1].cost)
             ]
             notes.append("costs less" if better else "costs more, or can't be done")
             if better:

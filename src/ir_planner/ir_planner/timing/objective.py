@@ -86,8 +86,10 @@ def coarse_energy_cost(trajectory: JointTrajectory, context: Context) -> float:
 
 
 def coarse_cost(trajectory: JointTrajectory, context: Context) -> float:
-    """The objective of a trajectory for comparisons: energies and path lengths are sampled coarsely."""
+    """What a request minimises, for comparisons: energies and path lengths are sampled coarsely."""
     weights = context.scene.weights
+    if context.options.duration > 0.0:
+        return movement_energy(trajectory, context.scene, coarse_step(trajectory)).total
     if context.options.objective == "time":
         return trajectory.duration
     if context.options.objective == "movement_cost":
