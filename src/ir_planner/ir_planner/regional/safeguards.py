@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.options import PlanOptions
 
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError, TimingError
@@ -22,6 +21,7 @@ from ir_planner.search import Ends
 from ir_planner.timing import DURATION_SLACK, Movement, baseline, straight_steps
 
 Answer = tuple[str, Movement]  # the search that found it
+_OPTIMISED_AGAIN = 2  # coarse solutions refined for another objective, and the best of them thoroughly
 _WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
 DIRECT = "direct"  # the search that finds straight segments
 
@@ -41,22 +41,22 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
     duration [s] met where none is as short as requested.
     """
     options = context.options
-    best, shortest = _improved(exploration, context)
+    own = _explored(exploration, context)
+    best, shortest = own.best(), own.refinement.shortest
     if options.planner_id:
         return best, shortest
-    for objective in _companions(options):
-        other, duration = _companion(exploration, context, objective)
-        best, shortest = _cheaper(best, other), min(shortest, duration)
-        if duration <= options.duration:
-            break  # the others are for requests that leave no time for least cost
-    return best, shortest
-
-
-def _companions(options: PlanOptions) -> tuple[str, ...]:
-    """Objectives, at a free duration, whose answers may serve a request better than its own descent."""
     if options.duration > 0.0:
-        return ("time_and_energy", "time", "movement_cost")
-    return ("movement_cost",) if options.objective == "time" else ()
+        free, duration = _as_asked(_optimised_again(own, context.asking("time_and_energy")), context)
+        best, shortest = _cheaper(best, free), min(shortest, duration)
+        if duration <= options.duration:
+            return best, shortest
+        own = _explored(exploration, context.asking("time"))  # there is no time for least cost
+        fastest, duration = _as_asked(own.best(), context)
+        best, shortest = _cheaper(best, fastest), min(shortest, duration)
+    if options.duration > 0.0 or options.objective == "time":
+        least, duration = _as_asked(_optimised_again(own, context.asking("movement_cost")), context)
+        best, shortest = _cheaper(best, least), min(shortest, duration)
+    return best, shortest
 
 
 def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Context) -> Answer | None:
@@ -94,18 +94,28 @@ def _along(segment: FloatArray, context: Context, *, hurried: bool) -> Iterator[
             context.journal.reject(f"straight segment: {error}")
 
 
-def _improved(exploration: Exploration, context: Context) -> tuple[Answer | None, float]:
-    refinement = Refinement(context)
-    portfolio = Portfolio(exploration.space, refinement)
+def _explored(exploration: Exploration, context: Context) -> Portfolio:
+    """The paths that the searches find, and the movements that come of them."""
+    portfolio = Portfolio(exploration.space, Refinement(context))
     improve(exploration.ends, exploration.paths, portfolio, context, exploration.searches)
-    return portfolio.best(), refinement.shortest
+    return portfolio
 
 
-def _companion(exploration: Exploration, context: Context, objective: str) -> tuple[Answer | None, float]:
-    """The best answer for another objective at a free duration, as an answer to this request: stretched where
-    a duration is requested. None where it takes longer; and its own duration [s].
+def _optimised_again(portfolio: Portfolio, context: Context) -> Answer | None:
+    """The best movement near the same paths for another objective."""
+    again = Portfolio(portfolio.space, Refinement(context))
+    with context.journal.stage(f"for {context.options.objective}"):
+        for candidate in portfolio.candidates:
+            again.add(candidate.method, [candidate.path])
+        again.refine_best(_OPTIMISED_AGAIN)
+        again.deepen()
+    return again.best()
+
+
+def _as_asked(found: Answer | None, context: Context) -> tuple[Answer | None, float]:
+    """A movement of another objective as an answer to this request, stretched where a duration is requested;
+    None where it isn't certified or takes longer. And its own duration [s].
     """
-    found, _ = _improved(exploration, context.asking(objective))
     if found is None:
         return None, np.inf
     method, other = found
