@@ -29,6 +29,8 @@ SPEED_GUARD = 50.0
 _CHUNK = 4096  # steps whose work is kept when nobody asks for it
 _THICKNESS = 1e-6  # share of the largest principal moment; a thousand times finer than it is known
 
+_ATTEMPTS, _NUDGE = 20, 1e-9  # one attempt in sixteen fails; relative: far below any confidence in an inertia
+
 
 class PyBulletBackend:
     """Implements Backend for `robot` standing at `base_pose` (4, 4).
@@ -86,8 +88,25 @@ class PyBulletBackend:
         self._write_state()
 
     def set_load(self, loads: Sequence[Load]) -> None:
-        """Rebuild the robot with these loads, in the same motion."""
-        self._loads = tuple(_solid(load) for load in loads)
+        """Rebuild the robot with these loads, in the same motion. Raises BackendError where Bullet takes none
+        of their inertia.
+
+        Bullet turns an inertia into the frame of a link, and refuses to compute with it where rounding has
+        left it unsymmetrical by one bit: then it is tried with one that differs by parts in a billion.
+        """
+        solid = [_solid(load) for load in loads]
+        for attempt in range(_ATTEMPTS):
+            self._loads = tuple(_nudged(load, attempt) for load in solid)
+            self._build()
+            try:
+                self.bias()
+                return
+            except BackendError:
+                continue
+        names = ", ".join(load.name for load in loads)
+        raise BackendError(f"PyBullet cannot compute with the inertia of {names or 'the robot'}")
+
+    def _build(self) -> None:
         text = self._urdf(self._robot, self._loads)
         bullet = self._bullet
         # a new server: the inverse dynamics of a removed body live on in the old one
@@ -264,6 +283,12 @@ def _solid(load: Load) -> Load:
     if moments[0] + moments[1] - moments[2] > _THICKNESS * moments[2]:
         return load
     return replace(load, inertia=load.inertia + np.eye(3) * (_THICKNESS * moments[2]))
+
+
+def _nudged(load: Load, attempt: int) -> Load:
+    """The load with an inertia that differs by about _NUDGE; as it is at attempt 0."""
+    noise = np.random.default_rng(attempt).normal(size=(3, 3)) * (_NUDGE * np.abs(load.inertia).max())
+    return load if attempt == 0 else replace(load, inertia=load.inertia + noise + noise.T)
 
 
 def _pybullet() -> Any:
