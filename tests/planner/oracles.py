@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio
-from ir_planner.scene.planning_scene import PlanningScene
 from numpy.typing import NDArray
 
 from ir_description import RobotModel, robot_urdf
+from ir_planner.scene.planning_scene import PlanningScene
 
 FloatArray = NDArray[np.float64]
 

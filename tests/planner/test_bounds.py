@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from ir_description import load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.program.bounds import Rates, least_cost, least_seconds, potential_energy
@@ -18,8 +20,6 @@ from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
-
-from ir_description import load_cell, load_power_data
 
 CELL = load_cell("open")
 SCENE = scene_with(CELL, load_text(CELL), load_power_data())

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from ir_description import Cell, PowerData
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
@@ -23,8 +25,6 @@ from ir_planner.program.time_values import Point, TimeValues, convex_front
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_planner.timing import Movement
-
-from ir_description import Cell, PowerData
 
 BASE = 600.0  # W, while a program moves
 

@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from asking import planned
+from numpy.typing import NDArray
+
+from ir_description import cell_from_yaml, load_cell, load_power_data
 from ir_kernels.collision import FREE
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.options import PlanOptions
@@ -25,9 +28,6 @@ from ir_planner.search.correction import colliding_stretch, corrected, different
 from ir_planner.search.genetic import Genetic
 from ir_planner.search.population import _Breeder, evolve, path_matrix
 from ir_planner.search.registry import SEARCHES
-from numpy.typing import NDArray
-
-from ir_description import cell_from_yaml, load_cell, load_power_data
 
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]

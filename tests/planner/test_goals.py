@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from ir_description import load_cell
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request.goals import one_goal, parse_goal
-
-from ir_description import load_cell
 
 CELL = load_cell("demo")
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from ir_planner.configurations.interaction_point import (
     branches,
     distinct_configurations,

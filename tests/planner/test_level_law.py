@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from ir_planner.scene.motion_limits import torque_use
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.level_law import LEVELS, LevelLaw, level_laws

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ir_planner.scene.movement_cost import cheapest_chain, movement_cost, movement_weights, path_cost
 
 from ir_description import load_robot
+from ir_planner.scene.movement_cost import cheapest_chain, movement_cost, movement_weights, path_cost
 
 ROBOT = load_robot()
 WEIGHTS = movement_weights(ROBOT.link_mass, ROBOT.velocity_max)

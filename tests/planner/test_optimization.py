@@ -11,6 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
+from ir_description import PowerData
 from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
@@ -25,9 +28,6 @@ from ir_planner.search import SEARCHES
 from ir_planner.trajectories.optimization import POINTS_MAX, OptimizationPlan, optimize_trajectory
 from ir_planner.trajectories.pareto import non_dominated
 from ir_planner.trajectories.through_points import Reference
-from numpy.typing import NDArray
-
-from ir_description import PowerData
 
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]

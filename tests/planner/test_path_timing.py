@@ -8,6 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import movement_energy
@@ -29,7 +31,6 @@ from ir_planner.timing.objective import objective_weights
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.torque_shares import TORQUE_SHARES
 from ir_planner.trajectories.through_points import Reference, plan_through
-from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 TIME = PlanOptions(objective="time", planning_time=600.0)

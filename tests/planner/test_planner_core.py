@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from ir_description import load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -24,8 +26,6 @@ from ir_planner.scene.planning_scene import scene_with, with_parts
 from ir_planner.service.service_lines import line_poses, service_lines
 from ir_planner.store import Store
 from ir_planner.trajectories.through_points import Reference
-
-from ir_description import load_cell
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves.polynomials import extremes
 

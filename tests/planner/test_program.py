@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from ir_description import Cell, PowerData, load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, TrajectoryReport
 from ir_msgs_py.status import StatusCode
@@ -25,8 +27,6 @@ from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
 from ir_planner.service.service_lines import timed_service
 from ir_planner.service.withdrawals import EXIT_SEARCHES
-
-from ir_description import Cell, PowerData, load_cell
 
 
 def no_progress(phase: str, done: int, total: int, cost: float) -> None:

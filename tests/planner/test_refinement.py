@@ -10,6 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from asking import planned
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.curves.uniform_spline import UniformSpline, along_path
@@ -21,10 +24,8 @@ from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.service.service_movement import plan_service
 from ir_planner.service.work_configurations import ServiceRequest
-from ir_planner.timing.straight_steps import straight_steps
 from ir_planner.timing.objective import coarse_cost, objective_value
-from numpy.typing import NDArray
-from scipy.interpolate import BSpline
+from ir_planner.timing.straight_steps import straight_steps
 
 SceneOf = Callable[[str], PlanningScene]
 FloatArray = NDArray[np.float64]

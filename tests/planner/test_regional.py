@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from asking import planned
+
+from ir_description import cell_from_yaml, load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import CancelledError
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
-
-from ir_description import cell_from_yaml, load_cell, load_power_data
 
 SceneOf = Callable[[str], PlanningScene]
 TASKS = [

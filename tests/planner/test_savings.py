@@ -6,6 +6,8 @@ import time
 
 import numpy as np
 import pytest
+
+from ir_description import Cell, PowerData
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner.program.chain import layers_of
@@ -19,8 +21,6 @@ from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.search.registry import registered
 from ir_planner.service.withdrawals import EXIT_SEARCHES
-
-from ir_description import Cell, PowerData
 
 STATIONS = ("home", "infeed_pick", "gauge_measure", "park")
 

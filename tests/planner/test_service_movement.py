@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from ir_description import Body, Cell, PowerData, load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks.evaluation import evaluate_trajectory
@@ -28,8 +30,6 @@ from ir_planner.service.step_weights import accumulated_mass, step_weights
 from ir_planner.service.withdrawals import exit_searches, withdrawal
 from ir_planner.service.work_area import WorkArea
 from ir_planner.service.work_configurations import ServiceRequest
-
-from ir_description import Body, Cell, PowerData, load_cell
 
 IN_ZONES = [
     ("cnc_door", "cnc"),

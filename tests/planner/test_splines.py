@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
+
 from ir_planner.curves.arc_length import evenly_spaced
 from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
-from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 number = st.floats(-3.0, 3.0)

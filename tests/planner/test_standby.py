@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from ir_description import load_cell, load_power_data
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
 from ir_planner.program.standby import break_even, late_start, mode_watts, pause_energy, plan_standby
 from ir_planner.scene.planning_scene import load_text, scene_with
-
-from ir_description import load_cell, load_power_data
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Hop, Part, Settled, StationGraph
 
 

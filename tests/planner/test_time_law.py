@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from ir_planner.timing.time_law import GRID_S, LawLimits, TimeLaw, law_states, phase_steps, reached_speed
 
 positive = st.floats(0.05, 20.0)

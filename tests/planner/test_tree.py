@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+
 from ir_kernels.collision import FREE
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.errors import CancelledError

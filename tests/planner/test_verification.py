@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from ir_description import load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -18,8 +20,6 @@ from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.scene.zones import polynomials_between
 from ir_planner.timing.straight_steps import straight_steps
-
-from ir_description import load_cell, load_power_data
 
 Degrees = Callable[..., Any]
 NAMES = ("joint_a1", "joint_a2", "joint_a3", "joint_a4", "joint_a5", "joint_a6")

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from asking import planned
+
 from ir_msgs_py.options import PlanOptions
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene

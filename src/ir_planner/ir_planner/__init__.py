@@ -9,7 +9,6 @@ Everything a user needs is exported here; the rooms below are the planner's own.
 """
 
 from ir_msgs_py.options import PlanOptions
-
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError

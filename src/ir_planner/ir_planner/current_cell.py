@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 
+from ir_description import Cell, PowerData, cell_from_yaml, load_cell
 from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
-
-from ir_description import Cell, PowerData, cell_from_yaml, load_cell
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.scene import PlanningScene, load_text, scene_with
 

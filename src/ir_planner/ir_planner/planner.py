@@ -6,13 +6,12 @@ Every request takes one immutable snapshot of the cell; changing the cell meanwh
 from collections.abc import Callable
 from dataclasses import replace
 
+from ir_description import Cell, PowerData, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
-from ir_description import Cell, PowerData, load_power_data
 from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory, state_check
 from ir_planner.configurations import (
     IK_METHODS,

@@ -8,7 +8,6 @@ from ir_kernels.power import Regeneration
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.settings import check_settings, setting, stage
 from ir_msgs_py.transitions import TransitionTimes
-
 from ir_planner.configurations import InteractionSettings
 from ir_planner.search import Search, registered
 from ir_planner.service import ModifiedGa

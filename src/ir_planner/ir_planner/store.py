@@ -8,7 +8,6 @@ from typing import Generic, TypeVar
 
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
-
 from ir_planner.errors import RequestError
 
 T = TypeVar("T")

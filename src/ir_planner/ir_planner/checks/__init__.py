@@ -7,8 +7,7 @@ from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measur
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
-from ir_planner.checks.states import end_in_collision, too_near, too_near_sentence
-from ir_planner.checks.states import StateCheck, state_check
+from ir_planner.checks.states import StateCheck, end_in_collision, state_check, too_near, too_near_sentence
 from ir_planner.checks.verification import TorqueProof, Verification, torque_proof, verified
 
 __all__ = [

@@ -5,12 +5,12 @@ profile.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from ir_kernels.collision import FREE, Witnesses
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
-from numpy.typing import NDArray
-
 from ir_planner.scene import PlanningScene
 
 _STEP, _FEWEST, _MOST = 0.01, 32, 2000  # s between the samples of a profile, and how many of them

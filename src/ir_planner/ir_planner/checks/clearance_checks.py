@@ -6,7 +6,6 @@ At a station its allowed contacts hold while the tcp is in the machine's zone; o
 from ir_kernels.collision import COLLIDES, FREE
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.checks.clearance import pair_value
 from ir_planner.checks.limit_checks import Violation, segment_at
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, polynomials_between, spans_outside, tcp_inside

@@ -8,10 +8,10 @@ end is not credited.
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_kernels import dc_bus
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene import PlanningScene
 
 STEP_S = 1e-3

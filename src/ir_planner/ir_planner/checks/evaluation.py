@@ -5,9 +5,9 @@ proved.
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy
 from ir_planner.checks.verification import Verification, verify

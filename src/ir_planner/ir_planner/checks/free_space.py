@@ -5,9 +5,9 @@ thresholds.
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.arrays import BoolArray, FloatArray
-
 from ir_planner.request import Work
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 

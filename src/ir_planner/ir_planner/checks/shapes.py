@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
 
 from ir_description import Body, Cell
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile
 from ir_planner.scene import PlanningScene
 

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
-
 from ir_planner.checks.clearance import nearest_pairs, pair_value
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene

@@ -6,10 +6,10 @@ named with place, limit and excess.
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.checks.clearance_checks import clearance_violation
 from ir_planner.checks.limit_checks import (
     SLACK,

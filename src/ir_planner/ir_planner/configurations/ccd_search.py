@@ -10,10 +10,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
-from ir_kernels.reference.ccd import best_value
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 from ir_kernels import CcdSettings, ccd
+from ir_kernels.reference.ccd import best_value
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_planner.configurations.set_back import shares_back
 from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.request import Work

@@ -6,8 +6,8 @@ complete set, made distinct and ranked as that is.
 """
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray, IntArray
 
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.configurations.ccd_search import descend
 from ir_planner.configurations.inverse_kinematics import Configurations
 from ir_planner.configurations.settings import InteractionSettings

@@ -6,6 +6,7 @@ the gain of distance in metres as the factor.
 """
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 
 SECANT, LITERAL = "secant", "literal"

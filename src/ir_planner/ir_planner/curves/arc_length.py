@@ -1,6 +1,7 @@
 """Configurations along a path by the share of its length that lies before them."""
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 
 

@@ -9,9 +9,9 @@ a line, so none is missed and no sampling takes part.
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
 from ir_kernels import Extrema, polynomial_extrema
+from ir_msgs_py.arrays import FloatArray
 
 _HALVINGS = 15  # a root to 3e-5 of the segment: the value at an extreme is off by its square
 

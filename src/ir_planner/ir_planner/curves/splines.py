@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 from scipy.interpolate import PPoly, make_interp_spline
+
+from ir_msgs_py.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ closed forms.
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.curves.arc_length import at_shares
 
 

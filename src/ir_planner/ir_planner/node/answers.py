@@ -3,6 +3,8 @@
 from typing import Any
 
 import numpy as np
+
+from ir_description import Cell, Station
 from ir_msgs.msg import AllowedContact as AllowedContactMsg
 from ir_msgs.msg import Station as StationMsg
 from ir_msgs_py.ros.conversions import (
@@ -19,15 +21,12 @@ from ir_msgs_py.ros.conversions import (
     trajectory_to_msg,
 )
 from ir_msgs_py.status import Status
-
-from ir_description import Cell, Station
-from ir_planner.checks import Evaluation
-from ir_planner.checks import StateCheck
+from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
-from ir_planner.store import StoredProgram
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
 from ir_planner.service import ServicePlan
+from ir_planner.store import StoredProgram
 from ir_planner.trajectories import OptimizationPlan
 
 

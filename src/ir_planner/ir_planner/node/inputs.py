@@ -6,6 +6,8 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
+
+from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import BASE_FRAME
@@ -22,8 +24,6 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
-from ir_description import Cell
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.request import Goal, one_goal

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from geometry_msgs.msg import Point
-from ir_msgs_py.ros.conversions import pose_to_msg
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_msgs_py import names
+from ir_msgs_py.ros.conversions import pose_to_msg
 from ir_planner.checks import Shape
 
 _MARKER = {

@@ -12,6 +12,18 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.action import ActionServer
+from rclpy.action.server import ServerGoalHandle
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+from visualization_msgs.msg import MarkerArray
+
+from ir_description import DescriptionError
+from ir_kernels import compiled
 from ir_msgs.action import Plan
 from ir_msgs.srv import (
     CheckState,
@@ -29,6 +41,7 @@ from ir_msgs.srv import (
     SetCell,
     SetEquipment,
 )
+from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.parameters import Parameters
@@ -37,24 +50,11 @@ from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from rclpy.action import ActionServer
-from rclpy.action.server import ServerGoalHandle
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rclpy.context import Context
-from rclpy.executors import MultiThreadedExecutor
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
-from visualization_msgs.msg import MarkerArray
-
-from ir_description import DescriptionError
-from ir_kernels import compiled
-from ir_msgs_py import names
 from ir_planner.checks import cell_shapes, movement_shapes
-from ir_planner.node.markers import ShownMarkers
 from ir_planner.node.answers import fill_status
 from ir_planner.node.goal_queue import GoalQueue
 from ir_planner.node.inputs import LastState, measured_velocity
+from ir_planner.node.markers import ShownMarkers
 from ir_planner.node.requests import Requests
 from ir_planner.planner import Planner
 from ir_planner.service import ServicePlan, service_shapes

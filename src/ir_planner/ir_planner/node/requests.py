@@ -8,15 +8,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
+from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, is_path, robot_urdf
+from ir_kernels import KernelError
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError, PoseError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
-from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, is_path, robot_urdf
-from ir_kernels import KernelError
 from ir_planner.errors import CancelledError, PlannerError, RequestError
 from ir_planner.node.answers import (
     fill_evaluation,

@@ -1,9 +1,9 @@
 """Descents to certified movements from several starts near one path."""
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.curves import UniformSpline, along_motion, along_path, evenly_spaced, fewest_seconds
 from ir_planner.optimize.refinement import (
     EDGES_PER_INTERVAL,

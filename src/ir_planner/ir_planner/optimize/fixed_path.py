@@ -3,13 +3,13 @@
 from functools import lru_cache
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dpbtrs
 
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
 
 _PLACES = 2000  # of the path, between which it is interpolated

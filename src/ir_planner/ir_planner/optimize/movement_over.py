@@ -1,7 +1,6 @@
 """The movement over a given free path."""
 
 from ir_msgs_py.arrays import FloatArray
-
 from ir_planner.optimize.refinement import Refinement
 from ir_planner.request import Context
 from ir_planner.timing import Movement, distinct, straight_steps

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
 
 _KNOT = 0.02  # intervals: what is nearer to a knot is passed there

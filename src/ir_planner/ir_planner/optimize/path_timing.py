@@ -11,11 +11,11 @@ passed exactly by the correction of least jerk, where that costs little time.
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import convolve1d, maximum_filter1d
 
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
 from ir_planner.optimize.fixed_path import FixedPath
 from ir_planner.optimize.passing import Passing

@@ -10,8 +10,8 @@ it better.
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import at_shares
 from ir_planner.errors import TimingError

@@ -5,13 +5,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dtbtrs
-
 from scipy.optimize import Bounds, OptimizeResult, minimize
 
 from ir_kernels import SplineCost
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.optimize.fixed_path import FixedPath, from_knots
 from ir_planner.optimize.passing import jerk_bands
 from ir_planner.optimize.terms import spline_cost

@@ -10,11 +10,11 @@ comes too near gets a larger clearance margin, and the descent continues.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ir_msgs_py.arrays import BoolArray, FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
 from ir_kernels import SplineCost
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Violation
 from ir_planner.curves import UniformSpline, along_path, fewest_seconds
 from ir_planner.optimize.slowing import slowed_to_limits

@@ -1,9 +1,9 @@
 """The objective and the limits of a request as the compiled cost of splines takes them."""
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
 from ir_kernels import SplineCost, SplineTerms
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import ObjectiveWeights

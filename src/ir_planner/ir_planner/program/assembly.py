@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
-
 from ir_planner.program.pauses import Pause
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part

@@ -9,8 +9,8 @@ Losses in the motors and what the brake resistor takes are not counted, so the b
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import MotionLimits, PlanningScene
 
 _PLACES = 64  # of the line over which static torque is integrated: smooth over a few rad, error below 0.01 J

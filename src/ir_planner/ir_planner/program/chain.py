@@ -5,8 +5,8 @@ cheapest chain through them.
 from collections.abc import Mapping
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.program.edges import CostEdges, TravelEdges
 from ir_planner.program.movements import Movements
 from ir_planner.program.node import Node

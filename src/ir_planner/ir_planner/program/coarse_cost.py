@@ -8,9 +8,9 @@ edges of the bundled cells' programs the planner's movements cost 0.97 times the
 """
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
 from ir_kernels import SplineCost, SplineTerms
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.curves import UniformSpline, along_path, fewest_seconds
 from ir_planner.program.bounds import Rates
 from ir_planner.request import Context

@@ -9,8 +9,8 @@ movement runs along the planner's path in straight steps with blended corners; `
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.report import PlannedMovement
 
+from ir_msgs_py.report import PlannedMovement
 from ir_planner.errors import TimingError
 from ir_planner.program.assembly import assembled, legs_of
 from ir_planner.program.chain import parts_of

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.status import StatusCode
 
+from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain, parts_of
 from ir_planner.program.cycle_time import Task, Timed, shared_out

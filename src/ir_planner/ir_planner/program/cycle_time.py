@@ -9,7 +9,6 @@ is left of the time is given to the next part in turn where that is cheaper than
 from collections.abc import Callable
 from dataclasses import dataclass
 
-
 from ir_planner.program.station_graph import Part
 from ir_planner.program.time_values import Point, SlowDown, TimeValues, slow_downs
 from ir_planner.timing import Movement

@@ -6,8 +6,8 @@ exact where that is free; else the path found.
 """
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.program.bounds import least_cost
 from ir_planner.program.coarse_cost import MARGIN, CoarseCost

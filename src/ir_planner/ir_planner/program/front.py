@@ -5,8 +5,8 @@ with a point's cycle time looks for a better one as well.
 """
 
 import numpy as np
-from ir_msgs_py.status import Status
 
+from ir_msgs_py.status import Status
 from ir_planner.program.cycle_plan import task_of, values_of
 from ir_planner.program.cycle_time import shared_out
 from ir_planner.program.program import chosen_chain, cycle_of, filled, finished, prepared

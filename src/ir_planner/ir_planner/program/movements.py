@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-
 from ir_planner.errors import TimingError
 from ir_planner.program.bounds import Rates
 from ir_planner.program.node import Node
@@ -19,7 +18,6 @@ from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context
 from ir_planner.service import timed_service
 from ir_planner.timing import Movement
-
 
 Key = tuple[int, str, tuple[str, str], tuple[bytes, bytes]]  # scene, kind, names of the stops, ends
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from ir_msgs_py.arrays import FloatArray
-
 from ir_planner.service import ServiceLine
 
 

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.transitions import TransitionTimes
-
 from ir_planner.program.standby import BRAKES, MOTORS, late_start, pause_energy, plan_standby
 from ir_planner.scene import PlanningScene
 

@@ -9,10 +9,10 @@ import hashlib
 from collections.abc import Mapping
 
 import numpy as np
+
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status
-
 from ir_planner.checks import total_report
 from ir_planner.program.assembly import assembled, legs_of
 from ir_planner.program.chain import cheapest_chain, layers_of, parts_of

@@ -3,13 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from ir_description import Cell, PowerData
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-
-from ir_description import Cell, PowerData
 from ir_planner.errors import RequestError
 from ir_planner.settings import PlannerSettings
 

@@ -9,12 +9,12 @@ motors until its timer closes the brakes, and opens them when the next movement 
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-
 from ir_planner.checks import holding_watts
 from ir_planner.errors import RequestError
 from ir_planner.scene import PlanningScene

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
 LEAVE, ACROSS, ENTER = "leave", "across", "enter"

@@ -4,11 +4,10 @@ it.
 
 from dataclasses import dataclass, field
 
-from ir_kernels.power import Regeneration
-from ir_msgs_py.status import StatusCode
-
 from ir_description import Cell, InvalidValueError, PartPlaces, PowerData, ProgramStep, Signal
 from ir_description import UnknownNameError as DescriptionNameError
+from ir_kernels.power import Regeneration
+from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.request import POSTURES
 from ir_planner.scene import PlanningScene, with_parts

@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
-
 from ir_planner.checks import FreeSpace, too_near
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.program.node import Node

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_planner.program.movements import Failure, Movements, cost_of
 from ir_planner.program.bounds import Rates
+from ir_planner.program.movements import Failure, Movements, cost_of
 from ir_planner.program.request import StageError
 from ir_planner.program.station_graph import Part
 from ir_planner.timing import Movement

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Context, Journal
 from ir_planner.service import Exit, ExitSearch, ServiceLine, WorkArea, withdrawal

@@ -5,7 +5,6 @@ request.
 from collections.abc import Callable
 
 from ir_msgs_py.status import Status
-
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.regional.safeguards import DIRECT
 from ir_planner.request import Context

@@ -3,7 +3,6 @@
 from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
-
 from ir_planner.checks import FreeSpace, pair_value
 from ir_planner.request import Journal
 

@@ -7,10 +7,10 @@ Nothing found is an answer too: which pair blocks, where, by how much, and what 
 """
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
-
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.regional.answer import MovementPlan

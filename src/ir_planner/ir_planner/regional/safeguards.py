@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import Portfolio, Refinement

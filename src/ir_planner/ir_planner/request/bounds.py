@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
-
 from ir_planner.errors import RequestError
 
 SAFETY_DISTANCE_MAX = 1.0  # m

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
-
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene import MotionLimits, PlanningScene

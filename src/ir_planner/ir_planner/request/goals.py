@@ -9,11 +9,11 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+
+from ir_description import Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
-
-from ir_description import Cell
 from ir_planner.errors import RequestError, UnknownNameError
 
 POSTURES = ("home", "park")

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
-
 from ir_planner.request.work import Work
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 
 STILL = 1e-9  # rad: nothing moves

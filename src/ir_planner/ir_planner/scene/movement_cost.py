@@ -8,8 +8,9 @@ starts at the joint.) W ranks movements; it is not their energy.
 import itertools
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 from numpy.typing import NDArray
+
+from ir_msgs_py.arrays import FloatArray
 
 
 def movement_weights(link_mass: FloatArray, velocity_max: FloatArray, load_mass: float = 0.0) -> FloatArray:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+
+from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station, Zone
+from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
 from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
-
-from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station, Zone
-from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.scene.motion_limits import MotionLimits
 from ir_planner.scene.movement_cost import movement_weights

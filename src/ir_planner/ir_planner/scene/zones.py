@@ -6,9 +6,9 @@ checked with the plain safety distance.
 """
 
 import numpy as np
+
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.scene.planning_scene import PlanningScene
 
 _SAMPLES = 400

@@ -9,9 +9,9 @@ A stretch whose population finds nothing is tried again, each time wider and wit
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.arrays import FloatArray
-
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import path_cost
 from ir_planner.search.genetic_settings import SAMPLES_MAX, GeneticSettings

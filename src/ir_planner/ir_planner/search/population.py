@@ -11,9 +11,9 @@ steps.
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.arrays import FloatArray, IntArray
-
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import spline_through, to_ppoly, virtual_knots
 from ir_planner.scene import movement_cost, path_cost

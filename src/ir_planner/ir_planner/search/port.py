@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from ir_msgs_py.arrays import FloatArray
-
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 

@@ -8,9 +8,9 @@ the machine than a straight exit; this is the cheap attempt before the trees.)
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found

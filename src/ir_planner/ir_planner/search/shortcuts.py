@@ -4,8 +4,8 @@ Everything is tried in batches of certified edges, so a polished path is as free
 """
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import movement_cost, path_cost
 

@@ -7,10 +7,10 @@ budget, so that a request can be stopped between them.
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from ir_kernels.search import BidirectionalTree
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found

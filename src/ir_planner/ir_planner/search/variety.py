@@ -1,8 +1,8 @@
 """A few paths that differ: those that pass elsewhere in their middle."""
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import path_cost
 
 NEAREST_GOALS = 3  # goals that are tried by a search which takes one at a time: the rest cost more by W

@@ -4,6 +4,7 @@ They are generated in one go and certified in one batch; which of them are free 
 """
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of the joint step to a posture by which the arm is retracted

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ir_msgs_py.arrays import BoolArray, FloatArray
 
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Context
 from ir_planner.scene import tcp_inside

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.request import Work
 from ir_planner.service.exit import Exit
 

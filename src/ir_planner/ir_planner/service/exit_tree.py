@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_planner.request import Work
 from ir_planner.search import connect, joint_scale
 from ir_planner.service.exit import Exit

@@ -12,10 +12,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
+
 from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.settings import check_settings, setting
-
 from ir_planner.request import Work
 from ir_planner.service.exit import Exit
 from ir_planner.service.exit_search import ExitsFound

@@ -9,9 +9,9 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
 from ir_description import Station
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
 from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled

@@ -5,6 +5,7 @@ option "inverse" lets the light joints, which move little of the arm, step more.
 """
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 
 WEIGHTINGS = ("literal", "inverse")

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
-
 from ir_planner.errors import RequestError
 from ir_planner.request import Journal
 from ir_planner.scene import path_cost

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from ir_msgs_py.arrays import BoolArray, FloatArray
 
 from ir_description import Body, Station, Zone
 from ir_kernels import CollisionModel
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_planner.scene import PlanningScene
 
 FIRST_LINK = 3  # of the links that must leave the zone: those before it never enter

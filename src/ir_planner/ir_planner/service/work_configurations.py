@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.status import Status, StatusCode
 
 from ir_description import Station
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace, too_near
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.errors import RequestError

@@ -7,8 +7,8 @@ keep to the synchronous law too, those first that leave the line most.
 """
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.timing.time_law import Law, LawLimits, StepLaws, TimeLaw, phase_steps
 

@@ -6,9 +6,9 @@ portfolio is compared with it.
 """
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.request import Context
 from ir_planner.scene import STILL, MotionLimits
 from ir_planner.timing.blending import TimedPath, blended, stretched

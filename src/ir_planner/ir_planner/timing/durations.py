@@ -3,7 +3,6 @@
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.errors import RequestError
 from ir_planner.request import DURATION_MAX, Context
 from ir_planner.timing.blending import stretched

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray, IntArray
 
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.timing.time_law import GRID_S
 
 BANDS = np.array([0.6, 0.84, 1.0])  # upper ends of the bands, as shares of the cruising speed

@@ -3,8 +3,8 @@ halving.
 """
 
 import numpy as np
-from ir_msgs_py.arrays import BoolArray, FloatArray
 
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.timing.level_law import LEVELS, LevelLaw, LevelLaws, level_laws
 from ir_planner.timing.ptp import fastest_law, free_law, path_limits

@@ -6,8 +6,8 @@ factor is an estimate, to be applied again.
 """
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import MotionLimits
 
 

@@ -10,7 +10,6 @@ from functools import cached_property
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.checks import (
     Evaluation,
     TorqueProof,

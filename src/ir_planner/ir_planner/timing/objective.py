@@ -7,12 +7,12 @@ time_value x T, without the base load of the controller, which is part of what a
 from dataclasses import dataclass
 
 import numpy as np
+
+from ir_kernels import dc_bus
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-
-from ir_kernels import dc_bus
 from ir_planner.checks import movement_energy
 from ir_planner.request import Context
 from ir_planner.scene import path_cost

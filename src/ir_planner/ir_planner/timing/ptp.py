@@ -7,9 +7,9 @@ every joint stays within its share of the envelope along the whole law; the shor
 """
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.errors import TimingError
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.timing.time_law import GRID_S, LawLimits, TimeLaw, law_states, phase_steps

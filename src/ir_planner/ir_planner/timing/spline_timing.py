@@ -9,10 +9,10 @@ largest use is 1. Durations are whole grid steps (even, the virtual knots halve 
 from typing import Any
 
 import numpy as np
-from ir_msgs_py.arrays import FloatArray, IntArray
-from ir_msgs_py.trajectory import JointTrajectory
 from numpy.typing import NDArray
 
+from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, natural_durations, spline_through, virtual_knots
 from ir_planner.errors import TimingError
 from ir_planner.scene import Dynamics, MotionLimits

@@ -10,10 +10,10 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.checks import SLACK, Violation, clearance_violation
 from ir_planner.curves import extremes
 from ir_planner.request import Context

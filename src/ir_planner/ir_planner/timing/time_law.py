@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray, IntArray
 
 GRID_S = 1e-3

@@ -9,12 +9,12 @@ paths are searched. The trade of time for energy comes with the answer.
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-
 from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
 from ir_planner.curves import UniformSpline, evenly_spaced
 from ir_planner.errors import RequestError

@@ -10,11 +10,11 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import rescaled
