@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from _baseline import baseline
 from _drives import Drives
-from _energy_peer import EnergyPeer
 from energy import MOST, S_M, certified, movements
 
 from ir_planner import Planner
@@ -16,6 +15,8 @@ from ir_planner import Planner
 
 @pytest.mark.long
 def test_a_peer_is_certified_and_cheaper_than_the_baseline() -> None:
+    from _energy_peer import EnergyPeer  # CasADi takes a second to load
+
     planner = Planner(time.monotonic)
     planner.set_cell("", "open")
     scene = planner.scene()
