@@ -33,16 +33,10 @@ from ir_recorder.parameters import declared_settings
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.write.cell_files import files_of_cell
 from ir_recorder.write.session import CellFiles, RecordingSession
-from ir_recorder.write.writer import RecordingSummary, RecordingWriter
+from ir_recorder.write.writer import OpenWriter, RecordingSummary, open_writer
 
 COMMAND_NODE = "ir_record"  # beside the cell's own recorder
 POLL_PERIOD = 0.02  # s: 10 joint states at a time; waking for each takes a third of a core
-OpenWriter = Callable[[str, bool, FileRoots], RecordingWriter]
-
-
-def open_writer(path: str, overwrite: bool, roots: FileRoots) -> RecordingWriter:
-    """The writer of a file below `roots`; a test may hand in another."""
-    return RecordingWriter(path, overwrite=overwrite, roots=roots)
 
 
 class RecorderNode(Node):

@@ -8,7 +8,7 @@ channel, so everything else (cell file, URDF, facts) goes into attachments and m
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -190,3 +190,11 @@ def _open(path: Path, overwrite: bool, roots: FileRoots) -> BinaryIO:
         raise PathError(f"{path} is there already; choose another path or set overwrite") from error
     except OSError as error:
         raise PathError(f"{path} can't be written: {error.strerror}") from error
+
+
+OpenWriter = Callable[[str, bool, FileRoots], RecordingWriter]
+
+
+def open_writer(path: str, overwrite: bool, roots: FileRoots) -> RecordingWriter:
+    """The writer of a file below `roots`; a test may hand in another."""
+    return RecordingWriter(path, overwrite=overwrite, roots=roots)

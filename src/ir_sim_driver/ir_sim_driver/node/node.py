@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -28,13 +27,12 @@ from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, Sta
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.conversions import (
-    plc_inputs_from_msg,
     plc_inputs_to_msg,
     plc_outputs_to_msg,
     power_state_to_msg,
     time_to_msg,
 )
-from ir_msgs_py.ros.quality import ACTION_SERVICES, COMMANDS, REQUESTS_WAITING, SERVICE
+from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
 from ir_msgs_py.ros.running import run_node
 from ir_sim_driver.controller import Driver, Entry, Frame, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError, PlantStoppedError
@@ -43,10 +41,11 @@ from ir_sim_driver.node.executions import Executions
 from ir_sim_driver.node.markers import robot_markers
 from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state, goal_from_trajectory
 from ir_sim_driver.node.parameters import DriverParameters
+from ir_sim_driver.node.plc_topic import PlcTopic
 from ir_sim_driver.node.real_time import GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
 from ir_sim_driver.notices import Level, Notice
-from ir_sim_driver.plc import TOPIC, OpenLink
+from ir_sim_driver.plc import OpenLink
 
 try:  # where a ROS installation has it
     from control_msgs.action import FollowJointTrajectory
@@ -118,9 +117,7 @@ class SimDriver(Node):
         self._joint_state = JointState(name=list(self._driver.joint_names))
         self._joint_state.header.frame_id = names.BASE_FRAME
         self.create_subscription(JointTrajectory, names.COMMANDED_TRAJECTORY, self._on_trajectory, 10)
-        self._plc_messages: deque[tuple[int, PlcInputsMsg]] = deque(maxlen=REQUESTS_WAITING)
-        for quality in COMMANDS:
-            self.create_subscription(PlcInputsMsg, names.PLC_INPUTS, self._on_plc_inputs, quality)
+        self._plc_topic = PlcTopic(self, self._driver)
         self.create_subscription(
             Float64, names.SPEED_SCALING, lambda msg: self._driver.set_speed_scaling(float(msg.data)), 10
         )
@@ -247,16 +244,6 @@ class SimDriver(Node):
     def _topic_ended(self, outcome: Outcome) -> None:
         if outcome.code is not ErrorCode.SUCCESSFUL:
             self._driver.warn(f"trajectory of the topic: {outcome.sentence} ({outcome.code.name})")
-
-    def _on_plc_inputs(self, msg: PlcInputsMsg, info: dict[str, int]) -> None:
-        heard = (info["source_timestamp"], msg)
-        if heard in self._plc_messages:  # by the other subscription
-            return
-        self._plc_messages.append(heard)
-        try:
-            self._driver.plc.write_all_inputs(TOPIC, plc_inputs_from_msg(msg))
-        except (MsgsError, DriverError) as error:
-            self._driver.warn(f"plc_inputs ignored: {error}")
 
     # slow topics out
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from ir_description import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import BackendError
 from ir_sim_driver.plant.backend import STANDING, Work
+from ir_sim_driver.plant.bullet_inertia import ATTEMPTS, nudged, solid
 from ir_sim_driver.plant.control import CommandFollower, ControlSettings
 from ir_sim_driver.plant.drivetrain import Drivetrain
 
@@ -27,9 +27,6 @@ BRAKE_FACTOR = 1.5
 SPEED_GUARD = 50.0
 """Speed [rad/s] that no joint reaches: beyond it the physics has diverged."""
 _CHUNK = 4096  # steps whose work is kept when nobody asks for it
-_THICKNESS = 1e-6  # share of the largest principal moment; a thousand times finer than it is known
-
-_ATTEMPTS, _NUDGE = 20, 1e-9  # one attempt in sixteen fails; relative: far below any confidence in an inertia
 
 
 class PyBulletBackend:
@@ -94,9 +91,9 @@ class PyBulletBackend:
         Bullet turns an inertia into the frame of a link, and refuses to compute with it where rounding has
         left it unsymmetrical by one bit: then it is tried with one that differs by parts in a billion.
         """
-        solid = [_solid(load) for load in loads]
-        for attempt in range(_ATTEMPTS):
-            self._loads = tuple(_nudged(load, attempt) for load in solid)
+        bodies = [solid(load) for load in loads]
+        for attempt in range(ATTEMPTS):
+            self._loads = tuple(nudged(load, attempt) for load in bodies)
             self._build()
             try:
                 self.bias()
@@ -272,23 +269,6 @@ class PyBulletBackend:
             info = self._bullet.getJointInfo(self._body, joint, physicsClientId=self._client)
             by_name[info[1].decode()] = joint
         return [by_name[name] for name in self._robot.joint_names]
-
-
-def _solid(load: Load) -> Load:
-    """The load with an inertia that Bullet does not take for impossible by rounding, and then for zero.
-
-    A flat disc fulfils the triangle inequality of the principal moments with equality.
-    """
-    moments = np.linalg.eigvalsh(load.inertia)
-    if moments[0] + moments[1] - moments[2] > _THICKNESS * moments[2]:
-        return load
-    return replace(load, inertia=load.inertia + np.eye(3) * (_THICKNESS * moments[2]))
-
-
-def _nudged(load: Load, attempt: int) -> Load:
-    """The load with an inertia that differs by about _NUDGE; as it is at attempt 0."""
-    noise = np.random.default_rng(attempt).normal(size=(3, 3)) * (_NUDGE * np.abs(load.inertia).max())
-    return load if attempt == 0 else replace(load, inertia=load.inertia + noise + noise.T)
 
 
 def _pybullet() -> Any:
