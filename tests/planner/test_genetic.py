@@ -24,10 +24,11 @@ from ir_planner.errors import CancelledError
 from ir_planner.request.work import Work
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
-from ir_planner.search.correction import colliding_stretch, corrected, different
+from ir_planner.search.correction import colliding_stretch, corrected
 from ir_planner.search.genetic import Genetic
 from ir_planner.search.population import _Breeder, evolve, path_matrix
 from ir_planner.search.registry import SEARCHES
+from ir_planner.search.variety import evenly, first_different
 
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]
@@ -100,9 +101,9 @@ def test_the_paths_are_different(scene_of: SceneOf) -> None:
     start, goal = ends(scene, "p1->p2")
     found = corrected(start, goal, space_of(scene), SETTINGS, np.random.default_rng(0))
     assert len(found.paths) == SETTINGS.paths
-    assert different(found.paths, 10, SETTINGS.difference) == found.paths
+    assert first_different(found.paths, 10, SETTINGS.difference, evenly) == found.paths
     bent = found.paths[0] + np.linspace(0.0, 0.1, len(found.paths[0]))[:, None]
-    assert len(different([found.paths[0], bent], 10, SETTINGS.difference)) == 1
+    assert len(first_different([found.paths[0], bent], 10, SETTINGS.difference, evenly)) == 1
 
 
 def test_only_the_stretch_that_collides_is_taken_out(scene_of: SceneOf) -> None:

@@ -9,18 +9,13 @@ it better.
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
-from ir_planner.curves import at_shares
 from ir_planner.errors import TimingError
 from ir_planner.optimize.refinement import QUICK, THOROUGH, Effort, Refinement, Solution
-from ir_planner.search import fewest_corners
+from ir_planner.search import COARSE, apart, at_nine_shares, fewest_corners
 from ir_planner.timing import Movement, straight_steps
 
-_ALIKE = 0.12  # rad: coarse solutions that are nearer to each other lead to one local minimum
-_PLACES = np.linspace(0.1, 0.9, 9)  # shares of their lengths at which they are compared
 _BETTER = 0.99  # share of the cost below which an alike path replaces another
 _OUT_OF_REACH = 1.25  # times the cost of the best: coarse solutions above are not refined
 
@@ -116,5 +111,5 @@ class Portfolio:
 
 def _alike(a: Solution, b: Solution) -> bool:
     """Whether two coarse solutions pass the same configurations."""
-    first, second = (at_shares(solution.spline.control, _PLACES) for solution in (a, b))
-    return bool(np.abs(first - second).max() < _ALIKE)
+    first, second = (at_nine_shares(solution.spline.control) for solution in (a, b))
+    return apart(first, second) < COARSE

@@ -10,9 +10,9 @@ comes too near gets a larger clearance margin, and the descent continues.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ir_kernels import SplineCost
+from ir_kernels.spline import RowArray
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Violation
@@ -31,7 +31,6 @@ from ir_planner.timing import (
     within_torque,
 )
 
-IntArray = NDArray[np.int32]
 SPACING = 0.1  # s between the knots of the coarsest spline
 FEWEST, MOST = 12, 64  # control points of the coarsest spline
 SLOWER = 1.3  # than the path at full speed: where the descent starts
@@ -174,7 +173,7 @@ class Refinement:
         limits = self.limits.with_torque_share(TORQUE_SHARES[0]).for_speed(solution.speed)
         return spline_cost(self.context, limits, weights, penalty, solution.kept)
 
-    def _rows(self, spline: UniformSpline) -> IntArray:
+    def _rows(self, spline: UniformSpline) -> RowArray:
         """Which thresholds hold in each interval: the station's where the tcp stays in the zone."""
         if len(self._kept) == 1:
             return np.zeros(spline.intervals, np.int32)

@@ -4,14 +4,20 @@ from ir_planner.search.port import Ends, Found, Search, quick
 from ir_planner.search.registry import SEARCHES, registered
 from ir_planner.search.shortcuts import fewest_corners, pulled
 from ir_planner.search.tree import connect, joint_scale
+from ir_planner.search.variety import COARSE, EXIT, apart, at_nine_shares, first_different
 
 __all__ = [
+    "COARSE",
+    "EXIT",
     "SEARCHES",
     "Ends",
     "Found",
     "Search",
+    "apart",
+    "at_nine_shares",
     "connect",
     "fewest_corners",
+    "first_different",
     "joint_scale",
     "pulled",
     "quick",

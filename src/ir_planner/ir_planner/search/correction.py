@@ -16,10 +16,10 @@ from ir_planner.checks import FreeSpace
 from ir_planner.scene import path_cost
 from ir_planner.search.genetic_settings import SAMPLES_MAX, GeneticSettings
 from ir_planner.search.population import Evolution, batch_work, evolve
+from ir_planner.search.variety import evenly, first_different
 
 _SPACING = 0.02  # rad between samples of a path in search of what collides
 _WIDER = 4.0  # by how much each further attempt widens the margin
-_COMPARED = 16  # places along two paths at which they are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def corrected(
         if not open_paths:
             break
     clean.sort(key=lambda path: path_cost(weights, path))
-    paths = different(clean, settings.paths, settings.difference)
+    paths = first_different(clean, settings.paths, settings.difference, evenly)
     return Correction(paths, missed.shortfall, missed.pair, missed.q, generations)
 
 
@@ -93,7 +93,9 @@ def _round_stretch(
         if found.paths:
             whole = [np.concatenate([before[:-1], part, after[1:]]) for part in found.paths]
             return replace(
-                found, paths=different(whole, wanted, settings.difference), generations=generations
+                found,
+                paths=first_different(whole, wanted, settings.difference, evenly),
+                generations=generations,
             )
         if found.shortfall < best.shortfall:
             best = found
@@ -136,26 +138,3 @@ def colliding_stretch(
 def _without_repeats(points: FloatArray) -> FloatArray:
     keep = np.append(True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0.0)
     return np.ascontiguousarray(points[keep])
-
-
-def different(paths: list[FloatArray], most: int, difference: float) -> list[FloatArray]:
-    """The first `most` paths (M, n) that differ somewhere by more than `difference` rad at the same share of
-    their length.
-    """
-    chosen: list[FloatArray] = []
-    shown: list[FloatArray] = []
-    for path in paths:
-        if len(chosen) == most:
-            break
-        mine = _evenly(path)
-        if all(np.abs(mine - other).max() > difference for other in shown):
-            chosen.append(path)
-            shown.append(mine)
-    return chosen
-
-
-def _evenly(path: FloatArray) -> FloatArray:
-    """Configurations (_COMPARED, n) at even shares of a path's length."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    at = np.linspace(0.0, length[-1], _COMPARED)
-    return np.stack([np.interp(at, length, joint) for joint in path.T], axis=1)

@@ -16,7 +16,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Journal
 from ir_planner.scene import path_cost
-from ir_planner.search import fewest_corners
+from ir_planner.search import EXIT, fewest_corners, first_different
 from ir_planner.service.exit import Exit
 from ir_planner.service.exit_search import ExitSearch
 from ir_planner.service.exit_tree import ExitTree
@@ -26,7 +26,6 @@ from ir_planner.service.modified_ga import ModifiedGa
 EXIT_SEARCHES: Mapping[str, ExitSearch] = {"modified_ga": ModifiedGa(), "tree": ExitTree()}
 _SEARCHED = 2  # raw paths per candidate that is wanted: shortened, some of them end at the same place
 _STREAM = 7  # of the request's seed, so that other stages draw other numbers
-_DIFFERENT = 0.1  # rad: paths that end nearer to each other are one
 _END_SAMPLES = 24  # of the last step, where the zone is left: about a centimetre apart
 _CORNERS = 11  # points of a path between which shortcuts are tried: their number grows with the square
 
@@ -100,16 +99,7 @@ def _cheapest(paths: list[ExitPath], problem: Exit, wanted: int) -> list[ExitPat
     for path in sorted(paths, key=cost)[: _SEARCHED * wanted]:
         points = _end_retracted(fewest_corners(path.points, space, weights, _CORNERS), problem)
         shortened.append(ExitPath(path.method, points if problem.contacts_end(points) else path.points))
-    chosen: list[ExitPath] = []
-    for path in sorted(shortened, key=cost):
-        if len(chosen) < wanted and all(_apart(path.points, other.points) for other in chosen):
-            chosen.append(path)
-    return chosen
-
-
-def _apart(a: FloatArray, b: FloatArray) -> bool:
-    """Whether two paths from the same configuration end apart."""
-    return bool(np.abs(a[-1] - b[-1]).max() > _DIFFERENT)
+    return first_different(sorted(shortened, key=cost), wanted, EXIT, lambda path: path.points[-1])
 
 
 def _end_retracted(path: FloatArray, problem: Exit) -> FloatArray:
