@@ -14,7 +14,6 @@ MACHINE_PATH = re.compile(r"(?<![\w.$}])/(?:)(work|root|home|farm|Users)/\w|\.py
 INDEX_HOST = re.compile(
     r"py(?:)pi\.org|python(?:)hosted\.org|--(extra-)?(?:)index-url|--trusted-(?:)host|file:/(?:)//"
 )
-LONGEST_MODULE = 450
 
 
 def tracked() -> list[Path]:
@@ -55,16 +54,6 @@ def test_no_tracked_file_names_a_package_index() -> None:
 )
 def test_the_patterns_find_what_they_are_for(pattern: re.Pattern[str], line: str) -> None:
     assert pattern.search(line)
-
-
-def test_no_module_is_two_rooms() -> None:
-    python = [p for p in tracked() if p.suffix == ".py" and "tests" not in p.relative_to(ROOT).parts]
-    long = {
-        str(p.relative_to(ROOT)): n
-        for p in python
-        if (n := len(p.read_bytes().splitlines())) > LONGEST_MODULE
-    }
-    assert long == {}
 
 
 def test_built_and_written_things_are_ignored() -> None:

@@ -5,10 +5,7 @@ carries more of the arm and counts more. (As printed the lower index of the sum 
 starts at the joint.) W ranks movements; it is not their energy.
 """
 
-import itertools
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ir_msgs_py.arrays import FloatArray
 
@@ -33,20 +30,3 @@ def movement_cost(weights: FloatArray, start: FloatArray, goal: FloatArray) -> F
 def path_cost(weights: FloatArray, waypoints: FloatArray) -> float:
     """W summed over the steps of a path (N, n)."""
     return float(np.sum(np.abs(np.diff(waypoints, axis=0)) @ weights))
-
-
-def cheapest_chain(layers: list[FloatArray], weights: FloatArray) -> tuple[list[int], float]:
-    """Shortest path of eq. (9) over layers of configurations: the index taken in each layer, and its W.
-
-    `layers[s]` (K_s, n): the configurations that reach station s. Every layer needs at least one.
-    """
-    cost = np.zeros(len(layers[0]))
-    came: list[NDArray[np.intp]] = []
-    for here, there in itertools.pairwise(layers):
-        through = cost[:, None] + movement_cost(weights, here[:, None, :], there[None, :, :])
-        came.append(np.argmin(through, axis=0))
-        cost = np.min(through, axis=0)
-    chosen = [int(np.argmin(cost))]
-    for step in reversed(came):
-        chosen.append(int(step[chosen[-1]]))
-    return chosen[::-1], float(np.min(cost))
