@@ -148,6 +148,7 @@ void newton_step(const CcdProblem& c, const Doubles* q, const Pose& pose, const 
   }
 }
 
+// long: the sweep over joints, lane by lane
 void run_lanes(const CcdProblem& c, Doubles* q, Doubles& psi, Doubles& distance, Doubles& angle, Integers& sweeps, Integers& steps) {
   V3 z[kMaxJoints], o[kMaxJoints];
   for (int i = 0; i < c.n; ++i) q[i] = dynamics::min(dynamics::max(q[i], splat<Doubles>(c.low[i])), splat<Doubles>(c.high[i]));

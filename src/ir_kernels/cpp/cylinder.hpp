@@ -78,6 +78,7 @@ template <class V> struct Rim {
 
 // Penetration of a segment that crosses the cylinder: caps, side, and the rims swept along the segment: the best of 17
 // directions, then Newton steps kept between its neighbours.
+// long: cases of one closed form that share their lanes
 template <class V> __attribute__((noinline)) void depth_in_cylinder(const Vec<V>& a, const Vec<V>& b, V radius, V half,
                                                                     V& depth, Vec<V>& n) {
   using S = Scalar<V>;

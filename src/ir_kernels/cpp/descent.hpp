@@ -30,6 +30,7 @@ inline double inner(const std::vector<double>& a, const std::vector<double>& b) 
 // `most` evaluations, when ten iterations gain less than `tolerance` of the value, or where no direction leads down (nor
 // where the function is not finite).
 template <class Function, class Precondition>
+// long: the iteration as it is written in the sources it names
 Descent descend(std::vector<double>& x, Function&& function, Precondition&& precondition, int most, double tolerance) {
   constexpr std::size_t memory = 16;
   constexpr int patience = 10;

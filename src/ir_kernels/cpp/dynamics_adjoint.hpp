@@ -43,6 +43,7 @@ inline void add_scaled(Vector<S>& to, const Vector<S>& v, const S& k) {
 // Adds to by_q, by_qd, by_qdd the derivatives of sum_i u_i tau_i, tau from newton_euler on the same numbers (with
 // gravity) traced in `link`; sn, cs of q + theta0.
 template <class S, class T>
+// long: the recursion backwards, step by step
 inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, const S* qd, const LinkTrace<S>* link,
                                  const S* u, S* by_q, S* by_qd, S* by_qdd) {
   const int n = m.n;

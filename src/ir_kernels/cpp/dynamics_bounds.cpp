@@ -66,6 +66,7 @@ void smooth_torque(const Model<double>& m, const S* sn, const S* cs, const S* qd
 }
 
 // Largest |tau| / limit per joint over the pieces, never too small.
+// long: interval arithmetic, term by term
 void upper_ratios(const Model<double>& m, const Envelope& envelope, const Batch& batch, int terms,
                   double upper[][kLanes]) {
   const int n = m.n;
@@ -139,6 +140,7 @@ void sampled_ratios(const Model<double>& m, const Envelope& envelope, const Batc
 
 }  // namespace
 
+// long: bisection and its bookkeeping share their arrays
 TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, const double* coefficients,
                            const double* durations, long S, int terms, double tolerance, long most) {
   const int n = m.n;

@@ -142,6 +142,7 @@ bool forward_dynamics(const Model<double>& m, const double* q, const double* qd,
   return finite.all();
 }
 
+// long: one block of lanes and its rest
 bool torque_gradients(const Model<double>& m, const double* q, const double* qd, const double* qdd, long N,
                       double* of_q, double* of_qd, double* of_qdd) {
   const int n = m.n;

@@ -156,6 +156,7 @@ double gas_force_per_length(const ChainInput& in, double square) {
 }
 
 // Chebyshev interpolation over all lengths that the geometry allows, rewritten in powers of the scaled square.
+// long: one check per value of the counterbalance
 Balance<double> balance_of(const ChainInput& in, const Joint<double>* joints) {
   Balance<double> b;
   b.joint = in.balanced_joint;
@@ -200,7 +201,7 @@ Balance<double> balance_of(const ChainInput& in, const Joint<double>* joints) {
 
 }  // namespace
 
-Model<double> build_model(const ChainInput& in) {
+Model<double> build_model(const ChainInput& in) {  // long: one block per part of the model, each with its checks
   Model<double> model;
   model.n = in.n;
   const Lines lines = joint_lines(in);

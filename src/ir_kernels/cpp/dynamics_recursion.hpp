@@ -98,6 +98,7 @@ struct NoTrace {
 // H qdd + h: sin and cos of q + theta0, torque per joint. Without `gravity` the weight is left out. `trace` receives the
 // motion of each link (angular velocity and acceleration, acceleration of its origin) and the load that it hands on.
 template <int kJoints = 0, class S, class T, class Trace = NoTrace>
+// long: unrolled out and back, so that what a link hands on stays in registers
 inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau,
                          bool gravity = true, Trace&& trace = {}) {
   const int n = kJoints ? kJoints : m.n;  // a number known at compile time unrolls the loops

@@ -48,7 +48,7 @@ void split(std::vector<int>& order, int begin, int end, const std::vector<std::a
 
 }  // namespace
 
-void Model::finish() {
+void Model::finish() {  // long: one layout of lanes per kind of body, filled side by side
   const double reach = reach_of(*this);
   double extent = reach;
   bodies_float.resize(kind.size());

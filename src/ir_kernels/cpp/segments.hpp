@@ -26,6 +26,7 @@ template <class V> IR_INLINE V excess(V x, V e) { return x - clamp(x, -e, e); }
 // Place of least distance from the box: the slope of the squared distance along the segment is piecewise linear and
 // rises, with kinks where a coordinate passes a face. Three evaluations find the piece among the sorted kinks, a
 // Newton step solves it. `crossing`: a part of the segment is inside (then any place is as good).
+// long: cases of one closed form that share their lanes
 template <class V> IR_INLINE V nearest_to_box(Vec<V> a, Vec<V> d, Vec<V> e, Mask<V>& crossing) {
   const V zero{}, one = splat<V>(1);
   V t[6];

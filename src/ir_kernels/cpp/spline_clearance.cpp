@@ -30,6 +30,7 @@ template <class V> struct Within {
 }  // namespace
 
 template <class V>
+// long: value and derivative side by side
 double SplineCost::clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>& shift, const std::int32_t* row,
                                 double step) {
   constexpr int width = Lanes<V>::width;

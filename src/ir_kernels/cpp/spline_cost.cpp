@@ -131,6 +131,7 @@ void SplineCost::scatter(double interval, double* gradient) const {
 }
 
 // Accelerations at the knots (linear between), jerk of each interval (constant), positions by the control points.
+// long: value and derivative side by side
 double SplineCost::knots(const double* control, int intervals, double interval, double* gradient,
                          double& of_interval) const {
   const double second = 1.0 / (interval * interval), third = second / interval, weight = terms_.penalty * interval;

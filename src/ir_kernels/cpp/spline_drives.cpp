@@ -19,7 +19,7 @@ double sum(const Double8& v) {
 }  // namespace
 
 // Torques, their penalties and those of speed; the powers.
-double SplineCost::drives(double step) {
+double SplineCost::drives(double step) {  // long: value and derivative side by side
   const auto& arm = core_.model;
   Lane cost{}, of_step{};
   for (Group& g : groups_) {
@@ -67,7 +67,7 @@ double SplineCost::drives(double step) {
 }
 
 // Energy at the mains over the common bus, sample after sample; and the derivative by each sample's power.
-double SplineCost::bus(double step) {
+double SplineCost::bus(double step) {  // long: value and derivative side by side
   using dynamics::Regeneration;
   power_.assign(count_, 0.0);
   of_power_.assign(count_, 0.0);

@@ -65,6 +65,7 @@ template <class Visit> IR_INLINE void each_pair(Int8 pair, Visit visit) {
 constexpr int own = 6;  // after the kinds of bodies
 
 // What each lane's axis finds at its body, in the world; `kinds` has a bit per kind among the lanes.
+// long: one case per kind of body
 __attribute__((noinline)) Touch<Double8> touch_bodies(const Model& model, const Gathered& a, Int8 pair, Int8 kind,
                                                       std::uint32_t kinds) {
   GatheredBody f{};
@@ -119,6 +120,7 @@ __attribute__((noinline)) Touch<Double8> touch_bodies(const Model& model, const 
 
 }  // namespace
 
+// long: one case per kind of pair
 WitnessLanes witness(const Model& model, const std::vector<Frame<Double8>>& frames, const std::int32_t pair[8]) {
   const int outside = static_cast<int>(model.environment.size());
   typedef std::int32_t Short8 __attribute__((vector_size(32), aligned(4), may_alias));
