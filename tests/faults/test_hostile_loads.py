@@ -21,7 +21,7 @@ def custom(cell: Cell, mass: float, com: tuple[float, float, float], *inertia: f
 
 
 def test_the_rated_load_point_is_carried_and_a_little_more_is_not(cell: Cell) -> None:
-    """210 kg at 0.24 m in front of the flange and 0.27 m beside it: published, and not used to build it."""
+    """210 kg at 0.24 m in front of the flange and 0.27 m beside it: an estimate, not used to build it."""
     custom(cell, 210.0, (0.24, 0.27 - MILLIMETRE, 0.0), 105.0, 0.0, 0.0, 105.0, 0.0, 105.0)
     with pytest.raises(RequestRefusedError, match=r"moment of .* Nm about the last axis.* at most 556 Nm"):
         custom(cell, 210.0, (0.1, 0.28, 0.0))

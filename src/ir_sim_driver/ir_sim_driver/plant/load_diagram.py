@@ -1,8 +1,8 @@
 """What the wrist can carry: moment and inertia of a load, bounded by the robot's own drives.
 
 The static moment of the load about the wrist's axes may not exceed the torque that their motors have at full
-speed, in any posture: for the KR210 that is its rated load point (210 kg, 0.27 m from A6 and 0.24 m in front
-of the flange). The inertia may be such that the motors still reach a share of the acceleration limit.
+speed, in any posture: for the KR210 that allows 210 kg at 0.27 m from A6 and 0.24 m in front of the flange,
+which is an estimate until it is held against a data sheet. The inertia may be such that the motors still reach a share of the acceleration limit.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ir_msgs_py.arrays import FloatArray
 
 _GRAVITY = 9.80665
 _ACCELERATION = 1.0 / 3.0
-"""Share of the acceleration limit that must be left: at the rated load point, with 105 kg m^2, it just is."""
+"""Share of the acceleration limit that must be left: at that load point, with 105 kg m^2, it just is."""
 
 
 class LoadDiagram:
