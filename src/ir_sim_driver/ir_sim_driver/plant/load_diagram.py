@@ -2,7 +2,8 @@
 
 The static moment of the load about the wrist's axes may not exceed the torque that their motors have at full
 speed, in any posture: for the KR210 that allows 210 kg at 0.27 m from A6 and 0.24 m in front of the flange,
-which is an estimate until it is held against a data sheet. The inertia may be such that the motors still reach a share of the acceleration limit.
+which is an estimate until it is held against a data sheet. The inertia may be such that the motors still
+reach a share of the acceleration limit.
 """
 
 from __future__ import annotations
