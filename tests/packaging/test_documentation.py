@@ -104,7 +104,7 @@ def test_functions_that_are_named_exist(page: Path) -> None:
 
 
 @cache
-def tests_by_file() -> dict[str, str]:
+def texts_by_file() -> dict[str, str]:
     """Text of all test files of a name."""
     texts: dict[str, str] = {}
     for path in (ROOT / "tests").rglob("test_*.py"):
@@ -121,7 +121,7 @@ def test_tests_that_are_named_exist(page: Path) -> None:
         if match is None or not (match[1] or match[2]):
             continue
         file = match[1] or file
-        text = tests_by_file().get(file, "")
+        text = texts_by_file().get(file, "")
         if not text or (match[2] and f"def {match[2]}(" not in text):
             missing.append(code)
     assert missing == []
