@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -226,6 +227,27 @@ def test_a_program_is_fetched_by_its_id_and_run(cell, wait_for):
     wait_for(lambda: cell.events() == ["0 started", "0 ended", "1 started", "1 ended"])
     assert cell.states[0].program_id == "known"
     assert (1, 2, "moving") in phases
+
+
+def test_diagnostics_say_what_runs_how_it_ended_and_whether_the_driver_is_heard(cell, wait_for):
+    said = []
+    cell.executor.run(
+        lambda: cell.test.create_subscription(
+            DiagnosticArray,
+            "/diagnostics",
+            lambda msg: said.extend((s.name, s.level, s.message) for s in msg.status),
+            10,
+        )
+    )
+    ready = ("ir_program_runner", DiagnosticStatus.OK, "ready")
+    wait_for(lambda: ready in said)
+    cell.run([pause(1.5)])
+    assert any("step 1 of 1: pause" in message for _, _, message in said)
+    cell.run(program_id="not\nknown")
+    wait_for(lambda: any(level == DiagnosticStatus.WARN and "unknown program" in m for _, level, m in said))
+    assert not any("\n" in message for _, _, message in said)
+    cell.executor.run(cell.driver.timer.cancel)
+    wait_for(lambda: any("nothing was heard from ir_sim_driver" in message for _, _, message in said))
 
 
 def test_pauses_switch_the_bits_and_wake_by_a_packet(cell):

@@ -38,6 +38,7 @@ from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_program_runner.checks import check_program
+from ir_program_runner.diagnose.node import RunnerDiagnostics
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
 from ir_program_runner.machines import Machines
@@ -86,6 +87,8 @@ class ProgramRunnerNode(Node):
         self.create_subscription(SignalMsg, "~/signals", self._hear_signal, _SIGNALS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
+        self._last, self._diagnostics = Status.success(), RunnerDiagnostics(self)
+        self.create_timer(1.0, self._diagnose, clock=steady)
         self._server = ActionServer(
             self,
             RunProgram,
@@ -215,6 +218,9 @@ class ProgramRunnerNode(Node):
         for signal in self._machines.take_answers(self._now()):
             self._signals.publish(signal_to_msg(self._stamped(signal)))
 
+    def _diagnose(self) -> None:
+        self._diagnostics.publish(self._progress, self._driver.state(), self._driver.mode, self._last)
+
     def _stamped(self, signal: Signal) -> Signal:
         return Signal(signal.name, signal.value, self.get_clock().now().nanoseconds)
 
@@ -265,7 +271,7 @@ class ProgramRunnerNode(Node):
         else:
             goal.abort()
             self.get_logger().error(str(result.status))
-        status = Status(result.status.code, result.status.message, self.get_name())
+        self._last = status = Status(result.status.code, result.status.message, self.get_name())
         return RunProgram.Result(
             status=status_to_msg(status), executed=result.executed, duration=duration, energy=energy
         )

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.action import ActionServer
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -44,6 +43,7 @@ from ir_msgs.srv import (
 from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
+from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
@@ -90,7 +90,7 @@ class PlannerNode(Node):
         )
         self._trajectories = self.create_publisher(JointTrajectoryMsg, names.PLANNED_TRAJECTORY, LATCHED)
         self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, LATCHED)
-        self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+        self._diagnostics = Diagnostics(self)
         self._shown = ShownMarkers()
         self._quick = MutuallyExclusiveCallbackGroup()
         self._long = MutuallyExclusiveCallbackGroup()
@@ -203,14 +203,9 @@ class PlannerNode(Node):
         self._look()
         cell = self.planner.cell.name if self.planner.has_cell else ""
         slow = compiled.NAME == "reference"
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.OK if cell and not slow else DiagnosticStatus.WARN,
-            name=names.PLANNER,
-            message="ready" if cell else "no cell is loaded: call set_cell",
-            hardware_id=cell,
-        )
+        sentence = "ready" if cell else "no cell is loaded: call set_cell"
         if cell and slow:
-            status.message = "ready, but without the compiled core: planning is slow"
+            sentence = "ready, but without the compiled core: planning is slow"
         values = {
             "cell": cell,
             "kernels": compiled.NAME,
@@ -219,10 +214,8 @@ class PlannerNode(Node):
             "joint_states": self._last_state.problem
             or ("none" if self._last_state.q is None else "received"),
         }
-        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+        level = OK if cell and not slow else WARN
+        self._diagnostics.publish([Condition(names.PLANNER, level, sentence, values, cell)])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

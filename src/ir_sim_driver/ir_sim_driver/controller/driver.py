@@ -137,6 +137,11 @@ class Driver:
         with self._lock:
             self._simulation.set_execution(settings)
 
+    def forbid_hibernation(self, reason: str) -> None:
+        """Ignore HIB from now on and leave hibernation out of pauses, with this reason."""
+        with self._lock:
+            self._simulation.plc.no_hibernation = reason
+
     @property
     def failure(self) -> str:
         """Why the simulation is not stepped any more, "" while it is."""

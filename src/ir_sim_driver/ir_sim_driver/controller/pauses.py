@@ -30,11 +30,14 @@ class Pauses:
         self.wants_motors = False
 
     def query_modes(self) -> tuple[PowerMode, ...]:
-        """All modes with the present load and posture, entered from where the robot is now."""
+        """All modes that can be left again, with the present load, entered from where the robot is."""
         source = self._modes.level
         if source not in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
             source = Mode.STAND_ON_MOTORS
-        return mode_table(self._modes.times, self._power, self._pe_ids, source)
+        times = self._modes.times
+        if self._plc.no_hibernation:
+            times = {mode: rest for mode, rest in times.items() if mode is not Mode.HIBERNATION}
+        return mode_table(times, self._power, self._pe_ids, source)
 
     def start(self, pause: float, executing: bool) -> PowerMode:
         """Start_Pause of `pause` [s]: go to the mode that takes least energy. Raises RequestRefusedError."""

@@ -14,10 +14,13 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
     trajectory_from_msg,
 )
+from ir_msgs_py.ros.diagnostics import Condition
+from ir_sim_driver.controller import Entry
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
+_HARDWARE = "KR210 R2700 extra, simulated"
 _LABEL_MAX = 64  # four times a trajectory id; a longer one would be published 50 times a second
 
 
@@ -56,6 +59,11 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
 def _label(text: str) -> str:
     """A name as states and diagnostics carry it: printable, at most _LABEL_MAX characters."""
     return "".join(c if c.isprintable() else "?" for c in text[:_LABEL_MAX])
+
+
+def condition_of(entry: Entry) -> Condition:
+    """A part of the driver for /diagnostics."""
+    return Condition(entry.name, entry.level, entry.sentence, entry.values, _HARDWARE)
 
 
 def fill_joint_state(msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, torque: FloatArray) -> None:

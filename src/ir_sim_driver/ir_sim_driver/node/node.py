@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -32,20 +31,26 @@ from ir_msgs_py.ros.conversions import (
     power_state_to_msg,
     time_to_msg,
 )
+from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
 from ir_msgs_py.ros.running import run_node
-from ir_sim_driver.controller import Driver, Entry, Frame, Simulation, make_simulation
-from ir_sim_driver.errors import DriverError, LinkError, PlantStoppedError
+from ir_sim_driver.controller import Driver, Frame, Simulation, make_simulation
+from ir_sim_driver.errors import DriverError, PlantStoppedError
 from ir_sim_driver.motion import ErrorCode, Outcome
 from ir_sim_driver.node.executions import Executions
+from ir_sim_driver.node.links import open_links
 from ir_sim_driver.node.markers import robot_markers
-from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state, goal_from_trajectory
+from ir_sim_driver.node.messages import (
+    condition_of,
+    fill_controller_state,
+    fill_joint_state,
+    goal_from_trajectory,
+)
 from ir_sim_driver.node.parameters import DriverParameters
 from ir_sim_driver.node.plc_topic import PlcTopic
 from ir_sim_driver.node.real_time import GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
 from ir_sim_driver.notices import Level, Notice
-from ir_sim_driver.plc import OpenLink
 
 try:  # where a ROS installation has it
     from control_msgs.action import FollowJointTrajectory
@@ -86,7 +91,7 @@ class SimDriver(Node):
         self._last_words = 0.0
         self._open_topics()
         self._open_requests()
-        self._links = self._open_links()
+        self._links = open_links(self._configuration.links, self._driver)
         self._plant = self._start_plant(options.joint_state_rate, options.real_time_factor)
 
     def port_of(self, link: str) -> int:
@@ -112,7 +117,7 @@ class SimDriver(Node):
         self._outputs = self.create_publisher(PlcOutputsMsg, names.PLC_OUTPUTS, _LATCHED)
         self._in_force = self.create_publisher(PlcInputsMsg, names.PLC_INPUTS_IN_FORCE, _LATCHED)
         self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
-        self._diagnostics = self.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+        self._diagnostics = Diagnostics(self)
         self._description = self.create_publisher(String, names.ROBOT_DESCRIPTION, _LATCHED)
         self._joint_state = JointState(name=list(self._driver.joint_names))
         self._joint_state.header.frame_id = names.BASE_FRAME
@@ -155,16 +160,6 @@ class SimDriver(Node):
             result_timeout=_RESULT_KEPT,
             **ACTION_SERVICES,
         )
-
-    def _open_links(self) -> dict[str, OpenLink]:
-        links = {}
-        for link in self._configuration.links:
-            if link.wanted:
-                try:
-                    links[link.name] = link.open(self._driver.plc)
-                except LinkError as error:
-                    self.get_logger().warning(str(error))
-        return links
 
     # what executions borrow
 
@@ -261,9 +256,7 @@ class SimDriver(Node):
         snapshot = self._driver.snapshot(self._plant.worst_lag)
         for notice in snapshot.notices:
             self._log(notice)
-        msg = DiagnosticArray(status=[_diagnostic(entry) for entry in snapshot.entries])
-        msg.header.stamp = self.now_msg()
-        self._diagnostics.publish(msg)
+        self._diagnostics.publish(condition_of(entry) for entry in snapshot.entries)
 
     def _log(self, notice: Notice) -> None:
         # a line of its own for each severity: rclpy lets a line log with one severity only
@@ -276,16 +269,6 @@ class SimDriver(Node):
 
     def _change_refusal(self) -> str:
         return "the robot moves: change it when it stands" if self._driver.moving else ""
-
-
-def _diagnostic(entry: Entry) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        name=entry.name,
-        level=bytes([entry.level]),
-        message=entry.sentence,
-        hardware_id="KR210 R2700 extra, simulated",
-        values=[KeyValue(key=key, value=str(value)) for key, value in entry.values.items()],
-    )
 
 
 def main() -> int:

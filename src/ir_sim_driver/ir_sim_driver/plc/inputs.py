@@ -21,6 +21,7 @@ from ir_sim_driver.plc.port import STOP_BIT
 
 OWNERS = ("any", *WRITERS)
 RESTART_BIT = "ks"
+HIBERNATION_BIT = ROW[Mode.HIBERNATION].bit
 POWER_BITS = (*REST_OF_BIT, RESTART_BIT)
 BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
 
@@ -62,7 +63,8 @@ class Plc:
 
     levels: what counts now (debounced, without stuck bits). rest: BUS_POWER_OFF, HIBERNATION or None.
     stopped: the emergency stop was pressed, however shortly, and nobody has reset it since.
-    drives_on, confirm, restart: rising edges seen in this step.
+    drives_on, confirm, restart: rising edges seen in this step. no_hibernation: why HIB is ignored, "" where
+    it counts.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class Plc:
         self.operating_mode = mode
         self.rest: Mode | None = None
         self.stopped = False
+        self.no_hibernation = ""
         self.drives_on = self.confirm = self.restart = False
         self._ages: dict[str, float] = {}
         self._stuck: frozenset[str] = frozenset()
@@ -237,4 +240,6 @@ class Plc:
             return f"operating mode is {self.operating_mode.name}, must be EXT"
         if pause_active and on:
             return "a PROFIenergy pause is on, end it first"
+        if self.no_hibernation and HIBERNATION_BIT in on:
+            return self.no_hibernation
         return "only one of AB, HIB and KS may be 1" if len(on) > 1 else ""

@@ -1,0 +1,56 @@
+"""What a node says of itself on /diagnostics, one bounded line each.
+
+The names carry the node's namespace, so that cells are kept apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from ir_msgs_py import names
+from ir_msgs_py.checks import one_line
+from ir_msgs_py.namespaces import diagnostic_name
+
+OK, WARN, ERROR = (
+    int(level[0]) for level in (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
+)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """The state of a node or of a part of it; level: a number of diagnostic_msgs/DiagnosticStatus."""
+
+    name: str
+    level: int
+    sentence: str
+    values: Mapping[str, object] = field(default_factory=dict)
+    hardware: str = ""
+
+
+class Diagnostics:
+    """The publisher of one node."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
+
+    def publish(self, conditions: Iterable[Condition]) -> None:
+        """Publish these conditions in one message."""
+        namespace = self._node.get_namespace()
+        message = DiagnosticArray(status=[_status(namespace, condition) for condition in conditions])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+
+def _status(namespace: str, condition: Condition) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        name=diagnostic_name(namespace, condition.name),
+        level=bytes([condition.level]),
+        message=one_line(condition.sentence),
+        hardware_id=condition.hardware,
+        values=[KeyValue(key=key, value=one_line(str(value))) for key, value in condition.values.items()],
+    )
