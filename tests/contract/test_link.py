@@ -40,11 +40,8 @@ class Recorder:
     def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
         self.calls.append(f"{writer} writes {dict(levels)}")
 
-    def write_operating_mode(self, writer: str, mode: OperatingMode) -> None:
-        self.calls.append(f"{writer} turns the switch to {mode.name}")
-
-    def request_pause(self, seconds: float) -> None:
-        self.calls.append(f"pause {seconds:g}")
+    def write_mode_and_pause(self, writer: str, mode: OperatingMode | None, pause: float | None) -> None:
+        self.calls.append(f"{writer} turns the switch to {mode} and asks for a pause of {pause} s")
 
     def heartbeat(self, timeout: float) -> None:
         pass

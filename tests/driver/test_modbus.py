@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import struct
 
@@ -15,9 +16,9 @@ from ir_msgs_py.modes import Mode
 from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
-from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.errors import LinkError, TrajectoryRefusedError
 from ir_sim_driver.plc.inputs import PlcSettings
-from ir_sim_driver.plc.modbus import ModbusServer
+from ir_sim_driver.plc.modbus_link import ModbusTcp
 from ir_sim_driver.plc.modbus_map import (
     COILS,
     DISCRETE_INPUTS,
@@ -31,14 +32,20 @@ PERIOD = 2_000_000
 WATCHDOG = 0.5
 
 
+def opened_on(driver, **limits):
+    """A server on a free port."""
+    wanted = {"modbus_port": 0, "modbus_watchdog": WATCHDOG, **limits}
+    return ModbusTcp(modbus=True, **wanted).open(driver.plc)
+
+
 @pytest.fixture
 def serve():
     """A served simulation: serve(simulation) gives driver, client and port."""
     opened = []
 
-    def serve_one(simulation):
+    def serve_one(simulation, **limits):
         driver = Driver(simulation)
-        server = ModbusServer("127.0.0.1", 0, driver.plc, WATCHDOG)
+        server = opened_on(driver, **limits)
         client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=10)
         assert client.connect()
         opened.append((client, server, driver))
@@ -165,8 +172,8 @@ def test_while_hibernating_the_controller_does_not_answer_for_itself(make, serve
 
 def test_a_taken_port_is_an_error_with_its_number(make, serve):
     driver, _, port = serve(make())
-    with pytest.raises(OSError, match=str(port)):
-        ModbusServer("127.0.0.1", port, driver.plc, WATCHDOG)
+    with pytest.raises(LinkError, match=str(port)):
+        opened_on(driver, modbus_port=port)
 
 
 def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, plan, start, cell):
@@ -209,7 +216,7 @@ def test_a_plc_without_a_heartbeat_is_not_watched(make, serve):
 @pytest.fixture(scope="module")
 def endangered(make):
     driver = Driver(make(load="none"))
-    server = ModbusServer("127.0.0.1", 0, driver.plc, WATCHDOG)
+    server = opened_on(driver)
     yield driver, server.port
     server.close()
     driver.close()
@@ -242,7 +249,11 @@ def survive(endangered, frames, framed):
     driver, port = endangered
     driver.plc.write_inputs("service", {"hib": False})  # a request may have put the controller to sleep
     driver.plc.wake()
-    with socket.create_connection(("127.0.0.1", port), timeout=2.0) as link:
+    # what is no Modbus ends its connection
+    with (
+        socket.create_connection(("127.0.0.1", port), timeout=2.0) as link,
+        contextlib.suppress(ConnectionError),
+    ):
         for body in frames:
             link.sendall(struct.pack(">HHHB", 1, 0, len(body) + 1, 1) + body if framed else body)
     run(driver, 0.01)

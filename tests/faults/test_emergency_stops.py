@@ -21,7 +21,7 @@ from ir_sim_driver import (
     make_simulation,
 )
 from ir_sim_driver.plc import SERVICE, TOPIC
-from ir_sim_driver.plc.modbus import ModbusServer
+from ir_sim_driver.plc.modbus_link import ModbusTcp
 from ir_sim_driver.plc.modbus_map import COILS
 
 QUICK = TransitionTimes(
@@ -189,7 +189,7 @@ def test_who_does_not_own_the_inputs_presses_all_the_same(cell: Cell) -> None:
 
 def test_a_modbus_client_that_writes_1_and_0_while_asleep_is_answered_and_latched(cell: Cell) -> None:
     cell.bring_into(Mode.HIBERNATION)
-    server = ModbusServer("127.0.0.1", 0, cell.driver.plc, 2.0)
+    server = ModbusTcp(modbus=True, modbus_port=0).open(cell.driver.plc)
     client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=10)
     try:
         assert client.connect()

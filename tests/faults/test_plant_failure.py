@@ -49,7 +49,7 @@ def test_no_request_is_answered_with_success_over_a_dead_plant(
         driver.recover,
         driver.end_pause,
         driver.query_modes,
-        lambda: driver.plc.request_pause(10.0),
+        lambda: driver.plc.write_mode_and_pause("modbus", None, 10.0),
     )
     for request in requests:
         with pytest.raises(RequestRefusedError, match="no such body") as refusal:

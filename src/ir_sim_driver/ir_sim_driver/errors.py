@@ -6,6 +6,7 @@ DriverError
 ├── RequestRefusedError               a request that cannot be met; code of moveit_msgs/MoveItErrorCodes
 ├── PlantStoppedError                 nobody steps the simulation any more: the process ends
 ├── LinkError                         a link to the PLC that cannot be opened
+├── ModbusRefusedError                a request that an exception code of Modbus answers
 └── BackendError                      the physics gave up: not installed, disconnected or diverged
 """
 
@@ -44,6 +45,14 @@ class PlantStoppedError(DriverError):
 
 class LinkError(DriverError):
     """A link to the PLC that cannot be opened here."""
+
+
+class ModbusRefusedError(DriverError):
+    """A Modbus request that is not met; `code` is its exception code."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(f"exception {code:02d}")
+        self.code = code
 
 
 class BackendError(DriverError):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_sim_driver.controller.access import Access
+from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import Readout
 
 _POWER_WINDOW = 0.01  # s; the mean power that a PLC reads is over at least one period of power_state
@@ -56,19 +57,20 @@ class PlcSide:
         with self._access.writing() as simulation:
             simulation.plc.write_all(writer, inputs)
 
-    def write_operating_mode(self, writer: str, mode: OperatingMode) -> None:
-        """Turn the mode switch. Raises RequestRefusedError."""
+    def write_mode_and_pause(self, writer: str, mode: OperatingMode | None, pause: float | None) -> None:
+        """Turn the mode switch and start or end a pause, both or neither. Raises RequestRefusedError."""
         with self._access.writing() as simulation:
-            simulation.plc.turn_switch(writer, mode)
-
-    def request_pause(self, seconds: float) -> None:
-        """Start a PROFIenergy pause, or end it with 0. Raises RequestRefusedError."""
-        with self._access.alive() as simulation:
-            pauses, executor = simulation.pauses, simulation.executor
-            if seconds == 0.0:
-                pauses.end()
-            else:
-                pauses.start(seconds, executor.active)
+            plc, before = simulation.plc, simulation.plc.operating_mode
+            if mode is not None:
+                plc.turn_switch(writer, mode)
+            try:
+                if pause == 0.0:
+                    simulation.pauses.end()
+                elif pause is not None:
+                    simulation.pauses.start(pause, simulation.executor.active)
+            except RequestRefusedError:
+                plc.set_operating_mode(before)  # no step has seen the other one
+                raise
 
     def heartbeat(self, timeout: float) -> None:
         """The PLC is alive; from the first one on it is watched, `timeout` [s] in plant time."""

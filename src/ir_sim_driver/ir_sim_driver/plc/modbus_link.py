@@ -7,7 +7,9 @@ from typing import ClassVar
 
 from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.errors import LinkError
+from ir_sim_driver.plc.modbus import Limits, ModbusServer
 from ir_sim_driver.plc.modbus_map import MODBUS
+from ir_sim_driver.plc.modbus_tables import ControllerTables
 from ir_sim_driver.plc.port import Controller, OpenLink
 
 
@@ -36,6 +38,22 @@ class ModbusTcp:
         read_only=True,
     )
 
+    modbus_connections: int = setting(
+        16,
+        "Modbus clients at once; one more takes the place of the one that has been silent for longest.",
+        minimum=1,
+        maximum=1000,
+        read_only=True,
+    )
+    modbus_idle: float = setting(
+        60.0,
+        "A Modbus client that is silent for this long is disconnected.",
+        unit="s",
+        minimum=0.1,
+        maximum=86400.0,
+        read_only=True,
+    )
+
     def __post_init__(self) -> None:
         check_settings(self)
 
@@ -45,10 +63,10 @@ class ModbusTcp:
         return self.modbus
 
     def open(self, controller: Controller) -> OpenLink:
-        """Serve the controller. Raises LinkError when pymodbus is missing or the port is taken."""
+        """Serve the controller. Raises LinkError when the port is taken."""
+        tables = ControllerTables(controller, self.modbus_watchdog)
+        limits = Limits(self.modbus_connections, self.modbus_idle)
         try:
-            from ir_sim_driver.plc.modbus import ModbusServer  # pymodbus may be missing where nobody wants it
-
-            return ModbusServer(self.modbus_host, self.modbus_port, controller, self.modbus_watchdog)
-        except (ImportError, OSError) as error:
+            return ModbusServer(self.modbus_host, self.modbus_port, tables, limits)
+        except OSError as error:
             raise LinkError(f"no Modbus: {error}") from error

@@ -45,11 +45,11 @@ class Controller(Protocol):
     def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
         """Set these levels, the others stay."""
 
-    def write_operating_mode(self, writer: str, mode: OperatingMode) -> None:
-        """Turn the mode switch."""
+    def write_mode_and_pause(self, writer: str, mode: OperatingMode | None, pause: float | None) -> None:
+        """Turn the mode switch, and start a PROFIenergy pause [s] or end it with 0; None: leave it.
 
-    def request_pause(self, seconds: float) -> None:
-        """Start a PROFIenergy pause, or end it with 0."""
+        Both or, where one of them is refused, neither.
+        """
 
     def heartbeat(self, timeout: float) -> None:
         """The PLC is alive; without another heartbeat within `timeout` [s] its link counts as lost."""
