@@ -15,11 +15,11 @@ import numpy as np
 from ir_description.cell import AUTO, Cell, Zone
 from ir_description.library import load_power_data
 from ir_description.robot import PowerData
-from ir_description.shapes import capsule_distance, point_distance
+from ir_description.shapes import Body, Capsule, capsule_distance, overlapping, point_distance
 from ir_msgs_py.arrays import FloatArray
 
-PAIRS_MAX = 200_000
-"""Zones are compared pairwise up to this many pairs."""
+OVERLAPS_MAX = 1_000
+"""Zones that overlap are named up to this many pairs."""
 
 
 @dataclass(frozen=True)
@@ -48,28 +48,35 @@ def _base(cell: Cell) -> Iterator[Finding]:
     """Capsules of base_link never move: what they touch, they touch for good."""
     ignored = set(cell.ignored_pairs)
     bodies = cell.bodies()
-    for capsule in cell.robot.capsules:
-        if capsule.link != 0:
+    bounds = np.array([body.bounds() for body in bodies]).reshape(-1, 2, 3)
+    fixed = [capsule.placed(cell.base_pose) for capsule in cell.robot.capsules if capsule.link == 0]
+    reaches = np.array([_capsule_bounds(capsule) for capsule in fixed]).reshape(-1, 2, 3)
+    for c, b in overlapping(reaches, bounds):
+        capsule, body = fixed[c], bodies[b]
+        if (capsule.name, body.name) in ignored:
             continue
-        placed = capsule.placed(cell.base_pose)
-        for body in bodies:
-            if (capsule.name, body.name) in ignored:
-                continue
-            distance = capsule_distance(body, placed)
-            if distance <= 0.0:
-                yield Finding(
-                    "error",
-                    body.name,
-                    f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or name the pair in "
-                    "base_contacts if the robot is mounted on it",
-                )
+        distance = capsule_distance(body, capsule)
+        if distance <= 0.0:
+            yield Finding(
+                "error",
+                body.name,
+                f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or name the pair in "
+                "base_contacts if the robot is mounted on it",
+            )
+
+
+def _capsule_bounds(capsule: Capsule) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner (3,) [m]."""
+    ends = np.stack([capsule.p0, capsule.p1])
+    return ends.min(axis=0) - capsule.radius, ends.max(axis=0) + capsule.radius
 
 
 def _stations(cell: Cell) -> Iterator[Finding]:
     shoulder = cell.base_pose @ cell.robot.joint_origin[0]
     reach = _reach(cell)
-    bodies = [body for machine in cell.equipment for body in machine.world_bodies()]
-    for station in cell.stations:
+    machines = {machine.name: machine for machine in cell.equipment}
+    around = _bodies_around(cell)
+    for station, bodies in zip(cell.stations, around, strict=True):
         point = station.pose[:3, 3]
         for body in bodies:
             depth = point_distance(body, point)
@@ -80,7 +87,7 @@ def _stations(cell: Cell) -> Iterator[Finding]:
             yield Finding(
                 "error", station.name, f"its tcp is {distance:.3f} m from A1, the arm reaches {reach:.3f} m"
             )
-        machine = cell.machine(station.equipment)
+        machine = machines[station.equipment]
         if not machine.enabled:
             yield Finding("warning", station.name, f"its machine {machine.name} is switched off")
         if station.allowed_contacts and not _inside(machine.zone, point):
@@ -89,6 +96,17 @@ def _stations(cell: Cell) -> Iterator[Finding]:
                 station.name,
                 f"its tcp is outside the zone of {machine.name}; only inside do its allowed contacts hold",
             )
+
+
+def _bodies_around(cell: Cell) -> list[list[Body]]:
+    """Bodies of machines whose bounds hold the tcp, for every station."""
+    bodies = [body for machine in cell.equipment for body in machine.world_bodies()]
+    points = np.array([station.pose[:3, 3] for station in cell.stations]).reshape(-1, 3)
+    bounds = np.array([body.bounds() for body in bodies]).reshape(-1, 2, 3)
+    found: list[list[Body]] = [[] for _ in cell.stations]
+    for k, b in overlapping(np.stack([points, points], axis=1), bounds):
+        found[k].append(bodies[b])
+    return found
 
 
 def _reach(cell: Cell) -> float:
@@ -107,12 +125,22 @@ def _zones(cell: Cell) -> Iterator[Finding]:
     machines = [machine for machine in cell.equipment if machine.enabled]
     visited = {station.equipment for station in cell.stations}
     zones = [machine.zone for machine in machines]
-    pairs = itertools.islice(itertools.combinations(range(len(zones)), 2), PAIRS_MAX)
-    for i, j in pairs:
-        if visited.isdisjoint((machines[i].name, machines[j].name)):
-            continue
-        if _boxes_overlap(zones[i], zones[j]):
-            yield Finding("warning", machines[i].name, f"its zone overlaps that of {machines[j].name}")
+    bounds = np.array([_zone_bounds(zone) for zone in zones]).reshape(-1, 2, 3)
+    pairs = (
+        (i, j)
+        for i, j in overlapping(bounds, bounds)
+        if i < j
+        and not visited.isdisjoint((machines[i].name, machines[j].name))
+        and _boxes_overlap(zones[i], zones[j])
+    )
+    for i, j in itertools.islice(pairs, OVERLAPS_MAX):
+        yield Finding("warning", machines[i].name, f"its zone overlaps that of {machines[j].name}")
+
+
+def _zone_bounds(zone: Zone) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner (3,) [m] in the world."""
+    reach = np.abs(zone.pose[:3, :3]) @ zone.size / 2.0
+    return zone.pose[:3, 3] - reach, zone.pose[:3, 3] + reach
 
 
 def _boxes_overlap(first: Zone, second: Zone) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
@@ -93,7 +94,7 @@ class Equipment:
         if self.state not in (known or [""]):
             raise UnknownNameError(f"state of {self.name}", self.state, known)
 
-    @property
+    @cached_property
     def zone(self) -> Zone:
         """The forbidden zone in the world."""
         zone = self.zone_in_equipment
@@ -109,6 +110,11 @@ class Equipment:
 
     def world_bodies(self) -> tuple[Body, ...]:
         """Return the bodies that are there in the current state, in the world."""
+        return self._world_bodies
+
+    @cached_property
+    def _world_bodies(self) -> tuple[Body, ...]:
+        """Placed once: every scene of a program asks for them."""
         return tuple(body.placed(self.pose) for body in self.present_bodies())
 
 

@@ -47,7 +47,10 @@ def _cell(cell: Cell) -> Iterator[str]:
     yield from _posture("home", cell.machine_home)
     yield from _posture("park", cell.park)
     yield from _block("parts", (_part(part) for part in cell.parts))
-    yield from _block("equipment", (_machine(machine, cell.stations) for machine in cell.equipment))
+    at: dict[str, list[Station]] = {machine.name: [] for machine in cell.equipment}
+    for station in cell.stations:
+        at[station.equipment].append(station)
+    yield from _block("equipment", (_machine(machine, at[machine.name]) for machine in cell.equipment))
     yield from _block("signals", ([_signal(signal)] for signal in cell.signals))
     yield from _block("program", ([_step(step)] for step in cell.program))
     yield from _block(
@@ -97,10 +100,9 @@ def _machine(machine: Equipment, stations: Iterable[Station]) -> Iterator[str]:
         for state in machine.states:
             yield f"  {state.name}: [{', '.join(state.bodies)}]"
         yield f"state: {machine.state}"
-    own = [station for station in stations if station.equipment == machine.name]
     yield "bodies:" if machine.bodies else "bodies: []"
     yield from _entries([_body(body)] for body in machine.bodies)
-    yield from _block("stations", (_station(station) for station in own))
+    yield from _block("stations", (_station(station) for station in stations))
 
 
 def _zone(machine: Equipment) -> str:

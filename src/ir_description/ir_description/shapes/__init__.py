@@ -1,6 +1,7 @@
 """Solids: bodies of a scene, capsules around links, and distances between them."""
 
 from ir_description.shapes.body import KINDS, SIZE_MAX, Body, BodyKind, floor_body
+from ir_description.shapes.bounds import overlapping
 from ir_description.shapes.capsule import Capsule
 from ir_description.shapes.convex_distance import capsule_distance, point_distance
 
@@ -12,5 +13,6 @@ __all__ = [
     "Capsule",
     "capsule_distance",
     "floor_body",
+    "overlapping",
     "point_distance",
 ]

@@ -119,15 +119,16 @@ class PlanningScene:
         return result
 
     @cached_property
-    def _numbers(self) -> dict[frozenset[str], list[int]]:
-        """Numbers of the pairs of two names."""
-        numbers: dict[frozenset[str], list[int]] = {}
-        for z, pair in enumerate(self.collision.pairs):
-            numbers.setdefault(frozenset((pair.body_a, pair.body_b)), []).append(z)
+    def _numbers(self) -> dict[tuple[str, str], list[int]]:
+        """Numbers of the pairs of two names, in their order."""
+        numbers: dict[tuple[str, str], list[int]] = {}
+        for z, (_, body_a, body_b) in enumerate(self.collision.pairs):
+            numbers.setdefault((body_a, body_b), []).append(z)
         return numbers
 
     def _numbers_of(self, contact: AllowedContact) -> list[int]:
-        return self._numbers.get(frozenset((contact.body_a, contact.body_b)), [])
+        a, b = contact.body_a, contact.body_b
+        return self._numbers.get((a, b), []) + self._numbers.get((b, a), [])
 
     def _contacts(self, station: str) -> tuple[AllowedContact, ...]:
         return self.station(station).allowed_contacts if station else ()
