@@ -9,7 +9,16 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from ir_description import Load, RobotModel, load_cell, load_robot, robot_urdf
+from ir_description import (
+    Load,
+    RobotModel,
+    bundled_cells,
+    fixed_frames,
+    load_cell,
+    load_robot,
+    moving_frames,
+    robot_urdf,
+)
 from ir_description.arrays import solid_box_inertia
 from ir_msgs_py.arrays import FloatArray
 
@@ -180,3 +189,61 @@ def test_limits_are_those_of_the_data() -> None:
         assert float(limit.get("upper", "nan")) == robot.position_max[i]
         assert float(limit.get("velocity", "nan")) == robot.velocity_max[i]
         assert float(limit.get("effort", "nan")) == robot.envelope_torque[i, 0]
+
+
+def fixed_in_tree(tree: Xml.Element) -> dict[str, tuple[str, FloatArray]]:
+    """Parent and pose (4, 4) of every link that a fixed joint holds, as the text says it."""
+    found = {}
+    for joint in tree.iter("joint"):
+        if joint.get("type") == "fixed":
+            origin, parent, child = joint.find("origin"), joint.find("parent"), joint.find("child")
+            assert origin is not None and parent is not None and child is not None  # noqa: PT018
+            pose = np.eye(4)
+            pose[:3, 3] = [float(x) for x in origin.get("xyz", "").split()]
+            roll, pitch, yaw = (float(x) for x in origin.get("rpy", "").split())
+            pose[:3, :3] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
+            found[child.get("link", "")] = (parent.get("link", ""), pose)
+    return found
+
+
+def turn(axis: int, angle: float) -> FloatArray:
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[a, a] = R[b, b] = np.cos(angle)
+    R[b, a], R[a, b] = np.sin(angle), -np.sin(angle)
+    return R
+
+
+@pytest.mark.parametrize("name", bundled_cells())
+def test_the_root_is_the_cell_without_inertia_and_everything_below_has_one(name: str) -> None:
+    cell = load_cell(name)
+    tree = Xml.fromstring(robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose))
+    links = {link.get("name"): link for link in tree.iter("link")}
+    children = {joint.find("child").get("link") for joint in tree.iter("joint")}  # type: ignore[union-attr]
+    assert set(links) - children == {"cell"}
+    assert [link for link, element in links.items() if element.find("inertial") is None] == ["cell"]
+
+
+@pytest.mark.parametrize("name", bundled_cells())
+def test_fixed_frames_are_those_of_the_urdf(name: str) -> None:
+    cell = load_cell(name)
+    loads = () if cell.tool is None else (cell.tool,)
+    tree = Xml.fromstring(robot_urdf(cell.robot, loads, cell.tcp, cell.base_pose))
+    said = fixed_in_tree(tree)
+    frames = fixed_frames(cell.robot, loads, cell.tcp, cell.base_pose)
+    assert {frame.name for frame in frames} == set(said)
+    for frame in frames:
+        parent, pose = said[frame.name]
+        assert frame.parent == parent
+        assert np.abs(frame.pose - pose).max() < POSITION_TOLERANCE
+
+
+def test_moving_frames_lead_from_link_to_link(robot: RobotModel) -> None:
+    generator = np.random.default_rng(5)
+    for q in generator.uniform(robot.position_min, robot.position_max, (20, robot.n)):
+        poses = np.array(link_poses(robot, q))
+        at = np.eye(4)
+        for k, frame in enumerate(moving_frames(robot, poses), start=1):
+            assert (frame.parent, frame.name) == robot.link_names[k - 1 : k + 1]
+            at = at @ frame.pose
+            assert np.abs(at - poses[k]).max() < POSITION_TOLERANCE

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import re
+import runpy
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree as Xml
 
+import pytest
 import yaml
 
 from ir_msgs_py import names
@@ -27,14 +32,76 @@ TOPICS = {value for key, value in vars(names).items() if key.isupper() and isins
 
 
 def test_the_launch_file_starts_executables_that_the_packages_declare() -> None:
-    tree = ast.parse((BRINGUP / "launch" / "cell.launch.py").read_text(encoding="utf-8"))
-    [launched] = [ast.literal_eval(n.value) for n in tree.body if isinstance(n, ast.Assign)]
-    assert launched == NODES
-    for node in launched:
+    started = [node for node in launched() if node["package"] in NODES]
+    assert [node["executable"] for node in started] == list(NODES)
+    for node in NODES:
         setup = (ROOT / "src" / node / "setup.py").read_text(encoding="utf-8")
         assert re.search(rf'"{node} = {node}(\.\w+)+:main"', setup), (
             f"{node}/setup.py declares no script {node}"
         )
+
+
+class Stand:
+    """Stands for whatever the launch file makes: it keeps the arguments."""
+
+    def __init__(self, *values: Any, **named: Any) -> None:
+        self.values, self.named = values, named
+
+
+def launched(**given: str) -> list[dict[str, Any]]:
+    """Arguments of the nodes that the launch file starts, with stand-ins for launch and launch_ros."""
+    modules = {name: ModuleType(name) for name in ("launch", "launch_ros")}
+    for name in ("launch.actions", "launch.substitutions", "launch_ros.actions", "launch_ros.substitutions"):
+        modules[name] = ModuleType(name)
+    for module in modules.values():
+        module.__getattr__ = lambda name: Stand  # type: ignore[method-assign]
+    with pytest.MonkeyPatch.context() as patch:
+        for name, module in modules.items():
+            patch.setitem(sys.modules, name, module)
+        script = runpy.run_path(str(BRINGUP / "launch" / "cell.launch.py"))
+        *arguments, everything = script["generate_launch_description"]().values[0]
+        values = {each.values[0]: each.named["default_value"] for each in arguments}
+        assert set(given) <= set(values)
+        context = SimpleNamespace(launch_configurations=values | given)
+        return [node.named for node in everything.named["function"](context)]
+
+
+def parameters_of(nodes: list[dict[str, Any]], name: str) -> dict[str, object]:
+    [found] = [node["parameters"][-1] for node in nodes if node["executable"] == name]
+    return dict(found)
+
+
+def test_launch_arguments_reach_the_nodes_that_they_concern() -> None:
+    nodes = launched(cell="open", namespace="cell_2", wake_port="9010", modbus_port="5021")
+    assert {node["namespace"] for node in nodes} == {"cell_2"}
+    assert parameters_of(nodes, "ir_sim_driver") == {
+        "cell": "open",
+        "wake_port": 9010,
+        "modbus": True,
+        "modbus_port": 5021,
+    }
+    assert parameters_of(nodes, "ir_program_runner") == {"cell": "open", "wake_port": 9010}
+    assert parameters_of(nodes, "ir_planner") == {"cell": "open"}
+    for name in NODES:
+        known = {
+            f"{prefix}{each.name}"
+            for prefix, classes in SETTINGS[name].items()
+            for settings in classes
+            for each in describe(settings)
+        }
+        assert set(parameters_of(nodes, name)) <= known
+
+
+def test_robot_state_publisher_gets_the_text_and_leaves_the_topic_to_the_driver() -> None:
+    nodes = launched(robot_state_publisher="true", rviz="true")
+    [publisher, view] = [node for node in nodes if node["package"] not in NODES]
+    text = publisher["parameters"][0]["robot_description"]
+    assert Xml.fromstring(text).find("link[@name='cell']") is not None
+    assert ("robot_description", "~/robot_description") in publisher["remappings"]
+    for node in (publisher, view):
+        assert {("/tf", "tf"), ("/tf_static", "tf_static")} <= set(node["remappings"])
+    assert parameters_of(nodes, "ir_sim_driver")["publish_tf"] is False
+    assert len(launched()) == len(NODES)
 
 
 def leaves(block: dict[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
@@ -73,7 +140,9 @@ def test_the_parameter_file_shows_settings_of_the_nodes_with_their_defaults() ->
 def test_views_show_topics_of_the_cell() -> None:
     rviz = yaml.safe_load((BRINGUP / "rviz" / "cell.rviz").read_text(encoding="utf-8"))
     displays = rviz["Visualization Manager"]["Displays"]
-    shown = {display["Topic"]["Value"] for display in displays if "Topic" in display}
+    kinds = ("Topic", "Description Topic")
+    shown = {display[kind]["Value"] for display in displays for kind in kinds if kind in display}
+    assert names.ROBOT_DESCRIPTION in shown
     layout = json.loads((BRINGUP / "foxglove" / "cell.json").read_text(encoding="utf-8"))
     for panel in layout["configById"].values():
         shown |= {path["value"].partition(".")[0].removeprefix("/") for path in panel.get("paths", ())}

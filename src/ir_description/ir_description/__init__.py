@@ -31,7 +31,15 @@ from ir_description.library import (
     load_power_data,
     load_robot,
 )
-from ir_description.robot import Counterbalance, Load, PowerData, RobotModel
+from ir_description.robot import (
+    Counterbalance,
+    FramePose,
+    Load,
+    PowerData,
+    RobotModel,
+    fixed_frames,
+    moving_frames,
+)
 from ir_description.shapes import Body, Capsule
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
@@ -49,6 +57,7 @@ __all__ = [
     "Equipment",
     "EquipmentState",
     "Finding",
+    "FramePose",
     "InvalidValueError",
     "Load",
     "Part",
@@ -67,9 +76,11 @@ __all__ = [
     "cell_from_yaml",
     "cell_to_yaml",
     "check_cell",
+    "fixed_frames",
     "is_path",
     "load_cell",
     "load_power_data",
     "load_robot",
+    "moving_frames",
     "robot_urdf",
 ]

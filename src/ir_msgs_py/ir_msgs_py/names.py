@@ -21,6 +21,8 @@ RECORDER: Final = "ir_recorder"
 # of nobody in particular
 JOINT_STATES: Final = "joint_states"
 ROBOT_DESCRIPTION: Final = "robot_description"
+TF: Final = "tf"
+TF_STATIC: Final = "tf_static"
 DIAGNOSTICS: Final = "/diagnostics"
 
 # ir_planner: services

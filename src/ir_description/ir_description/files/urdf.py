@@ -1,8 +1,9 @@
 """The robot as URDF: links from the robot data, shapes from its capsules, loads fixed to the flange.
 
-Frames: base_link, link_1 .. link_n, flange (the last link's frame), tool0 (at the flange, z out), tcp. A
-capsule is a cylinder with a sphere at each end, because URDF has no capsules. Friction, rotor inertia and
-the counterbalance are not part of it: they belong to the drives.
+Frames: cell (the root, where the base's pose is given), base_link, link_1 .. link_n, flange (the last link's
+frame), tool0 (at the flange, z out), tcp. The root has no inertia, as KDL wants it. A capsule is a cylinder
+with a sphere at each end, because URDF has no capsules. Friction, rotor inertia and the counterbalance are
+not part of it: they belong to the drives.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ir_description.poses import abc_from_rotation
 from ir_description.robot import Load, RobotModel
 from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.names import WORLD_FRAME
 
 FRAME_MASS = 1e-9
 """Mass [kg] of a link that is only a frame: some simulators take a missing mass for 1 kg."""
@@ -26,16 +28,24 @@ _COLOURS = {"link": "1.0 0.45 0.1 1.0", "load": "0.35 0.4 0.45 1.0"}
 
 
 def robot_urdf(
-    robot: RobotModel, load: Load | Sequence[Load] | None = None, tcp: FloatArray | None = None
+    robot: RobotModel,
+    load: Load | Sequence[Load] | None = None,
+    tcp: FloatArray | None = None,
+    base_pose: FloatArray | None = None,
 ) -> str:
     """Return the URDF text of the robot with its load(s) and the tcp (4, 4) in the last link's frame.
 
-    Each load is a link `load_<name>` fixed to the flange. Without a tcp it stands at the flange.
+    Each load is a link `load_<name>` fixed to the flange. Without a tcp it stands at the flange. With the
+    base's pose (4, 4) in the cell, the root is the frame `cell`.
     """
     loads = () if load is None else (load,) if isinstance(load, Load) else tuple(load)
     root = Xml.Element("robot", name=robot.name)
     for name, colour in _COLOURS.items():
         Xml.SubElement(Xml.SubElement(root, "material", name=name), "color", rgba=colour)
+    if base_pose is not None:
+        Xml.SubElement(root, "link", name=WORLD_FRAME)
+        base = robot.link_names[0]
+        _fixed(root, base, WORLD_FRAME, base_pose[:3, 3], _rpy(base_pose[:3, :3]))
     for i, name in enumerate(robot.link_names):
         capsules = [capsule for capsule in robot.capsules if capsule.link == i]
         mass, com, inertia = float(robot.link_mass[i]), robot.link_com[i], robot.link_inertia[i]

@@ -114,7 +114,7 @@ class Requests:
         """The cell as it stands."""
         cell = self.planner.cell
         response.cell_yaml, response.stations = cell_to_yaml(cell), stations_to_msg(cell)
-        response.robot_description = robot_urdf(cell.robot, cell.tool, cell.tcp)
+        response.robot_description = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
         return Status.success()
 
     def set_equipment(self, request: Any, response: Any) -> Status:

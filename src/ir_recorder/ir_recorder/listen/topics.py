@@ -13,7 +13,7 @@ from fnmatch import fnmatchcase
 
 from ir_msgs_py import names
 
-SHARED = (names.JOINT_STATES, names.ROBOT_DESCRIPTION, "tf", "tf_static")  # in the cell's namespace
+SHARED = (names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC)  # in the cell's namespace
 GLOBAL = ("/diagnostics", "/rosout", "/parameter_events")
 NODES = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER, names.RECORDER)
 ACTION_STATUS = "/_action/status"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ir_description import Capsule, Cell, robot_urdf
+from ir_description import Capsule, Cell, FramePose, fixed_frames, moving_frames, robot_urdf
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.modes import Mode
@@ -224,7 +224,18 @@ class Driver:
         """URDF of the robot with what it carries."""
         with self._lock:
             cell, load = self._simulation.cell, self._simulation.load
-        return robot_urdf(cell.robot, load.loads, cell.tcp)
+        return robot_urdf(cell.robot, load.loads, cell.tcp, cell.base_pose)
+
+    def fixed_frames(self) -> tuple[FramePose, ...]:
+        """Frames that no joint moves, with those of what is carried."""
+        with self._lock:
+            cell, load = self._simulation.cell, self._simulation.load
+        return fixed_frames(cell.robot, load.loads, cell.tcp, cell.base_pose)
+
+    def moving_frames(self, q: FloatArray) -> tuple[FramePose, ...]:
+        """Frames of the joints at q (n,) [rad]."""
+        poses = self._simulation.tool.chain.link_poses(q[None])[0]
+        return moving_frames(self._simulation.robot, poses)
 
     def bodies(self, q: FloatArray) -> Bodies:
         """Robot and load at q (n,) [rad]."""

@@ -50,6 +50,7 @@ from ir_sim_driver.node.parameters import DriverParameters
 from ir_sim_driver.node.plc_topic import PlcTopic
 from ir_sim_driver.node.real_time import GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
+from ir_sim_driver.node.transforms import open_transforms
 from ir_sim_driver.notices import Level, Notice
 
 try:  # where a ROS installation has it
@@ -62,7 +63,7 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged yet. What
 # is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
 _STREAM = QoSProfile(depth=2000)
-_MARKERS_PERIOD, _DIAGNOSTICS_PERIOD = 0.05, 1.0  # s
+_MARKERS_PERIOD, _DIAGNOSTICS_PERIOD, _TRANSFORMS_PERIOD = 0.05, 1.0, 0.02  # s
 _LAG_MAX = 5.0  # s behind the clock beyond which the grid starts anew instead of catching up
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
@@ -128,6 +129,9 @@ class SimDriver(Node):
         )
         self.create_timer(_MARKERS_PERIOD, self._publish_markers)
         self.create_timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        self._transforms = open_transforms(self, self._driver, self._configuration.node.publish_tf)
+        if self._transforms is not None:
+            self.create_timer(_TRANSFORMS_PERIOD, self._publish_transforms)
         self._publish_description()
 
     def _open_requests(self) -> None:
@@ -244,6 +248,13 @@ class SimDriver(Node):
 
     def _publish_description(self) -> None:
         self._description.publish(String(data=self._driver.description()))
+        if self._transforms is not None:
+            self._transforms.publish_fixed(self.now_msg())
+
+    def _publish_transforms(self) -> None:
+        frame = self._frame
+        if self._transforms is not None and frame is not None and frame.q is not None:
+            self._transforms.publish_moving(frame.q, frame.stamp_ns)
 
     def _publish_markers(self) -> None:
         frame = self._frame

@@ -45,6 +45,11 @@ class NodeSettings:
         maximum=3600.0,
         read_only=True,
     )
+    publish_tf: bool = setting(
+        True,
+        "Whether tf and tf_static are published, where tf2_msgs is installed.",
+        read_only=True,
+    )
     real_time_factor: float = setting(
         1.0,
         "How much faster than real time the plant runs; other than 1, the node publishes /clock.",
