@@ -44,6 +44,7 @@ EXPORT_PROGRAM: Final = f"{PLANNER}/export_program"
 # action and topics
 PLAN: Final = f"{PLANNER}/plan"
 PLANNED_TRAJECTORY: Final = f"{PLANNER}/planned_trajectory"
+PROGRAM_SAVINGS: Final = f"{PLANNER}/savings"
 PLANNER_MARKERS: Final = f"{PLANNER}/markers"
 
 # ir_sim_driver: services

@@ -23,7 +23,7 @@ from ir_recorder.format import contents
 from ir_recorder.format.definition import definitions_of
 from ir_recorder.read.cdr import Columns
 from ir_recorder.read.chunks import ReadLimits
-from ir_recorder.read.decoded import movement_from
+from ir_recorder.read.decoded import movement_from, savings_from
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
     BitSeries,
@@ -33,6 +33,7 @@ from ir_recorder.read.recording import (
     PowerSeries,
     ProgramEvent,
     Recording,
+    SavingsEvent,
     TextEvent,
     TopicSummary,
 )
@@ -83,6 +84,7 @@ class _Reader:
             signals=tuple(self._signals()),
             warnings=tuple(self._warnings()),
             goals=tuple(self._goals()),
+            savings=tuple(self._savings()),
             hardware=self._hardware(),
             cell_yaml=self._attached(contents.CELL),
             urdf=self._attached(contents.URDF) or self._description(),
@@ -221,6 +223,10 @@ class _Reader:
                     last[bytes(goal.goal_info.goal_id.uuid)] = int(goal.status)
             for status in last.values():
                 yield GoalEnd(action, status, _OUTCOMES.get(status, f"status {status}"))
+
+    def _savings(self) -> Iterator[SavingsEvent]:
+        for time, message in self._messages(names.PROGRAM_SAVINGS):
+            yield SavingsEvent(time, savings_from(message))
 
     def _hardware(self) -> str:
         for _, message in self._messages(names.DIAGNOSTICS):
