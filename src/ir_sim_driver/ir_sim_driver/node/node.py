@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
+from rclpy.time_source import USE_SIM_TIME_NAME
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
@@ -38,6 +42,7 @@ from ir_sim_driver.controller import Driver, Frame, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, PlantStoppedError
 from ir_sim_driver.motion import ErrorCode, Outcome
 from ir_sim_driver.node.executions import Executions
+from ir_sim_driver.node.grid import FOREIGN, OWN, SYSTEM
 from ir_sim_driver.node.links import open_links
 from ir_sim_driver.node.markers import robot_markers
 from ir_sim_driver.node.messages import (
@@ -64,7 +69,7 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
 _STREAM = QoSProfile(depth=2000)
 _MARKERS_PERIOD, _DIAGNOSTICS_PERIOD, _TRANSFORMS_PERIOD = 0.05, 1.0, 0.02  # s
-_LAG_MAX = 5.0  # s behind the clock beyond which the grid starts anew instead of catching up
+_CLOCK_RATE = 200  # messages of /clock per second of real time at most: each wakes every node
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
 REFUSALS = (DriverError, DescriptionError, MsgsError)
@@ -82,6 +87,7 @@ class SimDriver(Node):
         self._configuration = configuration = DriverParameters(
             self, self._change_refusal, lambda settings: self._driver.set_execution(settings)
         )
+        self.add_on_set_parameters_callback(self._keep_time)
         options = configuration.node
         simulation = simulation or make_simulation(
             options.cell, options.load, options.backend, configuration.simulation
@@ -192,20 +198,21 @@ class SimDriver(Node):
         start = clock.now().nanoseconds
         own_time = factor != 1.0
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if own_time else None
+        self._clock_period = math.ceil(rate * factor / _CLOCK_RATE) * (_NS // rate)
         plant = GridThread(
             _NS // rate,
             ScaledClock(factor, start or _NS) if own_time else lambda: clock.now().nanoseconds,
+            lambda: OWN if own_time else FOREIGN if clock.ros_time_is_active else SYSTEM,
             self._tick,
             self._driver.abort,
             self._plant_failed,
-            max_lag=float("inf") if own_time else _LAG_MAX,
         )
         plant.start()
         return plant
 
     def _tick(self, stamp_ns: int) -> None:
         frame = self._frame = self._driver.tick(stamp_ns)
-        if self._clock_publisher is not None:
+        if self._clock_publisher is not None and stamp_ns % self._clock_period == 0:
             self._clock_publisher.publish(Clock(clock=time_to_msg(stamp_ns)))
         if frame.q is not None and frame.qd is not None and frame.torque is not None:
             fill_joint_state(self._joint_state, stamp_ns, frame.q, frame.qd, frame.torque)
@@ -264,7 +271,7 @@ class SimDriver(Node):
         self._markers.publish(MarkerArray(markers=markers))
 
     def _publish_diagnostics(self) -> None:
-        snapshot = self._driver.snapshot(self._plant.worst_lag)
+        snapshot = self._driver.snapshot(self._plant.worst_lag, self._plant.lag)
         for notice in snapshot.notices:
             self._log(notice)
         self._diagnostics.publish(condition_of(entry) for entry in snapshot.entries)
@@ -277,6 +284,12 @@ class SimDriver(Node):
             self.get_logger().warning(notice.sentence)
         else:
             self.get_logger().error(notice.sentence)
+
+    def _keep_time(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse another clock while the robot moves."""
+        turned = any(parameter.name == USE_SIM_TIME_NAME for parameter in parameters)
+        reason = self._change_refusal() if turned else ""
+        return SetParametersResult(successful=not reason, reason=reason)
 
     def _change_refusal(self) -> str:
         return "the robot moves: change it when it stands" if self._driver.moving else ""
