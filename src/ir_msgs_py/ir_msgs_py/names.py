@@ -24,6 +24,8 @@ ROBOT_DESCRIPTION: Final = "robot_description"
 TF: Final = "tf"
 TF_STATIC: Final = "tf_static"
 DIAGNOSTICS: Final = "/diagnostics"
+ROSOUT: Final = "/rosout"
+PARAMETER_EVENTS: Final = "/parameter_events"
 
 # ir_planner: services
 SET_CELL: Final = f"{PLANNER}/set_cell"
