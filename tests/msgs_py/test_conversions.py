@@ -14,15 +14,15 @@ from rclpy.serialization import deserialize_message, serialize_message
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 
-from ir_msgs_py import options, plc, power, program, report
+from ir_msgs_py import announced, options, plc, power, program, report
 from ir_msgs_py.candidates import IkSolution, ServiceCandidate
 from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import conversions
-from ir_msgs_py.savings import ProgramPoint, ProgramSavings, Saving
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.transitions import TransitionTimes
 
 numbers = st.floats(-1e6, 1e6)
 lengths = st.floats(0.0, 1e6)
@@ -88,7 +88,24 @@ reports = st.builds(
     torque_ratio=arrays(6),
     path_length=lengths,
     certified=st.booleans(),
+    cell_hash=texts,
+    load=texts,
     contacts=tuples(pairs),
+)
+seconds = st.floats(0.0, 604_800.0)
+timers = st.builds(
+    announced.ControllerTimers,
+    seconds,
+    st.builds(TransitionTimes, **{field.name: seconds for field in dataclasses.fields(TransitionTimes)}),
+)
+loads = st.builds(
+    announced.CarriedLoad,
+    texts,
+    lengths,
+    arrays(3),
+    hnp.arrays(np.float64, (3, 3), elements=numbers).map(lambda m: np.triu(m) + np.triu(m, 1).T),
+    numbers,
+    numbers,
 )
 infos = st.builds(
     report.PlanningInfo,
@@ -209,18 +226,6 @@ program_states = st.builds(
     note=texts,
 )
 
-saved = st.builds(Saving, numbers, numbers, lengths)
-program_savings = st.builds(
-    ProgramSavings,
-    st.booleans(),
-    saved,
-    saved,
-    st.integers(0, 500),
-    st.integers(0, 500),
-    texts,
-    texts,
-)
-
 ROUND_TRIPS = {
     "status": statuses,
     "trajectory": trajectories(),
@@ -228,8 +233,6 @@ ROUND_TRIPS = {
     "report": reports,
     "planning_info": infos,
     "planned_movement": movements | pauses,
-    "program_savings": program_savings,
-    "program_point": st.builds(ProgramPoint, numbers, numbers, texts),
     "power_mode": modes,
     "power_state": power_states,
     "plc_inputs": plc_inputs,
@@ -238,6 +241,8 @@ ROUND_TRIPS = {
     "program_state": program_states,
     "plan_options": plan_options,
     "ik_solution": solutions,
+    "controller_timers": timers,
+    "carried_load": loads,
     "service_candidate": candidates,
 }
 
@@ -271,7 +276,7 @@ def test_a_value_comes_back_from_its_message_as_it_was(name):
 
 
 def test_every_conversion_is_round_tripped_here():
-    elsewhere = {"time", "point", "pose", "stamped_pose", "configuration"}
+    elsewhere = {"time", "point", "pose", "stamped_pose", "configuration", "cell_state"}
     there_and_back = {
         name.removesuffix("_to_msg") for name in conversions.__all__ if name.endswith("_to_msg")
     }
@@ -282,6 +287,36 @@ def test_every_conversion_is_round_tripped_here():
 def test_a_stamped_pose_comes_back_within_rounding(T):
     again = conversions.stamped_pose_from_msg(conversions.stamped_pose_to_msg(T))
     np.testing.assert_allclose(again, T, atol=1e-14)
+
+
+@given(poses(), texts, st.booleans())
+def test_a_cell_comes_back_with_its_machines(T, text, enabled):
+    cell = announced.CellState(text, "0123", "format: x", ("lathe",), (T,), (enabled,), (text,))
+    again = conversions.cell_state_from_msg(conversions.cell_state_to_msg(cell))
+    np.testing.assert_allclose(again.poses[0], T, atol=1e-14)
+    assert same(dataclasses.replace(again, poses=()), dataclasses.replace(cell, poses=()))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"modes": [2, 3], "enter": [1.0], "stay": [1.0], "leave": [1.0]}, "have 2, 1, 1, 1 values"),
+        (
+            {"modes": [2], "enter": [1.0], "stay": [1.0], "leave": [1.0]},
+            "BUS_POWER_OFF, HIBERNATION are miss",
+        ),
+        ({"modes": [99, 3, 4]}, "power mode is 99"),
+        ({"enter": [-1.0, 1.0, 1.0]}, "stand_on_brakes_enter is -1"),
+        ({"leave": [0.0, float("nan"), 1.0]}, "nan"),
+        ({"brakes_after": float("nan")}, "brakes_after is nan"),
+    ],
+)
+def test_timers_that_no_controller_has_are_refused(change, sentence):
+    msg = conversions.controller_timers_to_msg(announced.ControllerTimers(20.0))
+    for name, value in change.items():
+        setattr(msg, name, value)
+    with pytest.raises(InvalidValueError, match=sentence):
+        conversions.controller_timers_from_msg(msg)
 
 
 @given(stamps)

@@ -14,8 +14,8 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 ROOMS = {
     "ir_planner": (
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
-        "regional", "trajectories", "service", "settings", "program", "store", "current_cell",
-        "planner", "node",
+        "regional", "trajectories", "service", "settings", "program", "store", "heard",
+        "current_cell", "certificates", "asked_states", "planner", "node",
     ),
     "ir_description": (
         "errors", "arrays", "poses", "shapes", "robot", "cell", "files", "library", "cell_review",

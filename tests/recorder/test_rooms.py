@@ -18,7 +18,6 @@ KNOWS = {
     "format": {"errors"},
     "arguments": set(),
     "diagnose": set(),
-    "serve": {"errors", "write"},
     "settings": {"errors"},
     "parameters": {"settings"},
     "write": {"errors", "format"},
@@ -30,8 +29,7 @@ KNOWS = {
     "report": READING | {"analysis"},
     "report_main": READING | {"analysis", "arguments", "report"},
     "node": {
-        *("arguments", "diagnose", "errors", "format", "gather", "listen", "parameters", "serve"),
-        *("settings", "write"),
+        *("arguments", "diagnose", "errors", "format", "gather", "listen", "parameters", "settings", "write")
     },
     "__init__": READING | {"analysis"},
 }

@@ -21,7 +21,7 @@ from ir_description.errors import (
     RobotFileError,
     UnknownNameError,
 )
-from ir_description.files import cell_to_yaml, robot_urdf
+from ir_description.files import cell_hash, cell_to_yaml, robot_urdf
 from ir_description.library import (
     bundled_cells,
     bundled_robots,
@@ -74,6 +74,7 @@ __all__ = [
     "bundled_cells",
     "bundled_robots",
     "cell_from_yaml",
+    "cell_hash",
     "cell_to_yaml",
     "check_cell",
     "fixed_frames",

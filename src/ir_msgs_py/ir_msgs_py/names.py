@@ -24,8 +24,6 @@ ROBOT_DESCRIPTION: Final = "robot_description"
 TF: Final = "tf"
 TF_STATIC: Final = "tf_static"
 DIAGNOSTICS: Final = "/diagnostics"
-ROSOUT: Final = "/rosout"
-PARAMETER_EVENTS: Final = "/parameter_events"
 
 # ir_planner: services
 SET_CELL: Final = f"{PLANNER}/set_cell"
@@ -45,8 +43,8 @@ PLAN_STANDBY: Final = f"{PLANNER}/plan_standby"
 EXPORT_PROGRAM: Final = f"{PLANNER}/export_program"
 # action and topics
 PLAN: Final = f"{PLANNER}/plan"
+CELL: Final = f"{PLANNER}/cell"
 PLANNED_TRAJECTORY: Final = f"{PLANNER}/planned_trajectory"
-PROGRAM_SAVINGS: Final = f"{PLANNER}/savings"
 PLANNER_MARKERS: Final = f"{PLANNER}/markers"
 
 # ir_sim_driver: services
@@ -65,6 +63,8 @@ PLC_INPUTS_IN_FORCE: Final = f"{SIM_DRIVER}/plc_inputs_in_force"
 PLC_OUTPUTS: Final = f"{SIM_DRIVER}/plc_outputs"
 SPEED_SCALING: Final = f"{SIM_DRIVER}/speed_scaling"
 POWER_STATE: Final = f"{SIM_DRIVER}/power_state"
+CONTROLLER_TIMERS: Final = f"{SIM_DRIVER}/controller_timers"
+CARRIED_LOAD: Final = f"{SIM_DRIVER}/carried_load"
 CONTROLLER_STATE: Final = f"{SIM_DRIVER}/controller_state"
 ROBOT_MARKERS: Final = f"{SIM_DRIVER}/robot_markers"
 

@@ -66,8 +66,8 @@ class TrajectoryReport:
     bus (signed), base_energy of controller, drives and tool, burnt_energy in the brake resistor [J];
     peak_power [W]; min_clearance [m] over all pairs without an allowed contact (inf: no pair), closest:
     that pair at closest_time [s]; *_ratio (n,): largest used share of each joint's limit; path_length of
-    the tcp [m]; certified: clearance and limits proved for every instant; contacts: pairs that were
-    allowed their own safety distance.
+    the tcp [m]; certified: clearance and limits proved for every instant, in the cell of cell_hash and with
+    this load; contacts: pairs that were allowed their own safety distance.
     """
 
     duration: float = 0.0
@@ -86,6 +86,8 @@ class TrajectoryReport:
     torque_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
     path_length: float = 0.0
     certified: bool = False
+    cell_hash: str = ""
+    load: str = ""
     contacts: tuple[DistancePair, ...] = ()
 
     def __post_init__(self) -> None:

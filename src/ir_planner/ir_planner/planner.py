@@ -12,7 +12,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory, state_check
+from ir_planner.asked_states import asked_state
+from ir_planner.certificates import in_scene, movement_in, optimization_in, program_in, service_in
+from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory
 from ir_planner.configurations import (
     IK_METHODS,
     STARTS_MAX,
@@ -22,13 +24,14 @@ from ir_planner.configurations import (
     no_configuration,
 )
 from ir_planner.current_cell import CurrentCell
+from ir_planner.heard import Heard
 from ir_planner.program import (
     ProgramPlan,
     ProgramRequest,
-    Progress,
+    SavingPlan,
     Standby,
-    nobody,
     plan_program,
+    plan_savings,
     plan_standby,
 )
 from ir_planner.regional import MovementPlan, plan_regional
@@ -58,9 +61,7 @@ from ir_planner.settings import PlannerSettings
 from ir_planner.store import Store, StoredProgram
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 
-PAIRS_MAX = 1000
 Cancelled = Callable[[], bool]
-Stations = tuple[str, ...]
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 
 
@@ -76,7 +77,8 @@ class Planner:
         self.clock = clock
         self.settings = settings or PlannerSettings()
         self.power = power or load_power_data()
-        self._current = CurrentCell(self.power, lambda: self.settings.braking_energy)
+        self.heard = Heard(self.power, lambda: self.settings.transitions)
+        self._current = CurrentCell(self.heard, lambda: self.settings.braking_energy)
         self.trajectories: Store[JointTrajectory] = Store(
             "trajectory", self.settings.stored_trajectories, lambda trajectory: trajectory.trajectory_id
         )
@@ -88,6 +90,11 @@ class Planner:
     def cell(self) -> Cell:
         """The cell as it stands. Raises RequestError while there is none."""
         return self._current.cell
+
+    @property
+    def cell_hash(self) -> str:
+        """Content hash of the cell as it stands."""
+        return self._current.hash_of(self.cell)
 
     @property
     def has_cell(self) -> bool:
@@ -106,20 +113,14 @@ class Planner:
         return self._current.set_equipment(name, pose, enabled, state)
 
     def scene(self, load: str = "") -> PlanningScene:
-        """Snapshot of the cell with `load` attached; "" = what is attached when its program starts: the
-        tool.
-        """
+        """Snapshot of the cell with `load` attached; "": what the robot carries, else the tool."""
         return self._current.scene(load)
 
     def check_state(
         self, q: FloatArray, margin: float, max_pairs: int, load: str, station: str
     ) -> StateCheck:
         """Nearest pairs at q (n,), and whether all keep S_m (or what `station` allows)."""
-        safety_distance(margin)
-        bounded(max_pairs, 0, PAIRS_MAX, "max_pairs")
-        scene = self.scene(load)
-        q = within_limits(q, scene.cell, "state", StatusCode.INVALID_ROBOT_STATE)
-        return state_check(q, scene, margin, max_pairs, station)
+        return asked_state(self.scene(load), q, margin, max_pairs, station)
 
     def compute_ik(
         self,
@@ -147,14 +148,13 @@ class Planner:
         scene = self.scene(load)
         if station:
             scene.station(station)
-        return evaluate_trajectory(trajectory, scene, margin, station)
+        found = evaluate_trajectory(trajectory, scene, margin, station)
+        return replace(found, report=in_scene(scene)(found.report))
 
     def standby(self, pause: float, q: FloatArray | None, load: str) -> Standby:
         """The power mode of least energy for a pause [s] at q (n,), None: machine home."""
         scene = self.scene(load)
-        return plan_standby(
-            pause, scene.cell.machine_home if q is None else q, scene, self.settings.transitions
-        )
+        return plan_standby(pause, scene.cell.machine_home if q is None else q, scene, self.heard.transitions)
 
     def plan_regional(
         self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Cancelled = _NEVER
@@ -164,9 +164,8 @@ class Planner:
         scene = self.scene(options.load)
         start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
         journal = Journal(self._work(options, cancelled), options.seed)
-        if goal.configuration is not None:
-            candidates = goal.configuration[None]
-        else:
+        candidates = None if goal.configuration is None else goal.configuration[None]
+        if candidates is None:
             assert goal.pose is not None  # a Goal has one of both
             threshold = scene.thresholds(options.safety_distance)
             found = free_configurations(goal.pose, scene, threshold, start)
@@ -177,7 +176,7 @@ class Planner:
             candidates = found.q
         context = Context(scene, options, journal)
         plan = plan_regional(start, candidates, context, self.settings.searches)
-        return self._kept(plan, note)
+        return self._kept(plan, scene, note)
 
     def plan_service(
         self,
@@ -207,7 +206,7 @@ class Planner:
         for candidate in plan.candidates:
             if candidate.trajectory is not None:
                 self.trajectories.add(candidate.trajectory)
-        return replace(plan, info=noted(plan.info, note))
+        return service_in(replace(plan, info=noted(plan.info, note)), in_scene(scene))
 
     def plan_trajectory(
         self, reference: Reference, options: PlanOptions, cancelled: Cancelled = _NEVER
@@ -215,7 +214,8 @@ class Planner:
         """Trajectory through points."""
         options, note = self._checked(options)
         scene = self.scene(options.load)
-        return self._kept(plan_through(reference, scene, options, self._work(options, cancelled)), note)
+        plan = plan_through(reference, scene, options, self._work(options, cancelled))
+        return self._kept(plan, scene, note)
 
     def optimize_trajectory(
         self,
@@ -226,53 +226,68 @@ class Planner:
         """A trajectory made cheaper between its end points, with the trade of time for energy."""
         options, note = self._checked(options or PlanOptions())
         scene = self.scene(options.load)
-        names = scene.cell.robot.joint_names
-        work = self._work(options, cancelled)
-        plan = optimize_trajectory(trajectory.reordered(names), scene, options, work, self.settings.searches)
+        original, work = trajectory.reordered(scene.cell.robot.joint_names), self._work(options, cancelled)
+        plan = optimize_trajectory(original, scene, options, work, self.settings.searches)
         for point in plan.front:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
-        return replace(plan, info=noted(plan.info, note))
+        return optimization_in(replace(plan, info=noted(plan.info, note)), in_scene(scene))
 
     def plan_program(
         self,
-        stations: Stations,
+        stations: tuple[str, ...],
         cycle_time: float,
         options: PlanOptions,
         start: FloatArray,
-        progress: Progress = nobody,
+        progress: Callable[[str, int, int, float], None] = lambda phase, done, total, cost: None,
         cancelled: Cancelled = _NEVER,
-        *,
-        savings: bool = False,
-        front_points: int = 0,
     ) -> ProgramPlan:
-        """The cell's program, or a visit of stations, from start (n,). savings: held against the common
-        program; front_points: with programs from the shortest cycle time to twice the free one.
-        """
+        """The cell's program, or a visit of stations, from start (n,)."""
+        request, work, note = self._asked(stations, cycle_time, options, start, cancelled)
+        return self._program_kept(plan_program(request, work, progress), request, note)
+
+    def plan_savings(
+        self,
+        stations: tuple[str, ...],
+        options: PlanOptions,
+        start: FloatArray,
+        cancelled: Cancelled = _NEVER,
+    ) -> SavingPlan:
+        """The program in the common program's time, and what it saves; from start (n,)."""
+        request, work, note = self._asked(stations, 0.0, options, start, cancelled)
+        found = plan_savings(request, work)
+        return replace(found, plan=self._program_kept(found.plan, request, note))
+
+    def _asked(
+        self,
+        stations: tuple[str, ...],
+        cycle: float,
+        options: PlanOptions,
+        start: FloatArray,
+        stop: Cancelled,
+    ) -> tuple[ProgramRequest, Work, str]:
         options, note = self._checked(options)
         start = within_limits(start, cell := self.cell, "start", StatusCode.START_STATE_INVALID)
-        cycle = bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s")
-        request = ProgramRequest(
-            cell, self.power, stations, start, options, cycle, self.settings, savings, front_points
-        )
+        cycle = bounded(cycle, 0.0, 604_800.0, "cycle_time", "s")
+        settings = replace(self.settings, transitions=self.heard.transitions)
+        request = ProgramRequest(cell, self.heard.data, stations, start, options, cycle, settings)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
-        plan = plan_program(request, self._work(options, cancelled, stops), progress)
-        for program in (*plan.front, plan.compared, plan):
-            if program is not None and program.status.ok:
-                self._remember(program)
+        return request, self._work(options, stop, stops), note
+
+    def _program_kept(self, plan: ProgramPlan, request: ProgramRequest, note: str) -> ProgramPlan:
+        plan = program_in(plan, self._current.hash_of(request.cell))
+        if plan.status.ok:
+            for movement in plan.movements:
+                if movement.trajectory is not None:
+                    self.trajectories.add(movement.trajectory)
+            self.programs.add(StoredProgram(plan.program_id, plan.movements, plan.report))
         return replace(plan, info=noted(plan.info, note))
 
-    def _remember(self, plan: ProgramPlan) -> None:
-        for movement in plan.movements:
-            if movement.trajectory is not None:
-                self.trajectories.add(movement.trajectory)
-        self.programs.add(StoredProgram(plan.program_id, plan.movements, plan.report))
-
-    def _kept(self, plan: MovementPlan, note: str) -> MovementPlan:
+    def _kept(self, plan: MovementPlan, scene: PlanningScene, note: str) -> MovementPlan:
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
-        return replace(plan, info=noted(plan.info, note))
+        return movement_in(replace(plan, info=noted(plan.info, note)), in_scene(scene))
 
     def _checked(self, options: PlanOptions) -> tuple[PlanOptions, str]:
         chosen(options.planner_id, ("", *self.settings.searches), "planner_id")

@@ -40,8 +40,12 @@ class DriverPort(Protocol):
     async def query_modes(self) -> tuple[Status, tuple[PowerMode, ...]]:
         """The modes with their times."""
 
-    async def drive(self, trajectory: JointTrajectory, stop: Callable[[], bool]) -> Status:
-        """Execute a trajectory; stop along the path when `stop` is true."""
+    async def drive(
+        self, trajectory: JointTrajectory, stop: Callable[[], bool], cell_hash: str, load: str
+    ) -> Status:
+        """Execute a trajectory that was planned in a cell and with a load; stop along the path when `stop`
+        is true.
+        """
 
 
 @dataclass(frozen=True)
@@ -119,8 +123,8 @@ class Fulfilment:
                 return await ports.driver.set_load(load)
             case ask.SetPlcInput(name, value):
                 return await ports.driver.set_plc_input(name, value)
-            case ask.Drive(trajectory):
-                return await ports.driver.drive(trajectory, self._stop)
+            case ask.Drive(trajectory, cell_hash, load):
+                return await ports.driver.drive(trajectory, self._stop, cell_hash, load)
             case ask.WaitForSignals(signals, timeout):
                 return await self._wait(lambda: ports.machines.holds(signals), timeout)
             case ask.WaitForMode(wanted, timeout):

@@ -136,7 +136,9 @@ class ProgramRunnerNode(Node):
             result = ProgramResult(status, 0)
             if status.ok:
                 progress.movements = movements
-                program = Program(movements, self._settings.program.value, self._settings.transitions.value)
+                timers = self._driver.timers
+                times = self._settings.transitions.value if timers is None else timers.transitions
+                program = Program(movements, self._settings.program.value, times)
                 result = await self._run_steps(goal, program)
         finally:
             self._progress = None

@@ -117,7 +117,7 @@ class Program:
         else:
             assert movement.trajectory is not None  # checked with the program
             yield Phase("moving")
-            need((yield Drive(movement.trajectory)))
+            need((yield Drive(movement.trajectory, movement.report.cell_hash, movement.report.load)))
         yield from self._carry(load_after(movement))
         for text in movement.set_signals:
             need((yield SetSignal(Signal.parse(text))))

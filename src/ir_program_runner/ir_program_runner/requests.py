@@ -64,9 +64,11 @@ class SetLoad:
 
 @dataclass(frozen=True)
 class Drive:
-    """Let the driver execute a trajectory to its end."""
+    """Let the driver execute a trajectory to its end; cell_hash, load: what it was planned with."""
 
     trajectory: JointTrajectory
+    cell_hash: str = ""
+    load: str = ""
 
 
 @dataclass(frozen=True)

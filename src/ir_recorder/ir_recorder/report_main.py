@@ -20,7 +20,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds what `run` reads."""
     parser.add_argument("file", help="recording (.mcap)")
     parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
-    parser.add_argument("--namespace", help="of the cell, where the recording holds several")
     add_roots(parser)
     parser.add_argument("--picture", default="", help="picture to write as well (.png)")
 
@@ -30,7 +29,7 @@ def run(options: argparse.Namespace) -> int:
     written.
     """
     roots = FileRoots.of(options.roots)
-    analysis = analyse(read_recording(options.file, roots, namespace=options.namespace))
+    analysis = analyse(read_recording(options.file, roots))
     for problem in analysis.problems:
         sys.stderr.write(f"{options.file}: {problem}\n")
     sys.stdout.write(f"{write_report(analysis, findings(analysis), options.output, roots=roots)}\n")

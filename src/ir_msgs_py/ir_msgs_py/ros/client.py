@@ -24,6 +24,7 @@ from ir_msgs.srv import GetTrajectory, OptimizeTrajectory, PlanRegionalMovement,
 from ir_msgs_py import names
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.ros.answers import (
     Execution,
     MovementPlan,
@@ -177,20 +178,10 @@ class Client:
         options: PlanOptions | None = None,
         progress: Callable[[Plan.Feedback], object] | None = None,
         timeout: float = 600.0,
-        savings: bool = True,
-        front_points: int = 0,
     ) -> ProgramPlan:
-        """Plan a program over stations (none: the cell's own); progress gets the action's feedback. savings:
-        hold it against the common program; front_points: programs from the shortest cycle time to twice the
-        free one.
-        """
-        goal = Plan.Goal(
-            stations=list(stations),
-            cycle_time=cycle_time,
-            options=plan_options_to_msg(options or PlanOptions()),
-            savings=savings,
-            front_points=front_points,
-        )
+        """Plan a program over stations (none: the cell's own); progress gets the action's feedback."""
+        chosen = plan_options_to_msg(options or PlanOptions())
+        goal = Plan.Goal(stations=list(stations), cycle_time=cycle_time, options=chosen)
         result = self.send_goal(names.PLAN, goal, progress, timeout)
         _check(names.PLAN, result)
         return ProgramPlan.from_msg(result)
@@ -216,11 +207,17 @@ class Client:
         trajectory: JointTrajectory,
         feedback: Callable[[ExecuteTrajectory.Feedback], object] | None = None,
         timeout: float = float("inf"),
+        report: TrajectoryReport | None = None,
     ) -> Execution:
-        """Drive a trajectory; RequestRefusedError with the driver's code and sentence when it was aborted."""
+        """Drive a trajectory; RequestRefusedError with the driver's code and sentence when it was aborted.
+
+        report: of its plan; the driver refuses what was planned in another cell or with another load.
+        """
         goal = ExecuteTrajectory.Goal(
             trajectory=trajectory_to_msg(trajectory), trajectory_id=trajectory.trajectory_id
         )
+        if report is not None:
+            goal.cell_hash, goal.load = report.cell_hash, report.load
         result = self.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback, timeout)
         if result.error_code != ExecuteTrajectory.Result.SUCCESSFUL:
             raise RequestRefusedError(

@@ -1,5 +1,13 @@
 """x_to_msg and x_from_msg of every value of the shared vocabulary; each pair is a round trip."""
 
+from ir_msgs_py.ros.convert_announced import (
+    carried_load_from_msg,
+    carried_load_to_msg,
+    cell_state_from_msg,
+    cell_state_to_msg,
+    controller_timers_from_msg,
+    controller_timers_to_msg,
+)
 from ir_msgs_py.ros.convert_basics import (
     configuration_from_msg,
     configuration_given,
@@ -53,12 +61,6 @@ from ir_msgs_py.ros.convert_report import (
     report_from_msg,
     report_to_msg,
 )
-from ir_msgs_py.ros.convert_savings import (
-    program_point_from_msg,
-    program_point_to_msg,
-    program_savings_from_msg,
-    program_savings_to_msg,
-)
 from ir_msgs_py.ros.convert_trajectory import (
     MAX_POINTS,
     duration_to_msg,
@@ -70,9 +72,15 @@ from ir_msgs_py.ros.convert_trajectory import (
 __all__ = [
     "MAX_POINTS",
     "NORM_TOLERANCE",
+    "carried_load_from_msg",
+    "carried_load_to_msg",
+    "cell_state_from_msg",
+    "cell_state_to_msg",
     "configuration_from_msg",
     "configuration_given",
     "configuration_to_msg",
+    "controller_timers_from_msg",
+    "controller_timers_to_msg",
     "distance_pair_from_msg",
     "distance_pair_to_msg",
     "duration_to_msg",
@@ -97,10 +105,6 @@ __all__ = [
     "power_mode_to_msg",
     "power_state_from_msg",
     "power_state_to_msg",
-    "program_point_from_msg",
-    "program_point_to_msg",
-    "program_savings_from_msg",
-    "program_savings_to_msg",
     "program_state_from_msg",
     "program_state_to_msg",
     "report_from_msg",

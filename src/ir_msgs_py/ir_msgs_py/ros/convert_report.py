@@ -73,6 +73,8 @@ def report_to_msg(report: TrajectoryReport) -> TrajectoryReportMsg:
         **{name: float_array(getattr(report, name)) for name in _PER_JOINT},
         closest=distance_pair_to_msg(report.closest),
         certified=report.certified,
+        cell_hash=report.cell_hash,
+        load=report.load,
         contacts=[distance_pair_to_msg(pair) for pair in report.contacts],
     )
 
@@ -84,6 +86,8 @@ def report_from_msg(msg: TrajectoryReportMsg) -> TrajectoryReport:
         **{name: getattr(msg, name) for name in (*_NUMBERS, *_PER_JOINT)},
         closest=distance_pair_from_msg(msg.closest),
         certified=msg.certified,
+        cell_hash=msg.cell_hash,
+        load=msg.load,
         contacts=tuple(pair for pair in contacts if pair is not None),
     )
 

@@ -6,6 +6,7 @@ driver is alive, and when it falls silent every wait ends.
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from typing import Any
@@ -16,14 +17,22 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 
 from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
 from ir_msgs.msg import PowerState as PowerStateMsg
 from ir_msgs.srv import QueryModes
 from ir_msgs.srv import SetLoad as SetLoadSrv
 from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
+from ir_msgs_py.announced import ControllerTimers
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
 from ir_msgs_py.power import PowerMode
-from ir_msgs_py.ros.conversions import power_mode_from_msg, status_from_msg, trajectory_to_msg
-from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
+from ir_msgs_py.ros.conversions import (
+    controller_timers_from_msg,
+    power_mode_from_msg,
+    status_from_msg,
+    trajectory_to_msg,
+)
+from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -34,6 +43,7 @@ class Driver:
 
     response_timeout: for services, and to take a goal. silence_timeout: without a reading of the meter the
     driver counts as gone. cancel_timeout: to stop along the path. on_meter: called after each reading.
+    timers: those of the controller, None before they came.
     """
 
     def __init__(
@@ -49,6 +59,7 @@ class Driver:
     ) -> None:
         self.name = name
         self.mode: Mode | None = None
+        self.timers: ControllerTimers | None = None
         self.energy = 0.0
         self._waiting = waiting
         self._response_timeout = response_timeout
@@ -62,6 +73,7 @@ class Driver:
         self._execute = ActionClient(node, ExecuteTrajectory, f"{name}/execute_trajectory", **ACTION_SERVICES)
         heard_from_all = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
         node.create_subscription(PowerStateMsg, f"{name}/power_state", self._read_meter, heard_from_all)
+        node.create_subscription(ControllerTimersMsg, f"{name}/controller_timers", self._read_timers, LATCHED)
 
     @property
     def silent(self) -> bool:
@@ -95,16 +107,22 @@ class Driver:
             return response, ()
         return status_from_msg(response.status), tuple(power_mode_from_msg(mode) for mode in response.modes)
 
-    async def drive(self, trajectory: JointTrajectory, stop: Callable[[], bool]) -> Status:
+    async def drive(
+        self, trajectory: JointTrajectory, stop: Callable[[], bool], cell_hash: str = "", load: str = ""
+    ) -> Status:
         """Execute a trajectory; `stop` is looked at all the time, and when it is true the goal is canceled.
 
         SUCCESS, PREEMPTED when it was stopped along the path, else the driver's code and sentence. The
-        duration is not limited: speed scaling may prolong or hold a movement.
+        duration is not limited: speed scaling may prolong or hold a movement. cell_hash, load: what it was
+        planned with, "": the driver doesn't compare.
         """
         if not await self._waiting.until(self._execute.server_is_ready, self._response_timeout):
             return _timed_out(f"no node offers {self.name}/execute_trajectory", self._response_timeout)
         goal = ExecuteTrajectory.Goal(
-            trajectory=trajectory_to_msg(trajectory), trajectory_id=trajectory.trajectory_id
+            trajectory=trajectory_to_msg(trajectory),
+            trajectory_id=trajectory.trajectory_id,
+            cell_hash=cell_hash,
+            load=load,
         )
         sent: Future = self._execute.send_goal_async(goal)
         if not await self._waiting.answer(sent, self._response_timeout):
@@ -136,6 +154,10 @@ class Driver:
         if not await self._waiting.answer(result, self._cancel_timeout):
             return _timed_out(f"{self.name} did not confirm the stop", self._cancel_timeout)
         return Status(StatusCode.PREEMPTED, result.result().result.error_string or "stopped along the path")
+
+    def _read_timers(self, message: ControllerTimersMsg) -> None:
+        with contextlib.suppress(InvalidValueError):  # of a driver of another kind: the settings' count
+            self.timers = controller_timers_from_msg(message)
 
     def _read_meter(self, reading: PowerStateMsg) -> None:
         self._heard = time.monotonic()

@@ -33,13 +33,14 @@ def load_text(cell: Cell, held: str = "") -> str:
 @dataclass(frozen=True, eq=False)
 class PlanningScene:
     """cell: its parts lie where they are for this request. loads: what is attached, in the frame of the
-    last link.
+    last link. cell_hash: of the cell as it stood when the request came, "" where nobody asked.
     """
 
     cell: Cell
     loads: tuple[Load, ...]
     power: PowerData
     regeneration: Regeneration = "shared"
+    cell_hash: str = ""
 
     @property
     def load_text(self) -> str:

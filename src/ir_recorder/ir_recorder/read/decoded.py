@@ -8,7 +8,6 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
-from ir_msgs_py.savings import ProgramSavings, Saving
 
 
 def movement_from(message: Any) -> PlannedMovement:
@@ -31,23 +30,6 @@ def movement_from(message: Any) -> PlannedMovement:
     )
 
 
-def savings_from(message: Any) -> ProgramSavings:
-    """ProgramSavings of its decoded message."""
-    return ProgramSavings(
-        available=bool(message.available),
-        movements=_saving_from(message.movements),
-        pauses=_saving_from(message.pauses),
-        across=int(message.across),
-        around=int(message.around),
-        program_id=message.program_id,
-        sentence=message.sentence,
-    )
-
-
-def _saving_from(message: Any) -> Saving:
-    return Saving(float(message.common), float(message.planned), float(message.seconds))
-
-
 def report_from(message: Any) -> TrajectoryReport:
     """A TrajectoryReport of its decoded message."""
     return TrajectoryReport(
@@ -67,6 +49,8 @@ def report_from(message: Any) -> TrajectoryReport:
         torque_ratio=message.torque_ratio,
         path_length=message.path_length,
         certified=message.certified,
+        cell_hash=getattr(message, "cell_hash", ""),  # recordings from before have neither
+        load=getattr(message, "load", ""),
         contacts=tuple(_pair_from(pair) for pair in message.contacts),
     )
 

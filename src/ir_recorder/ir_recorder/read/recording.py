@@ -9,7 +9,6 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.savings import ProgramSavings
 
 
 class _ReadOnlyArrays:
@@ -103,14 +102,6 @@ class ProgramEvent:
 
 
 @dataclass(frozen=True)
-class SavingsEvent:
-    """What a program that was planned then saves."""
-
-    time: float
-    savings: ProgramSavings
-
-
-@dataclass(frozen=True)
 class TextEvent:
     """A text with its time: an attached load, the level of a signal, a warning of a log."""
 
@@ -150,7 +141,6 @@ class Recording:
     signals: tuple[TextEvent, ...]
     warnings: tuple[TextEvent, ...]
     goals: tuple[GoalEnd, ...]
-    savings: tuple[SavingsEvent, ...]
     hardware: str
     cell_yaml: str
     urdf: str

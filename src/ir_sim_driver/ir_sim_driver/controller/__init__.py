@@ -8,6 +8,7 @@ from ir_sim_driver.controller.goals import NO_GOAL
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.controller.supervision import SupervisionSettings
+from ir_sim_driver.controller.surroundings import PlannedCell
 from ir_sim_driver.controller.vetting import VettedGoal
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Driver",
     "Entry",
     "Frame",
+    "PlannedCell",
     "Simulation",
     "SimulationSettings",
     "Snapshot",

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ir_description import Capsule, Cell, FramePose, fixed_frames, moving_frames, robot_urdf
+from ir_msgs_py.announced import ControllerTimers
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.modes import Mode
@@ -20,8 +21,10 @@ from ir_sim_driver.controller.access import Access
 from ir_sim_driver.controller.diagnostics import Entry, report
 from ir_sim_driver.controller.frames import Frame, Frames
 from ir_sim_driver.controller.goals import Goals
+from ir_sim_driver.controller.moving_in import take_offered_cell
 from ir_sim_driver.controller.plc_side import PlcSide
 from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.controller.surroundings import PlannedCell
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
@@ -73,6 +76,7 @@ class Driver:
         with self._lock:
             self._stamp = stamp_ns
             try:
+                take_offered_cell(self._simulation)
                 for _ in range(self._steps):
                     self._simulation.step()
                 calls = self._goals.take_calls(self._simulation.take_outcomes())
@@ -99,7 +103,13 @@ class Driver:
         self, points: int, read: Callable[[], TrajectoryGoal], ended: Callable[[Outcome], None]
     ) -> int:
         """Check a goal beside everything else and start it; returns its ticket. See `Goals.submit`."""
-        return self._goals.submit(points, read, ended)
+
+        def here() -> TrajectoryGoal:
+            goal = read()
+            self._simulation.surroundings.wait_for(goal.cell_hash)
+            return goal
+
+        return self._goals.submit(points, here, ended)
 
     def cancel(self, ticket: int) -> None:
         """Stop a goal along its path, also one that is still being checked."""
@@ -206,6 +216,15 @@ class Driver:
             simulation.set_load(carried)
             return carried
 
+    def offer_cell(self, planned: PlannedCell) -> None:
+        """Stand in this cell as soon as the robot stands; a cell that can't be its own becomes a warning."""
+        with self._lock:
+            reason = self._simulation.surroundings.offer(planned)
+            if reason:
+                self._simulation.notices.add(
+                    Level.WARN, f"cell {planned.cell.name!r} of the planner is not taken: {reason}"
+                )
+
     # -- what people see ------------------------------------------------------------------------------------
 
     def warn(self, sentence: str) -> None:
@@ -213,13 +232,24 @@ class Driver:
         with self._lock:
             self._simulation.notices.add(Level.WARN, sentence)
 
-    def snapshot(self, worst_lag: float, lag: float = 0.0) -> Snapshot:
-        """Notices since the last snapshot, and the state; delays [s] of whoever ticks: worst and now."""
+    def snapshot(self, worst_lag: float) -> Snapshot:
+        """Notices since the last snapshot, and the state; worst_lag [s] of whoever ticks."""
         with self._lock:
             return Snapshot(
-                self._simulation.notices.take(),
-                report(self._simulation, worst_lag, self._access.failure, lag),
+                self._simulation.notices.take(), report(self._simulation, worst_lag, self._access.failure)
             )
+
+    @property
+    def carried(self) -> Carried:
+        """What the robot carries now."""
+        with self._lock:
+            return self._simulation.load
+
+    @property
+    def timers(self) -> ControllerTimers:
+        """What the controller does by itself; they never change."""
+        settings = self._simulation.settings
+        return ControllerTimers(settings.idle.motors_to_brakes_in_program, settings.transitions)
 
     def description(self) -> str:
         """URDF of the robot with what it carries."""

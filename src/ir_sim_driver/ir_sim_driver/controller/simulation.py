@@ -21,6 +21,7 @@ from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.supervision import PERIOD
+from ir_sim_driver.controller.surroundings import Surroundings
 from ir_sim_driver.controller.vetting import VettedGoal, vet
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion import (
@@ -55,6 +56,7 @@ class Simulation:
     ) -> None:
         self.settings = settings = settings or SimulationSettings()
         self.cell, self.robot, self.backend = cell, cell.robot, backend
+        self.surroundings = Surroundings(cell)
         self.notices, self.watch = Notices(), Watchdog()
         home = np.array(cell.machine_home)
         backend.reset(home)
@@ -85,6 +87,11 @@ class Simulation:
         return self.modes.mode not in OFF_THE_NETWORK
 
     @property
+    def stands(self) -> bool:
+        """Whether the robot stands and nothing waits to move it."""
+        return self._still() and not self.executor.active
+
+    @property
     def stopped(self) -> bool:
         """Whether an emergency stop or a fault is latched: nothing moves until somebody recovers."""
         return self.safety.stopped
@@ -105,7 +112,7 @@ class Simulation:
 
     def execute(self, vetted: VettedGoal, now_ns: int) -> int:
         """Start a vetted goal, return its id; preempts the one that runs. Raises TrajectoryRefusedError."""
-        refusal = self._refusal()
+        refusal = self._refusal() or self.surroundings.refusal(vetted.goal, self.load)
         if refusal:
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         now, delay = self.executor.motion(), vetted.delay(now_ns)
@@ -146,7 +153,7 @@ class Simulation:
 
     def set_load(self, load: Carried) -> None:
         """Carry this from now on. Raises RequestRefusedError while the robot moves."""
-        if self.executor.active or not self._standing():
+        if not self.stands:
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE, "the robot moves: a load changes only while it stands"
             )
@@ -185,14 +192,10 @@ class Simulation:
         """Let an outside torque (n,) [Nm] act on the joints until the next call; None ends it."""
         self.backend.disturbance = torque
 
-    # -- what may be read -----------------------------------------------------------------------------------
-
     def outputs(self) -> PlcOutputs:
         """Levels to the PLC; all off while the controller is off the network."""
         off_home = float(np.abs(self.backend.q - self.cell.machine_home).max())
         return self.control.outputs(in_home=off_home < _HOME)
-
-    # -- time -----------------------------------------------------------------------------------------------
 
     def step(self) -> None:
         """Let dt pass."""
@@ -238,7 +241,7 @@ class Simulation:
         changed = control.step(
             dt,
             motion=active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
-            standing=self._standing(),
+            standing=self._still(),
             emergency=self.stopped,
         )
         if changed is not None:
@@ -263,7 +266,7 @@ class Simulation:
             scaling = min(scaling, manual_scaling(self.tool, path, s, stop_time))
         return scaling
 
-    def _standing(self) -> bool:
+    def _still(self) -> bool:
         return self.executor.path_speed == 0.0 and self.backend.standing
 
     def _mode_changed(self, before: Mode, now: Mode) -> None:

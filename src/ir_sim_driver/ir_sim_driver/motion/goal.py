@@ -35,7 +35,7 @@ class TrajectoryGoal:
 
     stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for the goal
     tolerance after the end, 0 = the default. has_effort: points carry effort. multi_dof: number of multi-dof
-    points.
+    points. cell_hash, load: the cell and the load that it was planned with, "": not compared.
     """
 
     trajectory: JointTrajectory
@@ -46,6 +46,8 @@ class TrajectoryGoal:
     has_effort: bool = False
     multi_dof: int = 0
     label: str = ""
+    cell_hash: str = ""
+    load: str = ""
 
 
 @dataclass(frozen=True)

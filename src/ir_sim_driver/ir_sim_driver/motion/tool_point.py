@@ -18,6 +18,12 @@ class ToolPoint:
     """The tcp (4, 4 in the last link's frame) of `robot` standing at `base_pose` (4, 4)."""
 
     def __init__(self, robot: RobotModel, base_pose: FloatArray, tcp: FloatArray) -> None:
+        self._robot = robot
+        self.stand_at(base_pose, tcp)
+
+    def stand_at(self, base_pose: FloatArray, tcp: FloatArray) -> None:
+        """Stand elsewhere from now on, or hold another tcp."""
+        robot = self._robot
         self.chain = Chain(robot, base_pose, tcp)
         arms = np.linalg.norm(np.array(robot.joint_origin)[1:, :3, 3], axis=1)
         lengths = np.concatenate((arms, [np.linalg.norm(tcp[:3, 3])]))

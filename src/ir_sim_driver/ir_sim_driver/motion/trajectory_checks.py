@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -46,9 +47,7 @@ def check_goal(
         _check_tolerance(tolerance, joint_names)
     if not (math.isfinite(goal.goal_time) and goal.goal_time >= 0.0):
         raise _invalid(f"goal_time_tolerance is {goal.goal_time:g} s: it must be at least 0 s")
-    return TrajectoryGoal(
-        trajectory, goal.stamp_ns, goal.path_tolerance, goal.goal_tolerance, goal.goal_time, label=goal.label
-    )
+    return replace(goal, trajectory=trajectory)
 
 
 def check_trajectory(

@@ -53,6 +53,8 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
         _tolerances(goal.goal_tolerance),
         wait.sec + wait.nanosec * _NS,
         label=_label(str(getattr(goal, "trajectory_id", ""))),
+        cell_hash=str(getattr(goal, "cell_hash", "")),
+        load=str(getattr(goal, "load", "")),
     )
 
 

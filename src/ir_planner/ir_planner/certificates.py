@@ -1,0 +1,49 @@
+"""Where a certified answer holds: every report names the cell and the load that it was proved with."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_planner.program import ProgramPlan
+from ir_planner.regional import MovementPlan
+from ir_planner.scene import PlanningScene
+from ir_planner.service import ServicePlan
+from ir_planner.trajectories import OptimizationPlan
+
+Stamp = Callable[[TrajectoryReport], TrajectoryReport]
+
+
+def stamped(report: TrajectoryReport, cell_hash: str, load: str) -> TrajectoryReport:
+    """The report with cell and load where it is certified."""
+    return replace(report, cell_hash=cell_hash, load=load) if report.certified else report
+
+
+def in_scene(scene: PlanningScene) -> Stamp:
+    """Stamps reports of a scene."""
+    return lambda report: stamped(report, scene.cell_hash, scene.load_text)
+
+
+def movement_in(plan: MovementPlan, stamp: Stamp) -> MovementPlan:
+    """The plan with its report stamped."""
+    return replace(plan, report=stamp(plan.report))
+
+
+def service_in(plan: ServicePlan, stamp: Stamp) -> ServicePlan:
+    """The plan with the reports of its candidates stamped."""
+    candidates = tuple(replace(each, report=stamp(each.report)) for each in plan.candidates)
+    return replace(plan, candidates=candidates)
+
+
+def optimization_in(plan: OptimizationPlan, stamp: Stamp) -> OptimizationPlan:
+    """The plan with its reports stamped."""
+    return replace(plan, before=stamp(plan.before), after=stamp(plan.after))
+
+
+def program_in(plan: ProgramPlan, cell_hash: str) -> ProgramPlan:
+    """The plan with each movement's report stamped with its own load; that of all has the cell alone."""
+
+    def step(movement: PlannedMovement) -> PlannedMovement:
+        return replace(movement, report=stamped(movement.report, cell_hash, movement.load))
+
+    report = stamped(plan.report, cell_hash, "")
+    return replace(plan, movements=tuple(step(movement) for movement in plan.movements), report=report)

@@ -1,0 +1,81 @@
+"""What planner and driver announce to each other: the cell out, timers and load in; latched topics."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+
+from ir_description import Cell, cell_to_yaml
+from ir_msgs.msg import CarriedLoad as CarriedLoadMsg
+from ir_msgs.msg import CellState as CellStateMsg
+from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
+from ir_msgs_py import names
+from ir_msgs_py.announced import CellState
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.ros.conversions import (
+    carried_load_from_msg,
+    cell_state_to_msg,
+    controller_timers_from_msg,
+)
+from ir_msgs_py.ros.quality import LATCHED
+from ir_planner.planner import Planner
+
+_T = TypeVar("_T")
+
+
+class Announcements:
+    """Publishes the planner's cell, and lets the planner hear what a driver publishes while there is one."""
+
+    def __init__(self, node: Node, planner: Planner, group: CallbackGroup) -> None:
+        self._node, self._planner = node, planner
+        self._cells = node.create_publisher(CellStateMsg, names.CELL, LATCHED)
+        for kind, topic, hear in (
+            (ControllerTimersMsg, names.CONTROLLER_TIMERS, self._hear_timers),
+            (CarriedLoadMsg, names.CARRIED_LOAD, self._hear_load),
+        ):
+            node.create_subscription(kind, topic, hear, LATCHED, callback_group=group)
+
+    def announce(self) -> None:
+        """Publish the cell as it stands."""
+        message = cell_state_to_msg(cell_state(self._planner.cell, self._planner.cell_hash))
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._cells.publish(message)
+
+    def forget_the_gone(self) -> None:
+        """What a driver said counts no more when it is no longer there."""
+        heard, publishers = self._planner.heard, self._node.count_publishers
+        if heard.timers is not None and not publishers(names.CONTROLLER_TIMERS):
+            heard.timers = None
+        if heard.load is not None and not publishers(names.CARRIED_LOAD):
+            heard.load = None
+
+    def _hear_timers(self, message: Any) -> None:
+        heard = self._planner.heard
+        heard_now = self._understood(controller_timers_from_msg, message, names.CONTROLLER_TIMERS)
+        heard.timers = heard_now or heard.timers
+
+    def _hear_load(self, message: Any) -> None:
+        heard = self._planner.heard
+        heard.load = self._understood(carried_load_from_msg, message, names.CARRIED_LOAD) or heard.load
+
+    def _understood(self, convert: Callable[[Any], _T], message: Any, topic: str) -> _T | None:
+        try:
+            return convert(message)
+        except MsgsError as error:
+            self._node.get_logger().warning(f"{topic} is ignored: {error}")
+            return None
+
+
+def cell_state(cell: Cell, content: str) -> CellState:
+    """A cell as it is announced; content: its hash."""
+    machines = cell.equipment
+    return CellState(
+        cell.name,
+        content,
+        cell_to_yaml(cell),
+        tuple(machine.name for machine in machines),
+        tuple(machine.pose for machine in machines),
+        tuple(machine.enabled for machine in machines),
+        tuple(machine.state or "" for machine in machines),
+    )

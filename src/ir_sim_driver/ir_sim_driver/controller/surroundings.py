@@ -1,0 +1,104 @@
+"""The cell that the driver takes itself to stand in: its own at the start, then the one that the planner
+publishes.
+
+What was planned in another cell, or with another load, is refused with both named.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+
+from ir_description import Cell, cell_hash
+from ir_msgs_py.names import LOAD_SEPARATOR
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.motion import TrajectoryGoal
+from ir_sim_driver.plant import CUSTOM, Carried, carried
+
+PATIENCE = 1.0  # s: a trajectory may be faster than the cell that it was planned in
+_SAME = 1e-9  # of a rotation's entries
+
+
+class PlannedCell(NamedTuple):
+    """A cell and its hash."""
+
+    cell: Cell
+    hash: str
+
+
+class Surroundings:
+    """cell: the one that counts. `offered`: one that counts as soon as the robot stands."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell, self._hash = cell, ""
+        self.offered: PlannedCell | None = None
+        self._changed = threading.Condition()
+
+    @property
+    def hash(self) -> str:
+        """Content hash of the cell; made when it is first asked for."""
+        self._hash = self._hash or cell_hash(self.cell)
+        return self._hash
+
+    def offer(self, planned: PlannedCell) -> str:
+        """Take a cell as soon as the robot stands; why not, "" when it will be taken."""
+        reason = self._unlike(planned.cell)
+        if not reason:
+            self.offered = planned
+        return reason
+
+    def take(self) -> bool:
+        """Take what is offered, the robot stands; whether it is another cell."""
+        planned, self.offered = self.offered, None
+        if planned is None or planned.hash == self.hash:
+            return False
+        self.cell, self._hash = planned
+        with self._changed:
+            self._changed.notify_all()
+        return True
+
+    def wait_for(self, expected: str) -> None:
+        """Give the cell of this hash the time to come; must not be called by who steps the simulation."""
+        if expected and expected != self.hash:
+            with self._changed:
+                self._changed.wait_for(lambda: expected == self.hash, PATIENCE)
+
+    def refusal(self, goal: TrajectoryGoal, load: Carried) -> str:
+        """Why a trajectory that was planned elsewhere is not executed here, "" when it may be."""
+        if goal.cell_hash and goal.cell_hash != self.hash:
+            return (
+                f"the trajectory was planned in a cell with hash {goal.cell_hash[:32]!a}, the robot stands "
+                f"in cell {self.cell.name!r} with hash {self.hash!r}: plan it again"
+            )
+        if goal.load and _names(goal.load) != _names(load.text):
+            return f"the trajectory was planned with load {goal.load[:80]!a}, the robot carries {load.text!r}"
+        return ""
+
+    def load_here(self, load: Carried, before: Cell) -> tuple[Carried, str]:
+        """What is carried as this cell describes it, and a warning: it is unknown here and stays as it is.
+
+        The tool of the cell before becomes the tool of this one.
+        """
+        if load.text == CUSTOM:
+            return load, ""
+        tool, old = self.cell.tool, before.tool
+        names = load.text.split(LOAD_SEPARATOR)
+        if tool is not None and old is not None:
+            names = [tool.name if name == old.name else name for name in names]
+        try:
+            return carried(self.cell, LOAD_SEPARATOR.join(names)), ""
+        except RequestRefusedError as error:
+            return load, f"load {load.text!r} is kept as it is in cell {self.cell.name!r}: {error}"
+
+    def _unlike(self, cell: Cell) -> str:
+        """Why a cell can't be this robot's, "" when it can."""
+        if cell.robot.name != self.cell.robot.name:
+            return f"its robot is {cell.robot.name!r}, the driver's is {self.cell.robot.name!r}"
+        turned = np.abs(cell.base_pose[:3, :3] - self.cell.base_pose[:3, :3]).max()
+        return "" if turned < _SAME else "its robot stands at another inclination or heading"
+
+
+def _names(load: str) -> set[str]:
+    return set(load.split(LOAD_SEPARATOR))

@@ -1,0 +1,91 @@
+"""What the driver announces to whoever comes later, and the planner's cell that it hears; latched topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from ir_description import DescriptionError, cell_from_yaml
+from ir_msgs.msg import CarriedLoad as CarriedLoadMsg
+from ir_msgs.msg import CellState
+from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
+from ir_msgs_py import names
+from ir_msgs_py.announced import CarriedLoad
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.ros.conversions import carried_load_to_msg, controller_timers_to_msg
+from ir_msgs_py.ros.quality import LATCHED
+from ir_sim_driver.controller import Driver, PlannedCell
+from ir_sim_driver.plant import Carried
+
+_LOOK_PERIOD = 0.1  # s: a load that came with a cell is announced a moment later
+
+
+class Announcements:
+    """Of `driver`, by `node`; load_changed: called when the robot carries another load, and at the start.
+
+    A cell is read beside everything else.
+    """
+
+    def __init__(self, node: Node, driver: Driver, load_changed: Callable[[], None]) -> None:
+        self._node, self._driver, self._load_changed = node, driver, load_changed
+        self._load: Carried | None = None
+        self._cells = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cells")
+        self._loads = node.create_publisher(CarriedLoadMsg, names.CARRIED_LOAD, LATCHED)
+        self._description = node.create_publisher(String, names.ROBOT_DESCRIPTION, LATCHED)
+        self._timers = node.create_publisher(ControllerTimersMsg, names.CONTROLLER_TIMERS, LATCHED)
+        timers = controller_timers_to_msg(driver.timers)
+        timers.header.stamp = self._now()
+        self._timers.publish(timers)
+        self.look()
+        node.create_timer(_LOOK_PERIOD, self.look)
+        node.create_subscription(CellState, names.CELL, self._heard, LATCHED)
+
+    def close(self) -> None:
+        """Read no more cells."""
+        self._cells.shutdown(wait=True, cancel_futures=True)
+
+    def look(self) -> None:
+        """Announce the load, and the robot with it, when it has changed."""
+        load = self._driver.carried
+        if load is self._load:
+            return
+        self._load = load
+        msg = carried_load_to_msg(announced(load))
+        msg.header.stamp = self._now()
+        self._loads.publish(msg)
+        self._description.publish(String(data=self._driver.description()))
+        self._load_changed()
+
+    def _now(self) -> Any:
+        return self._node.get_clock().now().to_msg()
+
+    def _heard(self, msg: CellState) -> None:
+        self._cells.submit(self._read, msg)
+
+    def _read(self, msg: CellState) -> None:
+        try:
+            cell = cell_from_yaml(msg.cell_yaml)
+        except DescriptionError as error:
+            self._driver.warn(f"the planner's cell is not taken: {error}")
+            return
+        self._driver.offer_cell(PlannedCell(cell, msg.hash))
+
+
+def announced(load: Carried) -> CarriedLoad:
+    """What is carried as one rigid body."""
+    mass = load.mass
+    com = sum((each.mass * each.com for each in load.loads), np.zeros(3)) / (mass or 1.0)
+    about_com = (each.inertia + _steiner(each.mass, each.com - com) for each in load.loads)
+    inertia = sum(about_com, np.zeros((3, 3)))
+    return CarriedLoad(load.text, mass, com, inertia, load.watts_always, load.watts_drive_bus)
+
+
+def _steiner(mass: float, offset: FloatArray) -> FloatArray:
+    """Inertia (3, 3) of a point mass at an offset (3,)."""
+    inertia: FloatArray = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return inertia

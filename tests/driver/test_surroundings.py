@@ -1,0 +1,155 @@
+"""The planner's cell in the driver: taken while the robot stands; what was planned elsewhere is refused."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ir_description import cell_hash, load_cell
+from ir_sim_driver.controller import Driver, PlannedCell
+from ir_sim_driver.controller.moving_in import take_offered_cell
+from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.node.announcements import announced
+from ir_sim_driver.plant import carried, custom_load
+
+OPEN, DEMO = load_cell("open"), load_cell("demo")
+
+
+def planned(cell):
+    return PlannedCell(cell, cell_hash(cell))
+
+
+def without_parts():
+    stations = tuple(replace(station, allowed_contacts=()) for station in DEMO.stations)
+    return replace(DEMO, parts=(), program=(), stations=stations)
+
+
+def movement(plan, simulation, by=0.05):
+    q = simulation.backend.q
+    return plan(1.0, q, q + by)
+
+
+def executed(simulation, goal):
+    return simulation.execute(simulation.vet(goal, 0), 0)
+
+
+def test_the_cell_is_taken_with_its_tool_tcp_and_postures(make):
+    simulation = make(load="none")
+    simulation.set_load(carried(OPEN, OPEN.tool.name) if OPEN.tool else carried(OPEN, "none"))
+    home = np.array(DEMO.machine_home)
+    home[0] += 0.5
+    cell = replace(DEMO, machine_home=home)
+    assert simulation.surroundings.offer(planned(cell)) == ""
+    take_offered_cell(simulation)
+    assert simulation.cell is cell
+    assert simulation.surroundings.hash == cell_hash(cell)
+    np.testing.assert_array_equal(simulation.tool.chain.tcp_poses(home[None])[0].shape, (4, 4))
+    assert not simulation.outputs().in_home
+    simulation.backend.reset(home)
+    assert simulation.outputs().in_home
+    if OPEN.tool is not None:
+        assert simulation.load.text == DEMO.tool.name
+        assert simulation.load.mass == DEMO.tool.mass
+
+
+def test_a_robot_that_moves_takes_no_cell_until_it_stands(make, plan, run_out):
+    simulation = make()
+    executed(simulation, TrajectoryGoal(movement(plan, simulation)))
+    simulation.run(0.2)
+    simulation.surroundings.offer(planned(DEMO))
+    take_offered_cell(simulation)
+    assert simulation.cell is OPEN
+    run_out(simulation)
+    simulation.run(0.5)
+    take_offered_cell(simulation)
+    assert simulation.cell is DEMO
+
+
+def test_a_trajectory_of_another_cell_is_refused_with_both_hashes(make, plan):
+    simulation = make()
+    trajectory = movement(plan, simulation)
+    with pytest.raises(TrajectoryRefusedError, match=cell_hash(OPEN)) as refused:
+        executed(simulation, TrajectoryGoal(trajectory, cell_hash=cell_hash(DEMO)))
+    assert cell_hash(DEMO) in str(refused.value)
+    assert executed(simulation, TrajectoryGoal(trajectory, cell_hash=cell_hash(OPEN))) > 0
+
+
+@pytest.mark.parametrize("load", ["none", "gripper+part", "custom"])
+def test_a_trajectory_of_another_load_is_refused_with_both_loads(load, plan, make):
+    simulation = make()
+    simulation.surroundings.offer(planned(DEMO))
+    take_offered_cell(simulation)
+    own = custom_load(DEMO, 20.0, np.array((0.0, 0.0, 0.1)), np.zeros(0), 0.0, 0.0)
+    tool, part = DEMO.tool.name, DEMO.parts[0].name
+    names = {"none": "none", "gripper+part": f"{part}+{tool}", "custom": "custom"}
+    simulation.set_load(own if load == "custom" else carried(DEMO, names[load]))
+    trajectory = movement(plan, simulation)
+    other = tool if load != "none" else f"{tool}+{part}"
+    with pytest.raises(TrajectoryRefusedError) as refused:
+        executed(simulation, TrajectoryGoal(trajectory, load=other))
+    assert repr(other) in str(refused.value)
+    assert repr(simulation.load.text) in str(refused.value)
+    same = f"{tool}+{part}" if load == "gripper+part" else simulation.load.text
+    assert executed(simulation, TrajectoryGoal(trajectory, load=same)) > 0
+
+
+def test_a_cell_of_another_robot_or_another_mounting_is_not_taken(make):
+    simulation = make()
+    robot = replace(DEMO.robot, name="other")
+    assert "its robot is 'other'" in simulation.surroundings.offer(planned(replace(DEMO, robot=robot)))
+    tilted = np.diag([1.0, -1.0, -1.0, 1.0])
+    assert "inclination" in simulation.surroundings.offer(planned(replace(DEMO, base_pose=tilted)))
+    take_offered_cell(simulation)
+    assert simulation.cell is OPEN
+
+
+def test_a_trajectory_waits_for_its_cell_which_may_come_later(make, plan):
+    simulation = make()
+    driver = Driver(simulation)
+    trajectory = movement(plan, simulation)
+    outcomes: list[Outcome] = []
+    try:
+        goal = TrajectoryGoal(trajectory, cell_hash=cell_hash(DEMO))
+        driver.submit(2, lambda: goal, outcomes.append)
+        threading.Timer(0.05, lambda: driver.offer_cell(planned(DEMO))).start()
+        for k in range(5000):
+            driver.tick(k)
+            if outcomes:
+                break
+            if k % 10 == 0:
+                threading.Event().wait(0.001)
+    finally:
+        driver.close()
+    assert [outcome.code for outcome in outcomes] == [ErrorCode.SUCCESSFUL]
+
+
+def test_an_unknown_load_is_kept_with_a_warning(make):
+    simulation = make()
+    simulation.surroundings.offer(planned(DEMO))
+    take_offered_cell(simulation)
+    simulation.set_load(carried(DEMO, f"{DEMO.tool.name}+{DEMO.parts[0].name}"))
+    mass = simulation.load.mass
+    simulation.surroundings.offer(planned(without_parts()))
+    take_offered_cell(simulation)
+    assert simulation.load.mass == mass
+    assert any("is kept as it is" in notice.sentence for notice in simulation.notices.take())
+
+
+def test_the_announced_load_is_one_rigid_body():
+    """Against the sum over points: masses and first and second moments of the loads."""
+    load = carried(DEMO, f"{DEMO.tool.name}+{DEMO.parts[0].name}")
+    one = announced(load)
+    assert one.mass == pytest.approx(sum(each.mass for each in load.loads))
+    moment = sum(each.mass * each.com for each in load.loads)
+    np.testing.assert_allclose(one.mass * one.center_of_mass, moment)
+
+    def about_origin(mass, com, inertia):
+        return inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
+
+    together = sum(about_origin(each.mass, each.com, each.inertia) for each in load.loads)
+    np.testing.assert_allclose(about_origin(one.mass, one.center_of_mass, one.inertia), together)
+    assert announced(carried(DEMO, "none")).mass == 0.0
