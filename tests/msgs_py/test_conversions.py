@@ -20,6 +20,7 @@ from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, Tra
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import conversions
+from ir_msgs_py.savings import ProgramPoint, ProgramSavings, Saving
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes
@@ -226,6 +227,18 @@ program_states = st.builds(
     note=texts,
 )
 
+saved = st.builds(Saving, numbers, numbers, lengths)
+program_savings = st.builds(
+    ProgramSavings,
+    st.booleans(),
+    saved,
+    saved,
+    st.integers(0, 500),
+    st.integers(0, 500),
+    texts,
+    texts,
+)
+
 ROUND_TRIPS = {
     "status": statuses,
     "trajectory": trajectories(),
@@ -233,6 +246,8 @@ ROUND_TRIPS = {
     "report": reports,
     "planning_info": infos,
     "planned_movement": movements | pauses,
+    "program_savings": program_savings,
+    "program_point": st.builds(ProgramPoint, numbers, numbers, texts),
     "power_mode": modes,
     "power_state": power_states,
     "plc_inputs": plc_inputs,

@@ -162,3 +162,42 @@ def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(client, c
     assert min(gaps(stamps)) >= PERIOD
     assert all(stamp % PERIOD == 0 for stamp in stamps)
     assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=30.0).error_code == 0
+
+
+def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, stamps, wait_for):
+    clock.start(10 * NS)
+    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    answers = []
+
+    def change(feedback):
+        if not answers:
+            answers.append(driver.set_parameters([Parameter("use_sim_time", value=False)])[0])
+
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.1, 1.0)))
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=30.0).error_code == 0
+    assert not answers[0].successful
+    assert "the robot moves" in answers[0].reason
+    assert driver.get_parameter("use_sim_time").value is True
+
+
+@pytest.mark.parametrize("factor", [1.5, 4.0])
+def test_its_own_clock_is_published_200_times_a_second_at_most(
+    ros_context, ros_executor, ros_node, wait_for, factor
+):
+    ticks, states = [], []
+    ros_node.create_subscription(Clock, "/clock", lambda msg: ticks.append(stamp_of(msg.clock)), 100)
+    ros_node.create_subscription(
+        JointState, names.JOINT_STATES, lambda msg: states.append(stamp_of(msg.header.stamp)), 2000
+    )
+    values = {"cell": "open", "backend": "ideal", "wake_port": 0, "real_time_factor": factor}
+    overrides = [Parameter(name, value=value) for name, value in values.items()]
+    ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+    wait_for(lambda: len(ticks) > 20 and len(states) > 200, timeout=30.0)
+    periods = {b - a for a, b in pairwise(ticks)}
+    assert len(periods) == 1
+    assert NS / 200 <= periods.pop() / factor <= NS / 100  # of real time
+    assert set(gaps(states)) == {PERIOD}
+
+
+def stamp_of(time):
+    return time.sec * NS + time.nanosec

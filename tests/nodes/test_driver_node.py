@@ -281,11 +281,13 @@ def test_faster_than_real_time_the_driver_is_the_clock(make_driver, listen, wait
     make_driver(real_time_factor=4.0)
     clock = listen("/clock", Clock)
     states = listen(names.JOINT_STATES, JointState)
-    wait_for(lambda: len(clock) > 200 and len(states) > 200, timeout=20.0)
+    wait_for(lambda: len(clock) > 50 and len(states) > 500, timeout=20.0)
     stamps = np.array([stamp_ns(msg) for msg in states])
     assert (np.diff(stamps) == 2_000_000).all()
     ticks = {msg.clock.sec * 1_000_000_000 + msg.clock.nanosec for msg in clock}
-    assert len(ticks & set(stamps.tolist())) > 100
+    both = {tick for tick in ticks if stamps[0] <= tick <= stamps[-1]}
+    assert len(both) > 20
+    assert both <= set(stamps.tolist())
 
 
 def test_a_movement_whose_client_has_gone_is_stopped_on_its_path(

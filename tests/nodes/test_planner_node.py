@@ -19,7 +19,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
 from ir_msgs.action import Plan
-from ir_msgs.msg import PlanOptions, Status
+from ir_msgs.msg import PlanOptions, ProgramSavings, Status
 from ir_msgs.srv import (
     CheckState,
     ComputeIk,
@@ -206,6 +206,37 @@ def test_plan_program_and_get_program(call: Call) -> None:
     assert all(movement.trajectory.points for movement in moves)
 
 
+def test_a_program_comes_with_its_savings_and_its_front(
+    call: Call, ros_node: Any, ros_executor: Any, wait_for: Any
+) -> None:
+    heard: list[Any] = []
+    subscription = ros_executor.run(
+        lambda: ros_node.create_subscription(
+            ProgramSavings, "/ir_planner/savings", heard.append, QoSProfile(depth=1)
+        )
+    )
+    wait_for(lambda: subscription.get_publisher_count() == 1, what="the savings have a publisher")
+    answer = call(PlanProgram, "plan_program", stations=["home", "park"], front_points=3, timeout=120.0)
+    savings = answer.savings
+    assert savings.available, savings.sentence
+    assert savings.total.share == pytest.approx(1.0 - savings.total.planned / savings.total.common)
+    assert 0.0 <= answer.gap < 100.0
+    compared = call(GetProgram, "get_program", program_id=savings.program_id)
+    assert compared.report.energy == pytest.approx(savings.total.planned)
+    assert [point.cycle_time for point in answer.front] == sorted(p.cycle_time for p in answer.front)
+    assert len(answer.front) == 3
+    for point in answer.front:
+        stored = call(GetProgram, "get_program", program_id=point.program_id)
+        assert stored.report.energy == pytest.approx(point.energy)
+        assert stored.report.duration == pytest.approx(point.cycle_time)
+    wait_for(lambda: heard, what="the savings are published")
+    assert heard[-1].program_id == savings.program_id
+    plain = call(PlanProgram, "plan_program", stations=["home", "park"], savings=False, timeout=120.0)
+    assert not plain.savings.available
+    assert "not asked for" in plain.savings.sentence
+    ros_executor.run(lambda: ros_node.destroy_subscription(subscription))
+
+
 def test_plan_standby_wakes_in_time(call: Call) -> None:
     answer = call(PlanStandby, "plan_standby", pause=300.0)
     assert answer.status.code == Status.SUCCESS
@@ -248,10 +279,10 @@ def test_a_cancelled_plan_stops_and_quick_services_answer_meanwhile(
     entered, release = threading.Event(), threading.Event()
     plan = planner_node.planner.plan_program
 
-    def slow(*args: Any) -> Any:
+    def slow(*args: Any, **asked: Any) -> Any:
         entered.set()
         release.wait(30.0)
-        return plan(*args)
+        return plan(*args, **asked)
 
     vars(planner_node.planner)["plan_program"] = slow
     sent = ros_executor.run(lambda: plan_action.send_goal_async(Plan.Goal()))
@@ -562,6 +593,14 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         {"stations": ["home", "park"], "cycle_time": 0.1},
         -16,
         "shortest",
+    ),
+    (
+        "too many points of a front",
+        PlanProgram,
+        "plan_program",
+        {"stations": ["park"], "front_points": 51},
+        -16,
+        "50",
     ),
     ("negative pause", PlanStandby, "plan_standby", {"pause": -1.0}, -16, "-1"),
     ("nan pause", PlanStandby, "plan_standby", {"pause": NAN}, -16, "nan"),

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 import rclpy
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Log, ParameterEvent
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -21,10 +23,12 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
+from ir_msgs.msg import PowerState
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.status import StatusCode
-from ir_recorder.errors import PathError, WriteError
-from ir_recorder.node import RecorderNode
+from ir_recorder.errors import PathError, ReadError, WriteError
+from ir_recorder.listen.topics import GLOBAL
+from ir_recorder.node import FLUSH_PERIOD, RecorderNode
 from ir_recorder.read.raw import read_raw
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.write.writer import RecordingWriter
@@ -65,6 +69,15 @@ def stop(call: Any) -> Any:
     return call(StopRecording, "/ir_recorder/stop", StopRecording.Request())
 
 
+def so_far(path: Path, topic: str) -> tuple[bytes, ...]:
+    """Messages of a topic that the file of a running recording holds."""
+    try:
+        channel = read_raw(path).channel(topic)
+    except ReadError:  # nothing yet
+        return ()
+    return channel.messages if channel is not None else ()
+
+
 def test_latched_and_volatile_messages_arrive_byte_by_byte(
     recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
 ) -> None:
@@ -101,6 +114,63 @@ def test_topics_of_the_nodes_are_recorded_and_others_are_not(
     late_joiner = ros_node.create_publisher(Float64, "/ir_planner/late", 10)
     wait_for(late_joiner.get_subscription_count)
     assert other.get_subscription_count() == 0
+    stop(call)
+
+
+def test_only_the_recorders_own_cell_is_recorded(
+    ros_context: Any,
+    ros_executor: Any,
+    settings: RecorderSettings,
+    ros_node: Any,
+    wait_for: Any,
+    tmp_path: Path,
+) -> None:
+    recorder = ros_executor.add_node(RecorderNode(settings, context=ros_context, namespace="cell_1"))
+    recorder.start(str(tmp_path / "own.mcap"))
+    diagnostics = ros_node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+    rosout = ros_node.create_publisher(Log, "/rosout", LATCHED)
+    events = ros_node.create_publisher(ParameterEvent, "/parameter_events", 10)
+    states = {
+        cell: ros_node.create_publisher(PowerState, f"{cell}/ir_sim_driver/power_state", 10)
+        for cell in ("", "/cell_1", "/cell_10")
+    }
+    wait_for(states["/cell_1"].get_subscription_count)
+    for publisher in (diagnostics, rosout, events):
+        wait_for(lambda publisher=publisher: publisher.get_subscription_count())
+    for cell, state in states.items():
+        status = DiagnosticStatus(name=f"{cell}/ir_sim_driver: plant".strip("/"))
+        diagnostics.publish(DiagnosticArray(status=[status]))
+        rosout.publish(Log(name=f"{cell}/ir_planner".strip("/").replace("/", "."), msg="hello"))
+        events.publish(ParameterEvent(node=f"{cell}/ir_planner"))
+        state.publish(PowerState())
+    rosout.publish(Log(name="cell_1.ir_planner", msg="last"))
+
+    def last_has_come() -> bool:
+        recorder._flush()
+        return any(b"last" in message for message in so_far(tmp_path / "own.mcap", "/rosout"))
+
+    wait_for(last_has_come)
+    recorder.finish()
+    raw = read_raw(tmp_path / "own.mcap")
+    assert all(c.topic.startswith("/cell_1/") or c.topic in GLOBAL for c in raw.channels)
+    said = [deserialize_message(m, DiagnosticArray) for m in raw.channel("/diagnostics").messages]
+    assert {s.name.partition("/")[0] for message in said for s in message.status} == {"cell_1"}
+    logs = [deserialize_message(m, Log).name for m in raw.channel("/rosout").messages]
+    assert {name.partition(".")[0] for name in logs} == {"cell_1"}
+    nodes = [deserialize_message(m, ParameterEvent).node for m in raw.channel("/parameter_events").messages]
+    assert {name.split("/")[1] for name in nodes} == {"cell_1"}
+
+
+def test_a_slow_message_reaches_the_disk_within_two_seconds(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    slow = ros_node.create_publisher(String, "/ir_planner/slow", 10)
+    start(call, tmp_path / "slow.mcap", topics=["/ir_planner/slow"])
+    wait_for(slow.get_subscription_count)
+    slow.publish(String(data="once"))
+    wait_for(lambda: recorder.messages == 1)
+    wait_for(lambda: so_far(tmp_path / "slow.mcap", "/ir_planner/slow"))
+    assert FLUSH_PERIOD < 2.0  # a figure of the clock is no test on a busy machine
     stop(call)
 
 

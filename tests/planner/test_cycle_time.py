@@ -17,7 +17,6 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
 from ir_planner.program.cycle_time import Task, shared_out
-from ir_planner.program.front import POINTS, plan_front
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.standby import plan_standby
 from ir_planner.program.station_graph import Part
@@ -125,7 +124,7 @@ def planned(demo_cell: Cell, power: PowerData) -> Callable[[float], ProgramPlan]
             start, options = np.array(demo_cell.machine_home), PlanOptions(planning_time=60.0)
             request = ProgramRequest(demo_cell, power, STATIONS, start, options, cycle_time)
             work = Work(1_200_000, time.monotonic() + 180.0, time.monotonic)
-            known[cycle_time] = plan_program(request, work, lambda phase, done, total, cost: None)
+            known[cycle_time] = plan_program(request, work)
         return known[cycle_time]
 
     return plan
@@ -166,25 +165,22 @@ def test_too_short_a_cycle_names_the_shortest(planned: Callable[[float], Program
     assert planned(shortest + 1e-3).status.ok
 
 
+POINTS = 9
+
+
 def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power: PowerData) -> None:
+    park = np.array(demo_cell.park)
     request = ProgramRequest(
-        demo_cell, power, ("home", "park"), np.array(demo_cell.park), PlanOptions(planning_time=60.0)
+        demo_cell, power, ("home", "park"), park, PlanOptions(planning_time=60.0), front_points=POINTS
     )
-    front = plan_front(request, Work(2_000_000, time.monotonic() + 300.0, time.monotonic))
+    front = plan_program(request, Work(2_000_000, time.monotonic() + 300.0, time.monotonic)).front
     assert len(front) == POINTS
     assert len({plan.program_id for plan in front}) == POINTS
     assert all(plan.report.certified for plan in front)
     seconds, energy = ([getattr(plan.report, name) for plan in front] for name in ("duration", "energy"))
     assert seconds == sorted(seconds)
     assert energy[0] > 1.1 * min(energy)  # hurrying costs
-    scene, park = scene_with(demo_cell, load_text(demo_cell), power), np.array(demo_cell.park)
+    scene = scene_with(demo_cell, load_text(demo_cell), power)
     for a, b in itertools.combinations(range(POINTS), 2):
         wait = plan_standby(seconds[b] - seconds[a], park, scene, TransitionTimes()).energy
         assert energy[b] <= 1.005 * (energy[a] + wait)
-
-
-def test_a_front_says_why_there_is_no_program(demo_cell: Cell, power: PowerData) -> None:
-    shut = demo_cell.with_equipment("lathe", state="door_closed")
-    request = ProgramRequest(shut, power, ("lathe_work",), np.array(shut.park), PlanOptions())
-    (answer,) = plan_front(request, Work(100_000, np.inf, lambda: 0.0))
-    assert "lathe_work" in answer.status.message

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,23 +13,21 @@ import pytest
 from ir_description import Cell, PowerData
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
+from ir_msgs_py.savings import Saving
 from ir_planner.program.chain import layers_of
-from ir_planner.program.common_program import common_program, nearest_chain
+from ir_planner.program.choice import Choice
+from ir_planner.program.common_program import CommonProgram, common_program, nearest_chain
+from ir_planner.program.ladder import Ladder
 from ir_planner.program.movements import Movements
-from ir_planner.program.program import prepared
-from ir_planner.program.request import ProgramRequest
-from ir_planner.program.saving_request import SavingPlan, plan_savings
-from ir_planner.program.savings import Saving, savings_of
-from ir_planner.request.journal import Journal
-from ir_planner.request.work import Work
+from ir_planner.program.program import plan_program, prepared
+from ir_planner.program.request import ProgramPlan, ProgramRequest, nobody
+from ir_planner.program.savings import savings_of
+from ir_planner.program.station_graph import Chain
+from ir_planner.request import Journal, Work
 from ir_planner.search.registry import registered
 from ir_planner.service.withdrawals import EXIT_SEARCHES
 
 STATIONS = ("home", "infeed_pick", "gauge_measure", "park")
-
-
-def no_progress(phase: str, done: int, total: int, cost: float) -> None:
-    """Nobody listens."""
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +40,26 @@ def request_(demo_cell: Cell, power: PowerData) -> ProgramRequest:
 def movements(request_: ProgramRequest) -> Movements:
     journal = Journal(Work(10**7, np.inf, lambda: 0.0), 0)
     route, context = prepared(request_, journal)
-    fastest = context.asking("time")
-    layers = layers_of(route, request_.start, fastest, EXIT_SEARCHES, no_progress)
-    return Movements(route, layers, fastest, registered())
+    layers = layers_of(route, request_.start, context, EXIT_SEARCHES, nobody)
+    return Movements(route, layers, context, registered())
 
 
 @pytest.fixture(scope="module")
-def saved(request_: ProgramRequest) -> SavingPlan:
-    return plan_savings(request_, Work(2_000_000, time.monotonic() + 300.0, time.monotonic), no_progress)
+def common(request_: ProgramRequest, movements: Movements) -> CommonProgram:
+    """It needs the layers alone: the chain of the request doesn't matter."""
+    nowhere = Chain([], 0.0, 0.0)
+    return common_program(Choice(request_, Ladder(movements, 0), nowhere))
+
+
+@pytest.fixture(scope="module")
+def planned(request_: ProgramRequest) -> Callable[[float], ProgramPlan]:
+    """The program in a cycle time [s], 0: free, with what it saves."""
+
+    def plan(cycle_time: float) -> ProgramPlan:
+        work = Work(2_000_000, time.monotonic() + 300.0, time.monotonic)
+        return plan_program(replace(request_, cycle_time=cycle_time, savings=True), work)
+
+    return plan
 
 
 def test_the_common_program_goes_to_the_nearest_configuration_every_time(movements: Movements) -> None:
@@ -60,10 +73,9 @@ def test_the_common_program_goes_to_the_nearest_configuration_every_time(movemen
 
 
 def test_a_movement_of_the_common_program_is_a_straight_segment_at_full_speed(
-    request_: ProgramRequest, movements: Movements
+    common: CommonProgram,
 ) -> None:
-    common = common_program(request_, movements)
-    across = [m for m in common.movements if m.kind == MovementKind.REGIONAL]
+    across = [m for m in common.steps if m.kind == MovementKind.REGIONAL]
     assert (common.across, common.around) == (len(across), 0)
     for movement in across:
         trajectory = movement.trajectory
@@ -77,18 +89,51 @@ def test_a_movement_of_the_common_program_is_a_straight_segment_at_full_speed(
 
 
 def test_both_programs_last_equally_long_and_the_planned_one_costs_less(
-    saved: SavingPlan, request_: ProgramRequest, movements: Movements
+    planned: Callable[[float], ProgramPlan], common: CommonProgram
 ) -> None:
-    savings = saved.savings
-    assert savings is not None
-    common = common_program(request_, movements)
-    seconds = sum(step.duration for step in common.movements)
-    assert saved.plan.report.duration == pytest.approx(seconds, abs=1e-4)
-    assert savings.movements.common == pytest.approx(sum(step.report.energy for step in common.movements))
-    assert savings.total.planned == pytest.approx(saved.plan.report.energy)
+    plan = planned(0.0)
+    savings, compared = plan.savings, plan.compared
+    assert savings.available
+    assert compared is not None
+    assert savings.program_id == compared.program_id != plan.program_id
+    seconds = sum(step.duration for step in common.steps)
+    assert compared.report.duration == pytest.approx(seconds, abs=1e-4)
+    assert savings.movements.common == pytest.approx(sum(step.report.energy for step in common.steps))
+    assert savings.total.planned == pytest.approx(compared.report.energy)
     assert 0.0 < savings.total.share < 0.4
-    assert saved.plan.report.certified
+    assert compared.report.certified
     assert "against synchronous S-curve PTP at 100 %" in savings.sentence
+    assert f"the common program's {seconds:.2f} s" in savings.sentence
+
+
+def test_in_a_longer_cycle_both_programs_wait(
+    planned: Callable[[float], ProgramPlan], common: CommonProgram
+) -> None:
+    seconds = sum(step.duration for step in common.steps)
+    plan = planned(seconds + 40.0)
+    savings = plan.savings
+    assert savings.program_id == plan.program_id  # the answer itself
+    assert savings.movements.seconds == pytest.approx(plan.report.duration, abs=1e-4)
+    assert savings.movements.planned == pytest.approx(plan.report.energy)
+    assert savings.movements.common > sum(step.report.energy for step in common.steps)
+    assert "the common program waits 40.00 s at its end" in savings.sentence
+
+
+def test_a_cycle_that_the_common_program_cannot_keep_is_compared_in_its_own_time(
+    planned: Callable[[float], ProgramPlan], common: CommonProgram
+) -> None:
+    seconds = sum(step.duration for step in common.steps)
+    plan = planned(0.98 * seconds)
+    assert plan.report.duration == pytest.approx(0.98 * seconds, abs=1e-4)
+    assert plan.savings.movements.seconds == pytest.approx(seconds, abs=1e-4)
+    assert f"which can't keep {0.98 * seconds:g} s" in plan.savings.sentence
+
+
+def test_savings_that_nobody_asked_for_say_so(request_: ProgramRequest) -> None:
+    plan = plan_program(replace(request_, stations=("home", "park")), Work(200_000, np.inf, lambda: 0.0))
+    assert plan.status.ok
+    assert not plan.savings.available
+    assert "not asked for" in plan.savings.sentence
 
 
 def test_the_three_figures_are_kept_apart() -> None:
@@ -109,8 +154,14 @@ def test_the_three_figures_are_kept_apart() -> None:
         step(regional, 1.0, 700.0),
         step(pause, 0.5, 300.0),  # the wait at the end belongs to the movements' time
     )
-    savings = savings_of(common, planned, 2, 0)
+    nowhere = cast(Choice, None)
+    savings = savings_of(CommonProgram(nowhere, common, 2, 1), (), planned)
     assert savings.movements == Saving(4000.0, 3000.0, 3.0)
     assert savings.movements.share == pytest.approx(0.25)
     assert savings.pauses == Saving(28_000.0, 20_000.0, 60.0)
     assert savings.total == Saving(32_000.0, 23_000.0, 63.0)
+    assert (savings.across, savings.around) == (2, 1)
+    waits = (step(pause, 10.0, 5000.0),)  # of the common program, in a longer cycle
+    longer = savings_of(CommonProgram(nowhere, common, 2, 1), waits, planned)
+    assert longer.movements == Saving(9000.0, 3000.0, 13.0)
+    assert longer.pauses == savings.pauses

@@ -19,7 +19,15 @@ from sensor_msgs.msg import JointState
 
 from ir_description import cell_from_yaml, load_power_data
 from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
-from ir_msgs.msg import ControllerState, PlannedMovement, PlcOutputs, PowerState, ProgramState
+from ir_msgs.msg import (
+    ControllerState,
+    PlannedMovement,
+    PlcOutputs,
+    PowerState,
+    ProgramSavings,
+    ProgramState,
+    Saving,
+)
 from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.format.qos import QosOffer
@@ -130,6 +138,7 @@ class Run:
     """Phases one after another, and the recording that a cell going through them leaves."""
 
     phases: list[Phase] = field(default_factory=list)
+    savings: list[ProgramSavings] = field(default_factory=list)
 
     def rest(self, seconds: float, mode: Mode, q: np.ndarray, load: str, target: Mode | None = None) -> None:
         self.phases.append(Phase(seconds, mode, q, q, load, target))
@@ -167,6 +176,7 @@ class _Recorder:
                 "ir_msgs/msg/ProgramState",
                 QosOffer(transient_local=True),
             ),
+            ("/ir_planner/savings", "ir_msgs/msg/ProgramSavings", QosOffer(transient_local=True)),
             ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", QosOffer()),
         ):
             self.session.open_topic(topic, kind, [offer])
@@ -178,6 +188,8 @@ class _Recorder:
 
     def record(self) -> Path:
         steps = [phase for phase in self.run.phases if phase.step is not None]
+        for savings in self.run.savings:
+            self._put("/ir_planner/savings", savings, self.now)
         for phase in self.run.phases:
             self._diagnostics(phase.load)
             self._phase(phase, steps)
@@ -283,11 +295,23 @@ TABLE = np.radians([-32.0, -60.0, 95.0, 0.0, 55.0, 30.0])
 PRESS = np.radians([34.0, -55.0, 90.0, 0.0, 50.0, -30.0])
 
 
+SAVINGS = ProgramSavings(
+    available=True,
+    movements=Saving(common=4000.0, planned=3000.0, seconds=4.5, share=0.25),
+    pauses=Saving(common=1000.0, planned=800.0, seconds=1.2, share=0.2),
+    total=Saving(common=5000.0, planned=3800.0, seconds=5.7, share=0.24),
+    across=3,
+    around=1,
+    program_id="0123456789abcdef",
+    sentence="what was compared",
+)
+
+
 def demo_run(rest: float = 0.4, move: float = 1.5) -> Run:
     """Table II at machine home without and with the tool, then a program of three movements and two
     pauses.
     """
-    run = Run()
+    run = Run(savings=[SAVINGS])
     for load in ("none", "gripper"):
         run.rest(rest, Mode.STAND_ON_MOTORS, HOME, load)
         run.rest(rest / 2, Mode.TO_BRAKES, HOME, load, Mode.STAND_ON_BRAKES)

@@ -7,10 +7,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from mcap.writer import Writer
+from rcl_interfaces.msg import Log
 from rclpy.serialization import serialize_message
 
-from ir_msgs.msg import PlcInputs
+from ir_msgs.msg import PlcInputs, PowerState
+from ir_recorder.errors import ReadError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.read.reader import read_recording
@@ -85,3 +89,42 @@ def test_reading_needs_no_ros() -> None:
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
+
+
+def two_cells(path: Path) -> Path:
+    """A recording of everything in a graph with two cells: loads, hardware and warnings of both."""
+    session = RecordingSession(RecordingWriter(path), {}, 10**18)
+    diagnostics = "diagnostic_msgs/msg/DiagnosticArray"
+    session.open_topic("/diagnostics", diagnostics, [QosOffer()])
+    session.open_topic("/rosout", "rcl_interfaces/msg/Log", [QosOffer()])
+    for cell in ("left", "right"):
+        topic = f"/{cell}/ir_sim_driver/power_state"
+        session.open_topic(topic, "ir_msgs/msg/PowerState", [QosOffer()])
+        session.message(topic, serialize_message(PowerState(power=len(cell))), 10**18)
+        status = DiagnosticStatus(
+            name=f"{cell}/ir_sim_driver: plant",
+            hardware_id=cell,
+            values=[KeyValue(key="load", value=f"load {cell}")],
+        )
+        session.message("/diagnostics", serialize_message(DiagnosticArray(status=[status])), 10**18)
+        log = Log(level=30, name=f"{cell}.ir_planner", msg=f"warning {cell}")
+        session.message("/rosout", serialize_message(log), 10**18)
+    return session.finish().path
+
+
+def test_only_what_the_chosen_cell_said_is_read(tmp_path: Path) -> None:
+    path = two_cells(tmp_path / "two.mcap")
+    for cell in ("left", "right"):
+        recording = read_recording(path, namespace=cell)
+        assert [event.text for event in recording.loads] == [f"load {cell}"]
+        assert [event.text for event in recording.warnings] == [f"warning {cell}"]
+        assert recording.hardware == cell
+        assert recording.power is not None
+        assert recording.power.power.tolist() == [len(cell)]
+
+
+def test_a_recording_of_several_cells_says_which_one_is_read(tmp_path: Path) -> None:
+    path = two_cells(tmp_path / "two.mcap")
+    assert any("(/left, /right); --namespace chooses" in problem for problem in read_recording(path).problems)
+    with pytest.raises(ReadError, match=r"no cell '/middle' in the recording; there is: /left, /right"):
+        read_recording(path, namespace="middle")

@@ -18,6 +18,7 @@ KNOWS = {
     "format": {"errors"},
     "arguments": set(),
     "diagnose": set(),
+    "serve": {"errors", "write"},
     "settings": {"errors"},
     "parameters": {"settings"},
     "write": {"errors", "format"},
@@ -29,7 +30,8 @@ KNOWS = {
     "report": READING | {"analysis"},
     "report_main": READING | {"analysis", "arguments", "report"},
     "node": {
-        *("arguments", "diagnose", "errors", "format", "gather", "listen", "parameters", "settings", "write")
+        *("arguments", "diagnose", "errors", "format", "gather", "listen", "parameters", "serve"),
+        *("settings", "write"),
     },
     "__init__": READING | {"analysis"},
 }

@@ -24,6 +24,8 @@ ROBOT_DESCRIPTION: Final = "robot_description"
 TF: Final = "tf"
 TF_STATIC: Final = "tf_static"
 DIAGNOSTICS: Final = "/diagnostics"
+ROSOUT: Final = "/rosout"
+PARAMETER_EVENTS: Final = "/parameter_events"
 
 # ir_planner: services
 SET_CELL: Final = f"{PLANNER}/set_cell"
@@ -45,6 +47,7 @@ EXPORT_PROGRAM: Final = f"{PLANNER}/export_program"
 PLAN: Final = f"{PLANNER}/plan"
 CELL: Final = f"{PLANNER}/cell"
 PLANNED_TRAJECTORY: Final = f"{PLANNER}/planned_trajectory"
+PROGRAM_SAVINGS: Final = f"{PLANNER}/savings"
 PLANNER_MARKERS: Final = f"{PLANNER}/markers"
 
 # ir_sim_driver: services

@@ -13,7 +13,7 @@ from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError
 from ir_planner.planner import Planner
-from ir_planner.program import ProgramPlan, Saving, SavingPlan, Savings, Standby
+from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
 from ir_planner.request import Goal, parse_goal
 from ir_planner.service import ServicePlan
@@ -35,9 +35,6 @@ __all__ = [
     "ProgramPlan",
     "Reference",
     "RequestError",
-    "Saving",
-    "SavingPlan",
-    "Savings",
     "ServicePlan",
     "Standby",
     "StateCheck",

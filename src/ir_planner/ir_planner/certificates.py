@@ -45,5 +45,11 @@ def program_in(plan: ProgramPlan, cell_hash: str) -> ProgramPlan:
     def step(movement: PlannedMovement) -> PlannedMovement:
         return replace(movement, report=stamped(movement.report, cell_hash, movement.load))
 
-    report = stamped(plan.report, cell_hash, "")
-    return replace(plan, movements=tuple(step(movement) for movement in plan.movements), report=report)
+    compared = plan.compared if plan.compared is None else program_in(plan.compared, cell_hash)
+    return replace(
+        plan,
+        movements=tuple(step(movement) for movement in plan.movements),
+        report=stamped(plan.report, cell_hash, ""),
+        compared=compared,
+        front=tuple(program_in(point, cell_hash) for point in plan.front),
+    )

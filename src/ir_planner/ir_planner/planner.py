@@ -28,10 +28,10 @@ from ir_planner.heard import Heard
 from ir_planner.program import (
     ProgramPlan,
     ProgramRequest,
-    SavingPlan,
+    Progress,
     Standby,
+    nobody,
     plan_program,
-    plan_savings,
     plan_standby,
 )
 from ir_planner.regional import MovementPlan, plan_regional
@@ -240,49 +240,33 @@ class Planner:
         cycle_time: float,
         options: PlanOptions,
         start: FloatArray,
-        progress: Callable[[str, int, int, float], None] = lambda phase, done, total, cost: None,
+        progress: Progress = nobody,
         cancelled: Cancelled = _NEVER,
+        *,
+        savings: bool = False,
+        front_points: int = 0,
     ) -> ProgramPlan:
-        """The cell's program, or a visit of stations, from start (n,)."""
-        request, work, note = self._asked(stations, cycle_time, options, start, cancelled)
-        return self._program_kept(plan_program(request, work, progress), request, note)
-
-    def plan_savings(
-        self,
-        stations: tuple[str, ...],
-        options: PlanOptions,
-        start: FloatArray,
-        cancelled: Cancelled = _NEVER,
-    ) -> SavingPlan:
-        """The program in the common program's time, and what it saves; from start (n,)."""
-        request, work, note = self._asked(stations, 0.0, options, start, cancelled)
-        found = plan_savings(request, work)
-        return replace(found, plan=self._program_kept(found.plan, request, note))
-
-    def _asked(
-        self,
-        stations: tuple[str, ...],
-        cycle: float,
-        options: PlanOptions,
-        start: FloatArray,
-        stop: Cancelled,
-    ) -> tuple[ProgramRequest, Work, str]:
+        """The cell's program, or a visit of stations, from start (n,). savings: held against the common
+        program; front_points: with programs from the shortest cycle time to twice the free one.
+        """
         options, note = self._checked(options)
         start = within_limits(start, cell := self.cell, "start", StatusCode.START_STATE_INVALID)
-        cycle = bounded(cycle, 0.0, 604_800.0, "cycle_time", "s")
-        settings = replace(self.settings, transitions=self.heard.transitions)
-        request = ProgramRequest(cell, self.heard.data, stations, start, options, cycle, settings)
+        cycle = bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s")
+        data, settings = self.heard.data, replace(self.settings, transitions=self.heard.transitions)
+        request = ProgramRequest(cell, data, stations, start, options, cycle, settings, savings, front_points)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
-        return request, self._work(options, stop, stops), note
-
-    def _program_kept(self, plan: ProgramPlan, request: ProgramRequest, note: str) -> ProgramPlan:
-        plan = program_in(plan, self._current.hash_of(request.cell))
-        if plan.status.ok:
-            for movement in plan.movements:
-                if movement.trajectory is not None:
-                    self.trajectories.add(movement.trajectory)
-            self.programs.add(StoredProgram(plan.program_id, plan.movements, plan.report))
+        plan = plan_program(request, self._work(options, cancelled, stops), progress)
+        plan = program_in(plan, self._current.hash_of(cell))
+        for program in (*plan.front, plan.compared, plan):
+            if program is not None and program.status.ok:
+                self._remember(program)
         return replace(plan, info=noted(plan.info, note))
+
+    def _remember(self, plan: ProgramPlan) -> None:
+        for movement in plan.movements:
+            if movement.trajectory is not None:
+                self.trajectories.add(movement.trajectory)
+        self.programs.add(StoredProgram(plan.program_id, plan.movements, plan.report))
 
     def _kept(self, plan: MovementPlan, scene: PlanningScene, note: str) -> MovementPlan:
         if plan.trajectory is not None:

@@ -40,7 +40,7 @@ class PlannerSettings:
         500, "Trajectories remembered by id; the oldest go first.", minimum=1, maximum=100_000, read_only=True
     )
     stored_programs: int = setting(
-        50, "Programs remembered by id; the oldest go first.", minimum=1, maximum=10_000, read_only=True
+        120, "Programs remembered by id; the oldest go first.", minimum=1, maximum=10_000, read_only=True
     )
     state_max_age: float = setting(
         1.0,

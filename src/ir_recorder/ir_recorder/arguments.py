@@ -20,5 +20,6 @@ def record_parser() -> argparse.ArgumentParser:
     parser.add_argument("--overwrite", action="store_true", help="replace a recording")
     parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
     parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
+    parser.add_argument("--namespace", default="", help="of the cell to record (none)")
     add_roots(parser)
     return parser

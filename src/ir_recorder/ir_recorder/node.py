@@ -14,28 +14,27 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
-from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.running import run_node
-from ir_msgs_py.status import StatusCode
 from ir_recorder.arguments import record_parser
 from ir_recorder.diagnose.node import RecorderDiagnostics
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
 from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.gather.node import CellRequest, ParameterRequests
-from ir_recorder.listen.node import Listener
+from ir_recorder.listen.node import Listener, is_own
 from ir_recorder.listen.topics import TopicSelection, single_type
 from ir_recorder.parameters import declared_settings
+from ir_recorder.serve.node import Services, without_publisher
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.write.cell_files import files_of_cell
 from ir_recorder.write.session import CellFiles, RecordingSession
 from ir_recorder.write.writer import OpenWriter, RecordingSummary, open_writer
 
 COMMAND_NODE = "ir_record"  # beside the cell's own recorder
+FLUSH_PERIOD = 1.5  # s that messages stay in memory; those of a whole cell fill a chunk in that time
 POLL_PERIOD = 0.02  # s: 10 joint states at a time; waking for each takes a third of a core
 
 
@@ -62,11 +61,11 @@ class RecorderNode(Node):
         )
         self._diagnostics = RecorderDiagnostics(self)
         if name == names.RECORDER:  # a command's own recording is no service of the cell
-            self.create_service(StartRecording, "~/start", self._on_start, qos_profile=SERVICE)
-            self.create_service(StopRecording, "~/stop", self._on_stop, qos_profile=SERVICE)
+            self._requests = Services(self, self)
         self.create_timer(self._settings.discovery_period, self._discover)
         self.create_timer(POLL_PERIOD, self._collect)
         self.create_timer(1.0, self._each_second)
+        self.create_timer(FLUSH_PERIOD, self._flush)
         if self._settings.path:
             self.start(self._settings.path, self._settings.overwrite)
 
@@ -124,7 +123,9 @@ class RecorderNode(Node):
         self._cell.begin()
         self._parameters.begin()
         self._discover()
-        self.get_logger().info(f"recording into {writer.path}{_without_publisher(self.unmet, 'is seen yet')}")
+        if self._failure:
+            raise WriteError(self._failure)
+        self.get_logger().info(f"recording into {writer.path}{without_publisher(self.unmet, 'is seen yet')}")
         return str(writer.path)
 
     def finish(self) -> RecordingSummary | None:
@@ -134,7 +135,11 @@ class RecorderNode(Node):
         self._listener.close()
         if session is None:
             return None
-        summary = session.finish()
+        try:
+            summary = session.finish()
+        except WriteError as error:
+            self._failure = str(error)
+            raise
         self.get_logger().info(
             f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, "
             f"{self._listener.lost} lost"
@@ -147,44 +152,6 @@ class RecorderNode(Node):
             self.finish()
         finally:
             super().destroy_node()
-
-    def _on_start(
-        self, request: StartRecording.Request, response: StartRecording.Response
-    ) -> StartRecording.Response:
-        response.status.source = self.get_name()
-        try:
-            response.path = self.start(request.path, request.overwrite, request.topics)
-        except RecorderError as error:
-            self._session = None if isinstance(error, WriteError) else self._session
-            response.status.code = int(StatusCode.FAILURE)
-            response.status.message = str(error)
-        else:
-            response.status.code = int(StatusCode.SUCCESS)
-            response.status.message = (
-                f"recording into {response.path}{_without_publisher(self.unmet, 'is seen yet')}"
-            )
-        return response
-
-    def _on_stop(
-        self, request: StopRecording.Request, response: StopRecording.Response
-    ) -> StopRecording.Response:
-        response.status.source = self.get_name()
-        unmet = self.unmet
-        try:
-            summary = self.finish()
-        except WriteError as error:
-            self._failure = str(error)
-            summary = None
-        if summary is None:
-            response.status.code = int(StatusCode.FAILURE)
-            response.status.message = self._failure or "nothing is being recorded"
-            return response
-        response.status.code = int(StatusCode.SUCCESS)
-        seconds = f"{summary.messages} messages over {summary.seconds:.1f} s"
-        response.status.message = f"{seconds}{_without_publisher(unmet, 'was seen')}"
-        response.path = str(summary.path)
-        response.messages, response.seconds = summary.messages, summary.seconds
-        return response
 
     def _discover(self) -> None:
         """Subscribes to topics that are new and belong to the recording."""
@@ -217,7 +184,12 @@ class RecorderNode(Node):
 
     def _write_arrivals(self, session: RecordingSession) -> None:
         for arrival in self._listener.take():
+            if not self._selection.wanted and not is_own(arrival, self.get_namespace()):
+                continue
             session.message(arrival.topic, arrival.data, arrival.time)
+
+    def _flush(self) -> None:
+        self._write(RecordingSession.flush)
 
     def _each_second(self) -> None:
         self._ask()
@@ -260,11 +232,6 @@ class RecorderNode(Node):
         return int(self.get_clock().now().nanoseconds)
 
 
-def _without_publisher(topics: Sequence[str], when: str) -> str:
-    """The end of a sentence: the wanted topics without a publisher."""
-    return f"; no publisher {when} of {', '.join(topics)}" if topics else ""
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """`ir-record PATH [--overwrite] [--topics ...] [--cell NAME]`: records until SIGINT or SIGTERM."""
     everything = sys.argv[1:] if arguments is None else list(arguments)
@@ -273,7 +240,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     recorders: list[RecorderNode] = []
 
     def start() -> RecorderNode:
-        recorders.append(node := RecorderNode(name=COMMAND_NODE) if options.path else RecorderNode())
+        name = COMMAND_NODE if options.path else names.RECORDER
+        recorders.append(node := RecorderNode(name=name, namespace=options.namespace or None))
         try:
             if options.path:
                 roots = FileRoots.of(options.roots) if options.roots else None

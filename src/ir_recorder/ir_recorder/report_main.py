@@ -20,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds what `run` reads."""
     parser.add_argument("file", help="recording (.mcap)")
     parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
+    parser.add_argument("--namespace", help="of the cell, where the recording holds several")
     add_roots(parser)
     parser.add_argument("--picture", default="", help="picture to write as well (.png)")
 
@@ -29,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     written.
     """
     roots = FileRoots.of(options.roots)
-    analysis = analyse(read_recording(options.file, roots))
+    analysis = analyse(read_recording(options.file, roots, namespace=options.namespace))
     for problem in analysis.problems:
         sys.stderr.write(f"{options.file}: {problem}\n")
     sys.stdout.write(f"{write_report(analysis, findings(analysis), options.output, roots=roots)}\n")

@@ -11,6 +11,7 @@ from ir_recorder import Analysis, Finding, Tolerances, Verdict, analyse, finding
 from ir_recorder.analysis.findings import row_name
 from ir_recorder.report import write_report
 from ir_recorder.report.picture import write_picture
+from ir_recorder.report.savings import savings_lines
 from ir_recorder.report.words import interval, number
 
 MODES_AT_REST = 4
@@ -31,7 +32,7 @@ class Outcome:
 
     def text(self) -> str:
         """Tables for the terminal."""
-        parts = [self._movements(), self._at_rest(), self._cycle(), *self.analysis.problems]
+        parts = [self._movements(), self._at_rest(), self._cycle(), self._saved(), *self.analysis.problems]
         parts += [_sentence(check) for check in self.checks if not check.ok]
         parts.append(f"checks: {summary(self.checks)[1]}")
         return "\n\n".join(part for part in parts if part)
@@ -48,6 +49,10 @@ class Outcome:
             cut = f"pauses of {full.full_pauses:.0f} s instead of {full.run_pauses:.0f} s"
             lines.append(f"with full pauses (computed): {_total(full.energy, full.seconds)}; {cut}")
         return "\n".join(lines)
+
+    def _saved(self) -> str:
+        """What the program saves by its plan, each figure with its baseline."""
+        return "\n".join(savings_lines(self.analysis))
 
     def _movements(self) -> str:
         header = ["step", "s", "J planned", "J net", "cost W", "clearance mm", "tool deviation mm"]

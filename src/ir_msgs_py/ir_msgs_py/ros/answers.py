@@ -10,7 +10,9 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.ros.convert_report import planned_movement_from_msg, planning_info_from_msg, report_from_msg
+from ir_msgs_py.ros.convert_savings import program_point_from_msg, program_savings_from_msg
 from ir_msgs_py.ros.convert_trajectory import trajectory_from_msg, trajectory_given
+from ir_msgs_py.savings import ProgramPoint, ProgramSavings
 from ir_msgs_py.trajectory import JointTrajectory
 
 
@@ -66,12 +68,17 @@ class OptimizedTrajectory:
 
 @dataclass(frozen=True, eq=False)
 class ProgramPlan:
-    """A planned program: its steps, and the report of the whole."""
+    """A planned program: its steps, the report of the whole, and what it saves; gap [%]: how far above the
+    best chain of configurations it can be. front: programs by cycle time, where they were asked for.
+    """
 
     program_id: str
     movements: tuple[PlannedMovement, ...]
     report: TrajectoryReport
     info: PlanningInfo
+    gap: float
+    savings: ProgramSavings
+    front: tuple[ProgramPoint, ...]
 
     @classmethod
     def from_msg(cls, result: Any) -> ProgramPlan:
@@ -81,6 +88,9 @@ class ProgramPlan:
             tuple(planned_movement_from_msg(movement) for movement in result.movements),
             report_from_msg(result.report),
             planning_info_from_msg(result.info),
+            result.gap,
+            program_savings_from_msg(result.savings),
+            tuple(program_point_from_msg(point) for point in result.front),
         )
 
 

@@ -178,10 +178,20 @@ class Client:
         options: PlanOptions | None = None,
         progress: Callable[[Plan.Feedback], object] | None = None,
         timeout: float = 600.0,
+        savings: bool = True,
+        front_points: int = 0,
     ) -> ProgramPlan:
-        """Plan a program over stations (none: the cell's own); progress gets the action's feedback."""
-        chosen = plan_options_to_msg(options or PlanOptions())
-        goal = Plan.Goal(stations=list(stations), cycle_time=cycle_time, options=chosen)
+        """Plan a program over stations (none: the cell's own); progress gets the action's feedback. savings:
+        hold it against the common program; front_points: programs from the shortest cycle time to twice the
+        free one.
+        """
+        goal = Plan.Goal(
+            stations=list(stations),
+            cycle_time=cycle_time,
+            options=plan_options_to_msg(options or PlanOptions()),
+            savings=savings,
+            front_points=front_points,
+        )
         result = self.send_goal(names.PLAN, goal, progress, timeout)
         _check(names.PLAN, result)
         return ProgramPlan.from_msg(result)

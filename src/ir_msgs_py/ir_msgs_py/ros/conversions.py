@@ -61,6 +61,12 @@ from ir_msgs_py.ros.convert_report import (
     report_from_msg,
     report_to_msg,
 )
+from ir_msgs_py.ros.convert_savings import (
+    program_point_from_msg,
+    program_point_to_msg,
+    program_savings_from_msg,
+    program_savings_to_msg,
+)
 from ir_msgs_py.ros.convert_trajectory import (
     MAX_POINTS,
     duration_to_msg,
@@ -105,6 +111,10 @@ __all__ = [
     "power_mode_to_msg",
     "power_state_from_msg",
     "power_state_to_msg",
+    "program_point_from_msg",
+    "program_point_to_msg",
+    "program_savings_from_msg",
+    "program_savings_to_msg",
     "program_state_from_msg",
     "program_state_to_msg",
     "report_from_msg",

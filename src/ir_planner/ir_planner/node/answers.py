@@ -14,12 +14,15 @@ from ir_msgs_py.ros.conversions import (
     planned_movement_to_msg,
     planning_info_to_msg,
     power_mode_to_msg,
+    program_point_to_msg,
+    program_savings_to_msg,
     report_to_msg,
     service_candidate_to_msg,
     stamped_pose_to_msg,
     status_to_msg,
     trajectory_to_msg,
 )
+from ir_msgs_py.savings import ProgramPoint
 from ir_msgs_py.status import Status
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
@@ -105,6 +108,14 @@ def fill_program(response: Any, plan: ProgramPlan, include_points: bool) -> None
     response.movements = [planned_movement_to_msg(movement, include_points) for movement in plan.movements]
     response.report = report_to_msg(plan.report)
     response.info = planning_info_to_msg(plan.info)
+    response.gap = plan.gap
+    response.savings = program_savings_to_msg(plan.savings)
+    response.front = [program_point_to_msg(_point(program)) for program in plan.front]
+
+
+def _point(program: ProgramPlan) -> ProgramPoint:
+    report = program.report
+    return ProgramPoint(report.duration, report.energy, program.program_id)
 
 
 def fill_stored_program(response: Any, program: StoredProgram, include_points: bool) -> None:

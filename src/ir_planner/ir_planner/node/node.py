@@ -24,6 +24,7 @@ from visualization_msgs.msg import MarkerArray
 from ir_description import DescriptionError
 from ir_kernels import compiled
 from ir_msgs.action import Plan
+from ir_msgs.msg import ProgramSavings as ProgramSavingsMsg
 from ir_msgs.srv import (
     CheckState,
     ComputeIk,
@@ -42,12 +43,13 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
+from ir_msgs_py.ros.conversions import configuration_from_msg, program_savings_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
 from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import cell_shapes, movement_shapes
@@ -88,8 +90,10 @@ class PlannerNode(Node):
             lambda: random.SystemRandom().getrandbits(64),
             self.get_logger().error,
             self._show_service,
+            self._show_savings,
         )
         self._trajectories = self.create_publisher(JointTrajectoryMsg, names.PLANNED_TRAJECTORY, LATCHED)
+        self._savings = self.create_publisher(ProgramSavingsMsg, names.PROGRAM_SAVINGS, LATCHED)
         self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, LATCHED)
         self._diagnostics = Diagnostics(self)
         self._shown = ShownMarkers()
@@ -194,6 +198,9 @@ class PlannerNode(Node):
     def _show_movement(self, trajectory: JointTrajectory) -> None:
         self._trajectories.publish(trajectory_to_msg(trajectory))
         self._markers.publish(self._shown.beside_cell(movement_shapes(trajectory, self.planner.scene())))
+
+    def _show_savings(self, savings: ProgramSavings) -> None:
+        self._savings.publish(program_savings_to_msg(savings))
 
     def _show_service(self, station: str, plan: ServicePlan) -> None:
         for candidate in plan.candidates:

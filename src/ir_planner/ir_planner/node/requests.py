@@ -15,6 +15,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError, PoseError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import CancelledError, PlannerError, RequestError
@@ -66,8 +67,8 @@ class Requests:
     """Handlers of the planner's services.
 
     now: the node's clock [s]. cell_changed and planned: called after the cell changed or a trajectory was
-    planned; service_planned: the same for the candidates at a station. draw_seed: for random_seed. log:
-    takes what nobody expected.
+    planned; service_planned: the same for the candidates at a station, program_saves: for the savings of a
+    program. draw_seed: for random_seed. log: takes what nobody expected.
     """
 
     def __init__(
@@ -80,11 +81,12 @@ class Requests:
         draw_seed: Callable[[], int],
         log: Callable[[str], None],
         service_planned: Callable[[str, ServicePlan], None] = lambda station, plan: None,
+        program_saves: Callable[[ProgramSavings], None] = lambda savings: None,
     ) -> None:
         self.planner, self.last_state, self.now = planner, last_state, now
         self.cell_changed, self.planned, self.log = cell_changed, planned, log
         self.draw_seed = draw_seed
-        self.service_planned = service_planned
+        self.service_planned, self.program_saves = service_planned, program_saves
 
     def guarded(self, handler: Callable[[Any, Any], Status]) -> Callable[[Any, Any], Any]:
         """The handler as a service callback: its status goes into the response, whatever happens."""
@@ -208,9 +210,18 @@ class Requests:
         options = options_of(request.options, self.draw_seed)
         start = self._known_or_home(at_rest=True)
         plan: ProgramPlan = self.planner.plan_program(
-            tuple(request.stations), request.cycle_time, options, start, progress, cancelled
+            tuple(request.stations),
+            request.cycle_time,
+            options,
+            start,
+            progress,
+            cancelled,
+            savings=request.savings,
+            front_points=request.front_points,
         )
         fill_program(response, plan, options.include_points)
+        if plan.savings.available:
+            self.program_saves(plan.savings)
         for movement in plan.movements:
             if movement.trajectory is not None:
                 self.planned(movement.trajectory)

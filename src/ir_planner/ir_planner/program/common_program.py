@@ -10,13 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.report import PlannedMovement
 from ir_planner.errors import TimingError
-from ir_planner.program.assembly import assembled, legs_of
-from ir_planner.program.chain import parts_of
+from ir_planner.program.choice import Choice, Steps
+from ir_planner.program.ladder import FASTEST
 from ir_planner.program.movements import Failure, Movements
-from ir_planner.program.pauses import pause_by_itself
-from ir_planner.program.request import ProgramRequest, StageError
+from ir_planner.program.request import StageError
 from ir_planner.program.station_graph import ACROSS, Chain, Part
 from ir_planner.scene import movement_cost
 from ir_planner.timing import Movement, baseline, straight_steps
@@ -24,39 +22,33 @@ from ir_planner.timing import Movement, baseline, straight_steps
 
 @dataclass(frozen=True, eq=False)
 class CommonProgram:
-    """Movements and pauses in order; `around` of its `across` regional movements run around bodies."""
+    """Movements and pauses in order, and the chain they go along; `around` of its `across` regional movements
+    run around bodies.
+    """
 
-    movements: tuple[PlannedMovement, ...]
+    choice: Choice
+    steps: Steps
     across: int
     around: int
 
 
-def common_program(request: ProgramRequest, movements: Movements) -> CommonProgram:
-    """The common program through the layers of `movements`, which move as fast as they can.
+def common_program(choice: Choice) -> CommonProgram:
+    """The common program of a request, which moves as fast as it can; it needs the request's layers only.
 
     Raises StageError where it has a movement that isn't found.
     """
-    chain = nearest_chain(movements)
-    hops = parts_of(chain, movements)
-    parts = [part for hop in hops for part in hop]
+    fastest = choice.ladder.at(FASTEST)
+    nearest = choice.along(nearest_chain(fastest))
     chosen: dict[Part, Movement] = {}
     around = 0
-    for part in parts:
-        plain = _plain(part, movements)
+    for part in nearest.parts:
+        plain = _plain(part, fastest)
         if plain is None:
-            plain, by_path = _planned(part, movements), part.kind == ACROSS
+            plain, by_path = _planned(part, fastest), part.kind == ACROSS
             around += by_path
         chosen[part] = plain
-    route = movements.route
-    times = request.settings.transitions
-    steps = assembled(
-        route.steps,
-        legs_of(route, hops, chosen),
-        route.scenes,
-        request.start,
-        lambda pause: pause_by_itself(pause, times),
-    )
-    return CommonProgram(steps, sum(part.kind == ACROSS for part in parts), around)
+    across = sum(part.kind == ACROSS for part in chosen)
+    return CommonProgram(nearest, nearest.steps(chosen, by_itself=True), across, around)
 
 
 def nearest_chain(movements: Movements) -> Chain:
@@ -83,13 +75,19 @@ def _plain(part: Part, movements: Movements) -> Movement | None:
 
 def _planned(part: Part, movements: Movements) -> Movement:
     """The service movement of a part, or the movement along the planner's path."""
-    found = movements.plan([part], 0)[0]
-    if isinstance(found, Failure):
-        raise StageError(found.status)
     if part.kind != ACROSS:
-        return found
+        return _found(part, movements)
+    own = Movements(movements.route, movements.layers, movements.context, movements.searches)
+    found = _found(part, own)
     try:
         along = straight_steps(found.path, found.context)
     except TimingError:
         return found
     return along if along.certified else found
+
+
+def _found(part: Part, movements: Movements) -> Movement:
+    found = movements.plan([part], 0)[0]
+    if isinstance(found, Failure):
+        raise StageError(found.status)
+    return found

@@ -10,6 +10,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import TimingError
 from ir_planner.program.bounds import Rates
+from ir_planner.program.near import optimised_near
 from ir_planner.program.node import Node
 from ir_planner.program.parallel import mapped
 from ir_planner.program.route import Route
@@ -43,10 +44,21 @@ class Failure:
 
 
 class Movements:
-    """Movements between the configurations in `layers` of a route, by the objective of `context`."""
+    """Movements between the configurations in `layers` of a route, by the objective of `context`; optimised
+    from those of `near`, where that is given, instead of searched.
+    """
 
-    def __init__(self, route: Route, layers: list[list[Node]], context: Context, searches: Searches) -> None:
+    def __init__(
+        self,
+        route: Route,
+        layers: list[list[Node]],
+        context: Context,
+        searches: Searches,
+        near: "Movements | None" = None,
+    ) -> None:
         self.route, self.layers, self.context, self.searches = route, layers, context, searches
+        plain = context.options.planner_id == "" and context.options.timing == "synchronous"
+        self._near = near if plain else None
         self._found: dict[Key, Movement | Failure] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
@@ -60,6 +72,8 @@ class Movements:
     def plan(self, parts: Sequence[Part], improvement: int) -> list[Movement | Failure]:
         """The movements of parts of hops; those that aren't known yet side by side."""
         new = {key: part for part in parts if (key := self._key(part)) not in self._found}
+        if self._near is not None:
+            self._near.plan([part for part in new.values() if part.kind == ACROSS], improvement)
         planned = mapped(self._planned, list(new.values()), self.context, improvement)
         for key, found in zip(new, planned, strict=True):
             self._found[key] = found
@@ -109,6 +123,9 @@ class Movements:
         here, there = self.route.name(part.hop - 1), self.route.name(part.hop)
         inside = context.inside(self.route.arriving(part.hop))
         if part.kind == ACROSS:
+            known = self._near._found[self._near._key(part)] if self._near is not None else None
+            if isinstance(known, Movement) and (again := optimised_near(known, inside)) is not None:
+                return again
             status, found = search_regional(first.outside, second.outside, inside, self.searches)
             what = f"from {here or 'the start'} to {there}"
             return found or Failure(Status(status.code, f"{what}: {status.message}"))

@@ -6,53 +6,85 @@ with what is held at that moment.
 """
 
 import hashlib
-from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from ir_msgs_py.names import NO_LOAD
-from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.report import PlannedMovement, PlanningInfo
+from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status
 from ir_planner.checks import total_report
-from ir_planner.program.assembly import assembled, legs_of
-from ir_planner.program.chain import cheapest_chain, layers_of, parts_of
-from ir_planner.program.cycle_plan import Cycle, timed_chain
-from ir_planner.program.cycle_time import Timed
-from ir_planner.program.movements import Failure, Movements
-from ir_planner.program.pauses import AUTO, Pause, planned_pause
-from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError
+from ir_planner.program.chain import cheapest_chain, layers_of
+from ir_planner.program.choice import Choice, Steps
+from ir_planner.program.comparison import held_against_common
+from ir_planner.program.cycle_plan import timed_choice
+from ir_planner.program.front import front_of
+from ir_planner.program.ladder import Ladder
+from ir_planner.program.movements import Movements
+from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
 from ir_planner.program.route import Route
-from ir_planner.program.station_graph import ACROSS, Chain, Part
+from ir_planner.program.savings import named
+from ir_planner.program.station_graph import ACROSS
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.request import Context, Journal, Work
 from ir_planner.service import exit_searches
-from ir_planner.timing import Movement
 
 _CHOOSING = 8_000  # work of a movement while configurations are chosen; more of it improves the chosen ones
 
 
-def plan_program(request: ProgramRequest, work: Work, progress: Progress) -> ProgramPlan:
+def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobody) -> ProgramPlan:
     """Plan a program. Raises RequestError for a request that makes no sense, CancelledError when stopped."""
     journal = Journal(work, request.options.seed)
     route, context = prepared(request, journal)
     try:
-        movements, status = _planned(request, route, context, progress), Status.success()
+        answer = _answered(request, route, context, progress)
     except StageError as failed:
-        movements, status = (), failed.status
-    return finished(request, context, status, movements)
+        return ProgramPlan(failed.status, _info(request, context))
+    # the record of the whole request, savings and front included
+    return replace(answer, info=_info(request, context))
 
 
-def finished(
-    request: ProgramRequest, context: Context, status: Status, movements: tuple[PlannedMovement, ...]
-) -> ProgramPlan:
-    """The answer, with the report of all movements; without them where there are none."""
+def _answered(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> ProgramPlan:
+    """The program, what it saves, and its front, as they were asked for. Raises StageError where a stage
+    finds nothing.
+    """
+    choice = chosen(request, route, context, progress)
+    cycle = request.cycle_time
+    if cycle <= 0.0:
+        _improve(choice)
+    found = choice.found(progress)
+    standing, chain = choice.standing(found), choice.chain
+    steps = choice.steps(found)
+    if cycle > 0.0:
+        timed = timed_choice(choice, cycle, standing, progress)
+        steps, chain = timed.steps, timed.choice.chain
+    plan = replace(_planned(steps), gap=100.0 * chain.gap)
+    if request.savings:
+        comparison = held_against_common(choice, steps, cycle, standing, progress)
+        if isinstance(comparison, str):
+            plan = replace(plan, savings=ProgramSavings(sentence=comparison))
+        else:
+            compared = _planned(comparison.steps)
+            savings = named(comparison.savings, compared.program_id, comparison.compared)
+            plan = replace(plan, savings=savings, compared=compared)
+    if request.front_points:
+        with context.journal.stage("pareto front"):
+            front = front_of(choice, request.front_points, standing, progress)
+        plan = replace(plan, front=tuple(_planned(point.steps) for point in front))
+    return plan
+
+
+def _planned(steps: Steps) -> ProgramPlan:
+    """A program with the report of all its movements."""
+    elapsed = np.concatenate([[0.0], np.cumsum([step.duration for step in steps])[:-1]])
+    report = total_report(tuple(step.report for step in steps), tuple(elapsed.tolist()))
+    return ProgramPlan(Status.success(), PlanningInfo(), program_hash(steps), steps, report)
+
+
+def _info(request: ProgramRequest, context: Context) -> PlanningInfo:
     context.journal.planner_id = "station graph"
-    info = context.journal.info(request.start, context.joint_names)
-    if not movements:
-        return ProgramPlan(status, info)
-    elapsed = np.concatenate([[0.0], np.cumsum([movement.duration for movement in movements])[:-1]])
-    report = total_report(tuple(movement.report for movement in movements), tuple(elapsed.tolist()))
-    return ProgramPlan(status, info, program_hash(movements), movements, report)
+    return context.journal.info(request.start, context.joint_names)
 
 
 def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]:
@@ -75,99 +107,22 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
     return digest.hexdigest()[:16]
 
 
-def chosen_chain(
-    request: ProgramRequest, route: Route, context: Context, progress: Progress
-) -> tuple[Movements, Chain, int]:
-    """The chain of configurations with its movements, and the work that each of them had.
-
-    Raises StageError where there is none.
-    """
+def chosen(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Choice:
+    """The cheapest chain of configurations. Raises StageError where there is none."""
     layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
     movements = Movements(route, layers, context, request.settings.searches)
     improvement = min(context.work.improvement, _CHOOSING)
-    return movements, cheapest_chain(movements, improvement, progress), improvement
+    chain = cheapest_chain(movements, improvement, progress)
+    return Choice(request, Ladder(movements, improvement), chain)
 
 
-def _planned(
-    request: ProgramRequest, route: Route, context: Context, progress: Progress
-) -> tuple[PlannedMovement, ...]:
-    """Movements and pauses in order. Raises StageError where a stage finds nothing."""
-    movements, chain, improvement = chosen_chain(request, route, context, progress)
-    if request.cycle_time <= 0.0:
-        _improve(movements, chain, improvement)
-        found = _movements_of(movements, chain, improvement, progress)
-        return steps_along(request, movements, chain, found)
-    found = _movements_of(movements, chain, improvement, progress)
-    cycle = cycle_of(request, movements, chain, found)
-    chain, timed = timed_chain(cycle, movements, chain, improvement, progress)
-    return filled(request, movements, chain, timed, request.cycle_time)
-
-
-def steps_along(
-    request: ProgramRequest, movements: Movements, chain: Chain, found: Mapping[Part, Movement]
-) -> tuple[PlannedMovement, ...]:
-    """The steps of the program with the movements of a chain's parts."""
-    route, times = movements.route, request.settings.transitions
-    legs = legs_of(route, parts_of(chain, movements), found)
-    return assembled(
-        route.steps, legs, route.scenes, request.start, lambda pause: planned_pause(pause, times)
-    )
-
-
-def cycle_of(
-    request: ProgramRequest, movements: Movements, chain: Chain, found: Mapping[Part, Movement]
-) -> Cycle:
-    """The request's cycle time with what pauses take of it, and what a wait at its end costs."""
-    standing = sum(step.duration for step in steps_along(request, movements, chain, found) if step.is_pause)
-    return Cycle(
-        request.cycle_time,
-        standing,
-        lambda chain, left: _wait(request, movements, chain, left).report.energy,
-    )
-
-
-def filled(
-    request: ProgramRequest, movements: Movements, chain: Chain, timed: Timed, cycle_time: float
-) -> tuple[PlannedMovement, ...]:
-    """The steps of a program with the wait that fills its cycle [s]."""
-    planned = steps_along(request, movements, chain, timed.movements)
-    if timed.wait <= 0.0:
-        return planned
-    left = cycle_time - sum(movement.duration for movement in planned)
-    return (*planned, _wait(request, movements, chain, left))
-
-
-def _wait(request: ProgramRequest, movements: Movements, chain: Chain, seconds: float) -> PlannedMovement:
-    """The wait at the end of a program, in the mode of least energy."""
-    route = movements.route
-    end = route.scenes.of(route.steps[-1].after)
-    q = movements.layers[-1][chain.chosen[-1]].interaction
-    pause = Pause(route.name(len(route) - 1), seconds, AUTO, q, end)
-    return planned_pause(pause, request.settings.transitions)
-
-
-def _improve(movements: Movements, chain: Chain, improvement: int) -> None:
+def _improve(choice: Choice) -> None:
     """Plan the regional movements of a chain again where the request has more work than the choice took."""
+    movements, improvement = choice.movements, choice.ladder.improvement
     work = movements.context.work
-    across = [part for parts in parts_of(chain, movements) for part in parts if part.kind == ACROSS]
+    across = [part for part in choice.parts if part.kind == ACROSS]
     more = min(work.improvement, (work.max_iterations - work.iterations) // max(len(across), 1))
     if across and more > improvement and not work.exhausted:
         with movements.context.journal.stage("improve"):
             movements.plan(across, improvement)
             movements.better(across, more)
-
-
-def _movements_of(
-    movements: Movements, chain: Chain, improvement: int, progress: Progress
-) -> dict[Part, Movement]:
-    """Movements of all parts along a chain. Raises StageError where one of them isn't found."""
-    result: dict[Part, Movement] = {}
-    with movements.context.journal.stage("movements") as notes:
-        for hop, parts in enumerate(parts_of(chain, movements)):
-            progress("movements", hop, len(movements.route), chain.cost)
-            for part, found in zip(parts, movements.plan(parts, improvement), strict=True):
-                if isinstance(found, Failure):
-                    raise StageError(found.status)
-                result[part] = found
-        notes.append(f"{len(result)} movements")
-    return result

@@ -8,28 +8,41 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
+from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
+from ir_planner.request import bounded
 from ir_planner.settings import PlannerSettings
 
+FRONT_MAX = 50
+NOT_ASKED = ProgramSavings(sentence="savings were not asked for")
 Progress = Callable[[str, int, int, float], None]  # phase, done, total, cost of the best chain
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramPlan:
-    """The answer: movements and pauses in order; empty unless the status is SUCCESS."""
+    """The answer: movements and pauses in order; empty unless the status is SUCCESS.
+
+    gap [%]: how far above the best chain of configurations it can be at most. savings: with `compared`, the
+    program that they are of. front: programs by cycle time.
+    """
 
     status: Status
     info: PlanningInfo
     program_id: str = ""
     movements: tuple[PlannedMovement, ...] = ()
     report: TrajectoryReport = field(default_factory=TrajectoryReport)
+    gap: float = 0.0
+    savings: ProgramSavings = NOT_ASKED
+    compared: "ProgramPlan | None" = None
+    front: tuple["ProgramPlan", ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramRequest:
     """What to plan: the cell, its stations to visit (empty: its program), from `start` (n,), in
-    `cycle_time` s (0: free).
+    `cycle_time` s (0: free). savings: hold it against the common program; front_points: programs from the
+    shortest cycle time to twice the free one.
     """
 
     cell: Cell
@@ -39,9 +52,12 @@ class ProgramRequest:
     options: PlanOptions
     cycle_time: float = 0.0
     settings: PlannerSettings = field(default_factory=PlannerSettings)
+    savings: bool = False
+    front_points: int = 0
 
     def check(self) -> None:
         """Raise RequestError for options that a program doesn't take."""
+        bounded(self.front_points, 0, FRONT_MAX, "front_points")
         load, duration = self.options.load, self.options.duration
         if load not in ("", NO_LOAD):
             raise RequestError(

@@ -1,27 +1,21 @@
-"""The movements of one chain at many values of a second, and the cheapest choice among them for a time.
+"""The movements of one chain at many values of a second: a Pareto front of time and energy for every part.
 
 What a second is worth decides how fast a movement is: planned at the same value, all movements of a program
-trade seconds for joules at the same rate, which is the best distribution of the time there is. Values stand
-on a fixed ladder, so that two requests that differ in their cycle time choose among the same movements.
+trade seconds for joules at the same rate, which is the best distribution of the time there is.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ir_planner.program.bounds import Rates
+from ir_planner.program.ladder import FASTEST, Ladder
 from ir_planner.program.movements import Failure, Movements, cost_of
 from ir_planner.program.request import StageError
 from ir_planner.program.station_graph import Part
 from ir_planner.timing import Movement
-
-_LEAST = 250.0  # W: a second less of moving and more of waiting on brakes saves more than that
-_STEP = 2.0**0.5  # between two rungs: a mixture of neighbours is within about a percent of the rung between
-_RUNGS = 14  # up to 22 kW, where movements are as fast as they can be within a percent
-LADDER = tuple(_LEAST * _STEP**k for k in range(_RUNGS))
-FASTEST = _RUNGS  # the rung on which time alone counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,56 +44,52 @@ class SlowDown:
 
 
 class TimeValues:
-    """Points of the parts of one chain; `movements` are those of the chain's own request."""
+    """Points of the parts of one chain on a ladder of values."""
 
-    def __init__(self, movements: Movements, parts: Sequence[Part], improvement: int) -> None:
-        self.parts, self.improvement = tuple(parts), improvement
-        self._rungs: dict[int, Movements] = {}
-        self._own = movements
+    def __init__(self, ladder: Ladder, parts: Sequence[Part]) -> None:
+        self.ladder, self.parts = ladder, tuple(parts)
         self._points: dict[Part, list[Point]] = {part: [] for part in self.parts}
-        self._take(movements)
-
-    def at(self, rung: int) -> Movements:
-        """Movements at a rung of the ladder; their parts along the chain are planned."""
-        if rung not in self._rungs:
-            self._rungs[rung] = movements = self.movements(rung)
-            self._take(movements)
-        return self._rungs[rung]
-
-    def movements(self, rung: int) -> Movements:
-        """Movements at a rung, nothing planned yet."""
-        own = self._own
-        if rung == FASTEST:
-            context = own.context.asking("time")
-        else:
-            asked = replace(own.context.asking("time_and_energy").options, time_value=LADDER[rung])
-            context = replace(own.context, options=asked)
-        return Movements(own.route, own.layers, context, own.searches)
+        self._seconds: dict[int, float] = {}
+        self._own_seconds = self._take(ladder.own)
 
     def seconds(self, rung: int) -> float:
-        """How long the chain's movements take at a rung [s]."""
-        found = self.at(rung).plan(self.parts, self.improvement)
-        return sum(m.trajectory.duration for m in found if not isinstance(m, Failure))
+        """How long the chain's movements take at a rung [s]; they are planned there."""
+        if rung not in self._seconds:
+            self._seconds[rung] = self._take(self.ladder.at(rung))
+        return self._seconds[rung]
 
+    @property
     def own_seconds(self) -> float:
         """How long the movements of the chain's own request take [s]."""
-        found = self._own.plan(self.parts, self.improvement)
-        return sum(m.trajectory.duration for m in found if not isinstance(m, Failure))
+        return self._own_seconds
 
-    def _take(self, movements: Movements) -> None:
-        for part, found in zip(self.parts, movements.plan(self.parts, self.improvement), strict=True):
+    def _take(self, movements: Movements) -> float:
+        seconds = 0.0
+        planned = movements.plan(self.parts, self.ladder.improvement)
+        for part, found in zip(self.parts, planned, strict=True):
             if not isinstance(found, Failure):
-                self._points[part].append(Point.of(found))
-            elif movements is self._own:
+                point = Point.of(found)
+                self._points[part].append(point)
+                seconds += point.seconds
+            elif movements is self.ladder.own:
                 raise StageError(found.status)
+        return seconds
 
     def bracket(self, seconds: float) -> int:
         """Plan at neighbouring rungs between which the movements take `seconds`; the faster of both."""
         slow, fast = -1, FASTEST
+        rung, step = self.ladder.first, 1
+        while True:  # in growing steps from the request's own value
+            late = self.seconds(rung) > seconds
+            slow, fast = (max(slow, rung), fast) if late else (slow, min(fast, rung))
+            beyond = rung + step if late else rung - step
+            if not slow < beyond < fast:
+                break
+            rung, step = beyond, 2 * step
         while fast - slow > 1:
             middle = (slow + fast) // 2
             slow, fast = (middle, fast) if self.seconds(middle) > seconds else (slow, middle)
-        self.at(fast)
+        self.seconds(fast)
         return fast
 
     def fronts(self) -> dict[Part, list[Point]]:

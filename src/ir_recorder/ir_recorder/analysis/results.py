@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.grid import GridCheck
 from ir_recorder.analysis.loads import LoadTimeline
@@ -141,6 +143,15 @@ class Analysis:
     grid: GridCheck | None
     plateaus: tuple[Plateau, ...]
     problems: tuple[str, ...]
+
+    @property
+    def savings(self) -> ProgramSavings | None:
+        """What the executed program saves by its plan: the last that was recorded before its first step; None
+        where there is none.
+        """
+        begin = self.steps[0].step.start if self.steps else math.inf
+        known = [event.savings for event in self.recording.savings if event.time <= begin]
+        return known[-1] if known and known[-1].available else None
 
     @property
     def movements(self) -> tuple[StepResult, ...]:

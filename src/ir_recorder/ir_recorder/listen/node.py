@@ -4,19 +4,24 @@ message.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Log, ParameterEvent
 from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from ir_msgs_py import names
 from ir_msgs_py.errors import UnknownTypeError
+from ir_msgs_py.namespaces import owns_diagnostic, owns_logger, owns_node
 from ir_msgs_py.ros.types import interface_type
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.qos import QosOffer, request_for
@@ -31,6 +36,28 @@ class Arrival:
     time: int
     topic: str
     data: bytes
+
+
+_OWNERS: dict[str, tuple[Any, Callable[[str, Any], bool]]] = {
+    names.DIAGNOSTICS: (
+        DiagnosticArray,
+        lambda namespace, message: any(owns_diagnostic(namespace, each.name) for each in message.status),
+    ),
+    names.ROSOUT: (Log, lambda namespace, message: owns_logger(namespace, message.name)),
+    names.PARAMETER_EVENTS: (ParameterEvent, lambda namespace, message: owns_node(namespace, message.node)),
+}
+"""Topics that all cells share: the type, and whether a message comes from a node of a namespace."""
+
+
+def is_own(arrival: Arrival, namespace: str) -> bool:
+    """Whether a message belongs to the cell of a namespace; on topics of the cell's own all do."""
+    if arrival.topic not in _OWNERS:
+        return True
+    message_type, owns = _OWNERS[arrival.topic]
+    try:
+        return owns(namespace, deserialize_message(arrival.data, message_type))
+    except Exception:  # bytes of a stranger, that the middleware can't read
+        return False
 
 
 class PolledGroup(CallbackGroup):

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from ir_msgs_py import names
+from ir_msgs_py.namespaces import NODES
 
 SHARED = (names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC)  # in the cell's namespace
-GLOBAL = ("/diagnostics", "/rosout", "/parameter_events")
-NODES = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER, names.RECORDER)
+GLOBAL = (names.DIAGNOSTICS, names.ROSOUT, names.PARAMETER_EVENTS)
 ACTION_STATUS = "/_action/status"
 _FEEDBACK = "_FeedbackMessage"
 

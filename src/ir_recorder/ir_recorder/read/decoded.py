@@ -8,6 +8,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
+from ir_msgs_py.savings import ProgramSavings, Saving
 
 
 def movement_from(message: Any) -> PlannedMovement:
@@ -28,6 +29,23 @@ def movement_from(message: Any) -> PlannedMovement:
         wait_for=tuple(message.wait_for),
         set_signals=tuple(message.set_signals),
     )
+
+
+def savings_from(message: Any) -> ProgramSavings:
+    """ProgramSavings of its decoded message."""
+    return ProgramSavings(
+        available=bool(message.available),
+        movements=_saving_from(message.movements),
+        pauses=_saving_from(message.pauses),
+        across=int(message.across),
+        around=int(message.around),
+        program_id=message.program_id,
+        sentence=message.sentence,
+    )
+
+
+def _saving_from(message: Any) -> Saving:
+    return Saving(float(message.common), float(message.planned), float(message.seconds))
 
 
 def report_from(message: Any) -> TrajectoryReport:

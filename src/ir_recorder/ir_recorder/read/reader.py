@@ -17,13 +17,15 @@ from ir_msgs_py import names
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.namespaces import owns_diagnostic, owns_logger
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.format.definition import definitions_of
 from ir_recorder.read.cdr import Columns
+from ir_recorder.read.cells import chosen_namespace
 from ir_recorder.read.chunks import ReadLimits
-from ir_recorder.read.decoded import movement_from
+from ir_recorder.read.decoded import movement_from, savings_from
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
     BitSeries,
@@ -33,6 +35,7 @@ from ir_recorder.read.recording import (
     PowerSeries,
     ProgramEvent,
     Recording,
+    SavingsEvent,
     TextEvent,
     TopicSummary,
 )
@@ -46,20 +49,29 @@ _OUT_BITS = tuple(bit.name for bit in fields(PlcOutputs) if bit.type == "bool")
 
 
 def read_recording(
-    path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits | None = None
+    path: str | Path,
+    roots: FileRoots = ANYWHERE,
+    limits: ReadLimits | None = None,
+    namespace: str | None = None,
 ) -> Recording:
-    """The recording in a file below `roots`, read within `limits`; ReadError when it is none."""
-    return _Reader(read_raw(path, roots, limits)).recording()
+    """The recording of one cell in a file below `roots`, read within `limits`.
+
+    namespace: of the cell ("/cell_1"); None: the first one, with a sentence where there are more. ReadError
+    when the file is no recording, or holds no cell of that namespace.
+    """
+    return _Reader(read_raw(path, roots, limits), namespace).recording()
 
 
 class _Reader:
-    def __init__(self, raw: RawRecording) -> None:
+    def __init__(self, raw: RawRecording, namespace: str | None) -> None:
         self._raw = raw
         self._problems = list(raw.problems)
         times = [channel.log_time for channel in raw.channels if len(channel.log_time)]
         self._start = int(min(t.min() for t in times)) if times else 0
         self._end = int(max(t.max() for t in times)) if times else 0
-        self._prefix = self._namespace()
+        self._namespace, others = chosen_namespace(raw, namespace)
+        self._problems += [others] if others else []
+        self._prefix = f"{self._namespace.rstrip('/')}/"
 
     def recording(self) -> Recording:
         raw = self._raw
@@ -83,20 +95,13 @@ class _Reader:
             signals=tuple(self._signals()),
             warnings=tuple(self._warnings()),
             goals=tuple(self._goals()),
+            savings=tuple(self._savings()),
             hardware=self._hardware(),
             cell_yaml=self._attached(contents.CELL),
             urdf=self._attached(contents.URDF) or self._description(),
             facts=raw.facts,
             problems=tuple(self._problems),
         )
-
-    def _namespace(self) -> str:
-        """The cell's namespace: what stands before "/joint_states" or the mains meter's topic."""
-        for name in (names.POWER_STATE, names.JOINT_STATES):
-            for channel in self._raw.channels:
-                if channel.topic.endswith(f"/{name}"):
-                    return channel.topic.removesuffix(name)
-        return "/"
 
     def _channel(self, name: str) -> RawChannel | None:
         channel = self._raw.channel(name if name.startswith("/") else self._prefix + name)
@@ -196,7 +201,7 @@ class _Reader:
         """The attached load by the driver's diagnostics: key "load"."""
         for _, message in self._messages(names.DIAGNOSTICS):
             for status in message.status:
-                if names.SIM_DRIVER not in status.name:
+                if not self._of_driver(status.name):
                     continue
                 for pair in status.values:
                     if pair.key == "load":
@@ -208,8 +213,8 @@ class _Reader:
                 yield TextEvent(time, message.name, "1" if message.value else "0")
 
     def _warnings(self) -> Iterator[TextEvent]:
-        for time, message in self._messages("/rosout"):
-            if message.level >= _WARN:
+        for time, message in self._messages(names.ROSOUT):
+            if message.level >= _WARN and owns_logger(self._namespace, message.name):
                 yield TextEvent(time, message.name, message.msg)
 
     def _goals(self) -> Iterator[GoalEnd]:
@@ -222,12 +227,19 @@ class _Reader:
             for status in last.values():
                 yield GoalEnd(action, status, _OUTCOMES.get(status, f"status {status}"))
 
+    def _savings(self) -> Iterator[SavingsEvent]:
+        for time, message in self._messages(names.PROGRAM_SAVINGS):
+            yield SavingsEvent(time, savings_from(message))
+
     def _hardware(self) -> str:
         for _, message in self._messages(names.DIAGNOSTICS):
             for status in message.status:
-                if names.SIM_DRIVER in status.name and status.hardware_id:
+                if self._of_driver(status.name) and status.hardware_id:
                     return str(status.hardware_id)
         return ""
+
+    def _of_driver(self, name: str) -> bool:
+        return names.SIM_DRIVER in name and owns_diagnostic(self._namespace, name)
 
     def _description(self) -> str:
         for _, message in self._messages(names.ROBOT_DESCRIPTION):

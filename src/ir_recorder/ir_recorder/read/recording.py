@@ -9,6 +9,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.savings import ProgramSavings
 
 
 class _ReadOnlyArrays:
@@ -102,6 +103,14 @@ class ProgramEvent:
 
 
 @dataclass(frozen=True)
+class SavingsEvent:
+    """What a program that was planned then saves."""
+
+    time: float
+    savings: ProgramSavings
+
+
+@dataclass(frozen=True)
 class TextEvent:
     """A text with its time: an attached load, the level of a signal, a warning of a log."""
 
@@ -141,6 +150,7 @@ class Recording:
     signals: tuple[TextEvent, ...]
     warnings: tuple[TextEvent, ...]
     goals: tuple[GoalEnd, ...]
+    savings: tuple[SavingsEvent, ...]
     hardware: str
     cell_yaml: str
     urdf: str

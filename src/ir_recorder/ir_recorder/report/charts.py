@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 
 from ir_recorder.analysis import Analysis
 from ir_recorder.report.bars import joule_bars
+from ir_recorder.report.savings import savings_section
 from ir_recorder.report.tables import (
     fact_table,
     mode_table,
@@ -26,6 +27,7 @@ CHARTS: Mapping[str, Chart] = {
     "problems": lambda analysis: problem_list(analysis.problems),
     "bars": lambda analysis: joule_bars(analysis.movements),
     "steps": lambda analysis: step_table(analysis.steps),
+    "savings": savings_section,
     "stations": station_table,
     "modes": mode_table,
     "resting": resting_table,

@@ -16,6 +16,7 @@ from ir_recorder.analysis.shares import mode_name
 from ir_recorder.errors import RecorderError
 from ir_recorder.read.recording import PowerSeries
 from ir_recorder.report.files import write_output
+from ir_recorder.report.savings import savings_lines
 from ir_recorder.report.series import envelope
 from ir_recorder.report.words import joules, mode_words
 
@@ -50,6 +51,8 @@ def write_picture(analysis: Analysis, path: str | Path, roots: FileRoots = ANYWH
     _power(figure.add_subplot(grid[0, :]), analysis)
     _joules(figure.add_subplot(grid[1, 0]), analysis)
     _path(figure.add_subplot(grid[1, 1]), analysis)
+    if saved := savings_lines(analysis):
+        figure.supxlabel("\n".join(saved), fontsize=8.5, color="#39434f", ha="left", x=0.02)
     picture = BytesIO()
     figure.savefig(picture, format="png")
     return write_output(path, picture.getvalue(), PICTURE_START, roots)

@@ -80,6 +80,10 @@ class RecordingSession:
             self._writer.attach(name, media, text.encode(), time)
             self._attached.add(name)
 
+    def flush(self) -> None:
+        """Leaves no message in memory."""
+        self._writer.flush()
+
     def finish(self) -> RecordingSummary:
         """Closes the file with its indexes."""
         return self._writer.finish()

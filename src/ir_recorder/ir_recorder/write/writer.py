@@ -120,6 +120,11 @@ class RecordingWriter:
         with self._storage():
             self._writer.add_metadata(name, dict(facts))
 
+    def flush(self) -> None:
+        """Hands all messages so far to the operating system; they end a chunk."""
+        with self._storage():
+            self._writer.flush()  # type: ignore[no-untyped-call]
+
     def finish(self) -> RecordingSummary:
         """Writes indexes and statistics and closes the file. A second call changes nothing."""
         if not self._finished:

@@ -18,16 +18,24 @@ class Entry(NamedTuple):
     values: dict[str, object]
 
 
-def report(simulation: Simulation, worst_lag: float, failure: str = "") -> list[Entry]:
+_LAG_SHOWN = 0.5  # s; people and timeouts notice no shorter one
+
+
+def report(simulation: Simulation, worst_lag: float, failure: str = "", lag: float = 0.0) -> list[Entry]:
     """Controller, executor and plant; the controller's entries are STALE while it is off the network.
 
-    worst_lag [s]: longest delay of the plant's thread so far; failure: why it has ended.
+    worst_lag, lag [s]: delay of the plant's thread, the longest so far and now; failure: why it has ended.
     """
     reading = simulation.mains.meter.reading()
+    level, sentence = Level.OK, "running"
+    if failure or simulation.fault:
+        level, sentence = Level.ERROR, failure or simulation.fault
+    elif lag > _LAG_SHOWN:
+        level, sentence = Level.WARN, f"{lag:.1f} s behind the clock: this machine is too slow, or loaded"
     plant = Entry(
         "ir_sim_driver: plant",
-        Level.ERROR if failure or simulation.fault else Level.OK,
-        failure or simulation.fault or "running",
+        level,
+        sentence,
         {
             "plant time [s]": f"{simulation.time:.3f}",
             "energy [J]": f"{reading.energy:.1f}",

@@ -232,11 +232,12 @@ class Driver:
         with self._lock:
             self._simulation.notices.add(Level.WARN, sentence)
 
-    def snapshot(self, worst_lag: float) -> Snapshot:
-        """Notices since the last snapshot, and the state; worst_lag [s] of whoever ticks."""
+    def snapshot(self, worst_lag: float, lag: float = 0.0) -> Snapshot:
+        """Notices since the last snapshot, and the state; delays [s] of whoever ticks: worst and now."""
         with self._lock:
             return Snapshot(
-                self._simulation.notices.take(), report(self._simulation, worst_lag, self._access.failure)
+                self._simulation.notices.take(),
+                report(self._simulation, worst_lag, self._access.failure, lag),
             )
 
     @property

@@ -7,30 +7,21 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.parameter import Parameter
 from rclpy.task import Future
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
+from rclpy.time_source import USE_SIM_TIME_NAME
 from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_description import DescriptionError
 from ir_msgs.action import ExecuteTrajectory
-from ir_msgs.msg import ControllerState, PowerState
-from ir_msgs.msg import PlcInputs as PlcInputsMsg
-from ir_msgs.msg import PlcOutputs as PlcOutputsMsg
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import (
-    plc_inputs_to_msg,
-    plc_outputs_to_msg,
-    power_state_to_msg,
-    time_to_msg,
-)
 from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
 from ir_msgs_py.ros.running import run_node
@@ -39,18 +30,15 @@ from ir_sim_driver.errors import DriverError, PlantStoppedError
 from ir_sim_driver.motion import ErrorCode, Outcome
 from ir_sim_driver.node.announcements import Announcements
 from ir_sim_driver.node.executions import Executions
+from ir_sim_driver.node.grid import FOREIGN, OWN, SYSTEM
 from ir_sim_driver.node.links import open_links
 from ir_sim_driver.node.markers import robot_markers
-from ir_sim_driver.node.messages import (
-    condition_of,
-    fill_controller_state,
-    fill_joint_state,
-    goal_from_trajectory,
-)
+from ir_sim_driver.node.messages import condition_of, goal_from_trajectory
 from ir_sim_driver.node.parameters import DriverParameters
 from ir_sim_driver.node.plc_topic import PlcTopic
 from ir_sim_driver.node.real_time import GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
+from ir_sim_driver.node.streams import Streams
 from ir_sim_driver.node.transforms import open_transforms
 from ir_sim_driver.notices import Level, Notice
 
@@ -60,12 +48,7 @@ except ImportError:
     FollowJointTrajectory = None
 
 _NS = 1_000_000_000
-_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-# Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged yet. What
-# is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
-_STREAM = QoSProfile(depth=2000)
 _MARKERS_PERIOD, _DIAGNOSTICS_PERIOD, _TRANSFORMS_PERIOD = 0.05, 1.0, 0.02  # s
-_LAG_MAX = 5.0  # s behind the clock beyond which the grid starts anew instead of catching up
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
 REFUSALS = (DriverError, DescriptionError, MsgsError)
@@ -83,6 +66,7 @@ class SimDriver(Node):
         self._configuration = configuration = DriverParameters(
             self, self._change_refusal, lambda settings: self._driver.set_execution(settings)
         )
+        self.add_on_set_parameters_callback(self._keep_time)
         options = configuration.node
         simulation = simulation or make_simulation(
             options.cell, options.load, options.backend, configuration.simulation
@@ -114,15 +98,9 @@ class SimDriver(Node):
             raise PlantStoppedError(self._driver.failure)
 
     def _open_topics(self) -> None:
-        self._joint_states = self.create_publisher(JointState, names.JOINT_STATES, _STREAM)
-        self._power_states = self.create_publisher(PowerState, names.POWER_STATE, _STREAM)
-        self._controller_states = self.create_publisher(ControllerState, names.CONTROLLER_STATE, _STREAM)
-        self._outputs = self.create_publisher(PlcOutputsMsg, names.PLC_OUTPUTS, _LATCHED)
-        self._in_force = self.create_publisher(PlcInputsMsg, names.PLC_INPUTS_IN_FORCE, _LATCHED)
+        self._streams = Streams(self, self._driver.joint_names)
         self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
         self._diagnostics = Diagnostics(self)
-        self._joint_state = JointState(name=list(self._driver.joint_names))
-        self._joint_state.header.frame_id = names.BASE_FRAME
         self.create_subscription(JointTrajectory, names.COMMANDED_TRAJECTORY, self._on_trajectory, 10)
         self._plc_topic = PlcTopic(self, self._driver)
         self.create_subscription(
@@ -192,37 +170,22 @@ class SimDriver(Node):
         clock = self.get_clock()
         start = clock.now().nanoseconds
         own_time = factor != 1.0
-        self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if own_time else None
+        if own_time:
+            self._streams.give_time(rate, factor)
         plant = GridThread(
             _NS // rate,
             ScaledClock(factor, start or _NS) if own_time else lambda: clock.now().nanoseconds,
+            lambda: OWN if own_time else FOREIGN if clock.ros_time_is_active else SYSTEM,
             self._tick,
             self._driver.abort,
             self._plant_failed,
-            max_lag=float("inf") if own_time else _LAG_MAX,
         )
         plant.start()
         return plant
 
     def _tick(self, stamp_ns: int) -> None:
         frame = self._frame = self._driver.tick(stamp_ns)
-        if self._clock_publisher is not None:
-            self._clock_publisher.publish(Clock(clock=time_to_msg(stamp_ns)))
-        if frame.q is not None and frame.qd is not None and frame.torque is not None:
-            fill_joint_state(self._joint_state, stamp_ns, frame.q, frame.qd, frame.torque)
-            self._joint_states.publish(self._joint_state)
-        if frame.power is not None:
-            self._power_states.publish(power_state_to_msg(frame.power))
-        if frame.following is not None:
-            state = ControllerState()
-            fill_controller_state(state, self._driver.joint_names, stamp_ns, frame.following)
-            self._controller_states.publish(state)
-        if frame.outputs is not None:
-            msg = plc_outputs_to_msg(frame.outputs)
-            msg.header.stamp = time_to_msg(stamp_ns)
-            self._outputs.publish(msg)
-        if frame.inputs is not None:
-            self._in_force.publish(plc_inputs_to_msg(frame.inputs))
+        self._streams.publish(frame)
 
     def _plant_failed(self, error: Exception) -> None:
         self._driver.fail(f"the plant has stopped: {error!r}")
@@ -264,7 +227,7 @@ class SimDriver(Node):
         self._markers.publish(MarkerArray(markers=markers))
 
     def _publish_diagnostics(self) -> None:
-        snapshot = self._driver.snapshot(self._plant.worst_lag)
+        snapshot = self._driver.snapshot(self._plant.worst_lag, self._plant.lag)
         for notice in snapshot.notices:
             self._log(notice)
         self._diagnostics.publish(condition_of(entry) for entry in snapshot.entries)
@@ -277,6 +240,12 @@ class SimDriver(Node):
             self.get_logger().warning(notice.sentence)
         else:
             self.get_logger().error(notice.sentence)
+
+    def _keep_time(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse another clock while the robot moves."""
+        turned = any(parameter.name == USE_SIM_TIME_NAME for parameter in parameters)
+        reason = self._change_refusal() if turned else ""
+        return SetParametersResult(successful=not reason, reason=reason)
 
     def _change_refusal(self) -> str:
         return "the robot moves: change it when it stands" if self._driver.moving else ""

@@ -1,8 +1,4 @@
-"""A thread of its own for a stream with absolute deadlines: stamps on a gap-free grid of the clock.
-
-After a hiccup it catches up, stamp by stamp. Only when the clock itself jumps, back or farther ahead than
-`max_lag`, the grid starts anew, and `on_jump` is called.
-"""
+"""A thread of its own for a stream with absolute deadlines: it ticks at the stamps of a grid."""
 
 from __future__ import annotations
 
@@ -10,33 +6,41 @@ import threading
 import time
 from collections.abc import Callable
 
+from ir_sim_driver.node.grid import ClockPolicy, Grid
+
 _NS = 1_000_000_000
 _POLL = 0.002  # s, while a clock stands still or has not started
-_BACK = _NS // 2  # a clock that is this far behind the next stamp has jumped
+_STEP_MAX = _NS // 10  # ns of real time that a scaled clock counts between two looks; more is a suspension
 
 
 class GridThread:
     """Calls `tick(stamp_ns)` for every multiple of period_ns of `clock` until it is closed.
 
-    on_jump: called with a sentence when the clock has jumped. on_failure: called with what `tick` raised;
-    the thread ends then.
+    on_gap: called with a sentence when the grid begins anew. on_failure: called with what `tick` raised;
+    the thread ends then. lag [s]: the present delay; worst_lag [s]: the longest so far.
     """
 
     def __init__(
         self,
         period_ns: int,
         clock: Callable[[], int],
+        policy: Callable[[], ClockPolicy],
         tick: Callable[[int], None],
-        on_jump: Callable[[str], None],
+        on_gap: Callable[[str], None],
         on_failure: Callable[[Exception], None],
-        max_lag: float = 5.0,
+        wall: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        self._period, self._clock, self._tick = period_ns, clock, tick
-        self._on_jump, self._on_failure = on_jump, on_failure
-        self._max_lag = max_lag * _NS
+        self._grid = Grid(period_ns)
+        self._clock, self._policy, self._wall, self._tick = clock, policy, wall, tick
+        self._on_gap, self._on_failure = on_gap, on_failure
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plant", daemon=True)
         self.worst_lag = 0.0
+
+    @property
+    def lag(self) -> float:
+        """Present delay [s]."""
+        return self._grid.lag
 
     def start(self) -> None:
         """Begin at the next stamp."""
@@ -56,34 +60,30 @@ class GridThread:
                 self._on_failure(error)
 
     def _loop(self) -> None:
-        stamp = 0
+        grid = self._grid
         while not self._closing.is_set():
-            now = self._clock()
-            if now <= 0:  # simulated time that has not started
-                time.sleep(_POLL)
-                continue
-            if stamp == 0:
-                stamp = (now // self._period + 1) * self._period
-            ahead = stamp - now
-            if ahead > _BACK or -ahead > self._max_lag:
-                where = "back" if ahead > 0 else "ahead"
-                self._on_jump(f"the clock jumped {where} by {abs(ahead) / _NS:.3f} s")
-                stamp = 0
-            elif ahead > 0:
-                time.sleep(min(ahead / _NS, _POLL))
+            wait = grid.look(self._clock(), self._wall(), self._policy())
+            if grid.gap:
+                self._on_gap(grid.gap)
+            if wait > 0:
+                time.sleep(min(wait / _NS, _POLL))
             else:
-                self.worst_lag = max(self.worst_lag, -ahead / _NS)
-                self._tick(stamp)
-                stamp += self._period
+                self.worst_lag = max(self.worst_lag, grid.lag)
+                self._tick(grid.take())
 
 
 class ScaledClock:
-    """Nanoseconds that pass `factor` times as fast as real time, from `start_ns` on."""
+    """Nanoseconds that pass `factor` times as fast as real time, from `start_ns` on.
 
-    def __init__(self, factor: float, start_ns: int) -> None:
-        self._factor, self._start = factor, start_ns
-        self._origin = time.monotonic_ns()
+    While nobody looks at it, as in a process that is suspended, it stands.
+    """
+
+    def __init__(self, factor: float, start_ns: int, wall: Callable[[], int] = time.monotonic_ns) -> None:
+        self._factor, self._now, self._wall = factor, start_ns, wall
+        self._seen = wall()
 
     def __call__(self) -> int:
         """Present time [ns]."""
-        return self._start + int((time.monotonic_ns() - self._origin) * self._factor)
+        seen, self._seen = self._seen, self._wall()
+        self._now += int(self._factor * min(self._seen - seen, _STEP_MAX))
+        return self._now

@@ -1,0 +1,87 @@
+"""The chain that a request chose, its steps with given movements, and the wait that fills a cycle."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ir_msgs_py.report import PlannedMovement
+from ir_planner.program.assembly import assembled, legs_of
+from ir_planner.program.chain import parts_of
+from ir_planner.program.ladder import Ladder
+from ir_planner.program.movements import Failure, Movements
+from ir_planner.program.pauses import AUTO, Pause, pause_by_itself, planned_pause
+from ir_planner.program.request import ProgramRequest, Progress, StageError
+from ir_planner.program.station_graph import Chain, Part
+from ir_planner.timing import Movement
+
+Steps = tuple[PlannedMovement, ...]
+Found = Mapping[Part, Movement]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A chain of configurations for a request, and its movements at the values of a second."""
+
+    request: ProgramRequest
+    ladder: Ladder
+    chain: Chain
+
+    @property
+    def movements(self) -> Movements:
+        """The movements of the request's own objective."""
+        return self.ladder.own
+
+    @property
+    def parts(self) -> list[Part]:
+        """The parts of the chain that move, in order."""
+        return [part for hop in parts_of(self.chain, self.movements) for part in hop]
+
+    def along(self, chain: Chain) -> "Choice":
+        """The same with another chain."""
+        return replace(self, chain=chain)
+
+    def found(self, progress: Progress) -> dict[Part, Movement]:
+        """The movements of all parts. Raises StageError where one of them isn't found."""
+        movements, result = self.movements, dict[Part, Movement]()
+        with movements.context.journal.stage("movements") as notes:
+            for hop, parts in enumerate(parts_of(self.chain, movements)):
+                progress("movements", hop, len(movements.route), self.chain.cost)
+                for part, found in zip(parts, movements.plan(parts, self.ladder.improvement), strict=True):
+                    if isinstance(found, Failure):
+                        raise StageError(found.status)
+                    result[part] = found
+            notes.append(f"{len(result)} movements")
+        return result
+
+    def steps(self, found: Found, *, by_itself: bool = False) -> Steps:
+        """The steps of the program with these movements. by_itself: its pauses as the controller spends them
+        when nobody asks for a mode.
+        """
+        route, pause = self.movements.route, self._pause(by_itself)
+        legs = legs_of(route, parts_of(self.chain, self.movements), found)
+        return assembled(route.steps, legs, route.scenes, self.request.start, pause)
+
+    def standing(self, found: Found) -> float:
+        """Seconds of the pauses in the program."""
+        return sum(step.duration for step in self.steps(found) if step.is_pause)
+
+    def wait(self, seconds: float, *, by_itself: bool = False) -> PlannedMovement:
+        """A wait at the end of the program: in the mode of least energy, or as the controller spends it."""
+        route = self.movements.route
+        end = route.scenes.of(route.steps[-1].after)
+        q = self.movements.layers[-1][self.chain.chosen[-1]].interaction
+        return self._pause(by_itself)(Pause(route.name(len(route) - 1), seconds, AUTO, q, end))
+
+    def waiting(self, seconds: float) -> float:
+        """Joules of a wait at the end."""
+        return self.wait(seconds).report.energy
+
+    def _pause(self, by_itself: bool) -> Callable[[Pause], PlannedMovement]:
+        times = self.request.settings.transitions
+        if by_itself:
+            return lambda pause: pause_by_itself(pause, times)
+        return lambda pause: planned_pause(pause, times)
+
+
+def duration_of(steps: Sequence[PlannedMovement]) -> float:
+    """How long steps take [s]."""
+    return sum(step.duration for step in steps)

@@ -1,0 +1,52 @@
+"""A program held against the common program, over the same seconds.
+
+Without a cycle time, and within one that the common program can't keep, the planner's program is planned for
+the time that the common program takes. In a longer cycle both wait at their ends.
+"""
+
+from dataclasses import dataclass
+
+from ir_msgs_py.savings import ProgramSavings
+from ir_planner.errors import RequestError
+from ir_planner.program.choice import Choice, Steps, duration_of
+from ir_planner.program.common_program import common_program
+from ir_planner.program.cycle_plan import timed_choice
+from ir_planner.program.request import Progress, StageError
+from ir_planner.program.savings import savings_of
+
+_SAME = 1e-3  # s: a shorter wait is none
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Savings, of which steps, and what was compared, in words."""
+
+    savings: ProgramSavings
+    steps: Steps
+    compared: str
+
+
+def held_against_common(
+    choice: Choice, own: Steps, cycle_time: float, standing: float, progress: Progress
+) -> Comparison | str:
+    """The comparison of a program; own: its steps in a cycle time (0: free), of which `standing` s are
+    pauses. Where there is none, the sentence why.
+    """
+    progress("savings", 0, 1, choice.chain.cost)
+    with choice.movements.context.journal.stage("savings") as notes:
+        try:
+            common = common_program(choice)
+            seconds = duration_of(common.steps)
+            if cycle_time >= seconds:
+                left = cycle_time - seconds
+                waits = (common.choice.wait(left, by_itself=True),) if left > _SAME else ()
+                words = f"both in the cycle time of {cycle_time:g} s"
+                words += f", of which the common program waits {left:.2f} s at its end" if waits else ""
+                return Comparison(savings_of(common, waits, own), own, words)
+            steps = timed_choice(choice, seconds, standing, progress).steps
+        except (StageError, RequestError) as error:
+            notes.append("none")
+            return f"no savings: {error}"
+        words = f"both in the common program's {seconds:.2f} s"
+        words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
+        return Comparison(savings_of(common, (), steps), steps, words)

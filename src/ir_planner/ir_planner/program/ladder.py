@@ -1,0 +1,64 @@
+"""The movements of a program at many values of a second: a fixed ladder of them, so that requests that differ
+in their cycle time choose among the same movements.
+
+Movements are searched at the request's own value, at one in the middle of the ladder and for time alone; at
+the rungs beside these they are optimised again from the movements there.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ir_planner.program.movements import Movements, rates_of
+
+_LEAST = 250.0  # W: a second less of moving and more of waiting on brakes saves more than that
+_STEP = 2.0**0.5  # between two rungs: a mixture of neighbours is within about a percent of the rung between
+_RUNGS = 14  # up to 22 kW, where movements are as fast as they can be within a percent
+LADDER = tuple(_LEAST * _STEP**k for k in range(_RUNGS))
+FASTEST = _RUNGS  # the rung on which time alone counts
+_MIDDLE = 8  # 4 kW
+_REACH = 3.01  # rungs: paths change little over three times the value
+_SAME = 1e-6  # rungs
+
+
+class Ladder:
+    """Movements by rung; own: those of the request. improvement: work of each movement."""
+
+    def __init__(self, own: Movements, improvement: int) -> None:
+        self.own, self.improvement = own, improvement
+        self._rungs: dict[int, Movements] = {}
+        rates = rates_of(own.context)
+        value = rates.second / rates.joule if rates.joule else np.inf
+        searched = own.context.options.objective != "movement_cost"
+        place = float(np.log(value / _LEAST) / np.log(_STEP)) if value > 0.0 else -np.inf
+        self._place = (float(FASTEST) if np.isinf(value) else place) if searched else -np.inf
+
+    @property
+    def first(self) -> int:
+        """The rung nearest to the request's own value."""
+        return int(np.clip(round(self._place), 0, FASTEST)) if np.isfinite(self._place) else 0
+
+    def at(self, rung: int) -> Movements:
+        """Movements at a rung."""
+        if rung not in self._rungs:
+            self._rungs[rung] = self._made(rung)
+        return self._rungs[rung]
+
+    def _made(self, rung: int) -> Movements:
+        own = self.own
+        if abs(rung - self._place) < _SAME:
+            return own
+        if rung == FASTEST:
+            context = own.context.asking("time")
+        else:
+            asked = replace(own.context.asking("time_and_energy").options, time_value=LADDER[rung])
+            context = replace(own.context, options=asked)
+        return Movements(own.route, own.layers, context, own.searches, self._beside(rung))
+
+    def _beside(self, rung: int) -> Movements | None:
+        """Searched movements near which those of a rung are optimised; None where they are searched."""
+        if rung == FASTEST:
+            return None
+        if abs(rung - self._place) < _REACH:
+            return self.own
+        return self.at(_MIDDLE) if 0 < abs(rung - _MIDDLE) < _REACH else None

@@ -1,0 +1,65 @@
+"""What the program saves by its plan, in three figures, each with its baseline."""
+
+from __future__ import annotations
+
+from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_recorder.analysis import Analysis
+from ir_recorder.format import contents
+from ir_recorder.report.tables import table
+from ir_recorder.report.words import joules, seconds, text
+
+Row = tuple[str, Saving, str]
+
+
+def savings_section(analysis: Analysis) -> str:
+    """Section of the page; "" where the recording carries no savings."""
+    savings = analysis.savings
+    if savings is None:
+        return ""
+    cells = (
+        (
+            text(name),
+            joules(saving.common),
+            joules(saving.planned),
+            f"<b>{_share(saving)}</b>",
+            seconds(saving.seconds),
+            text(baseline),
+        )
+        for name, saving, baseline in _rows(analysis, savings)
+    )
+    heads = ("", ">baseline", ">planned", ">saved", ">time", "held against")
+    return (
+        '<section id="savings"><h2>What the program saves</h2>'
+        '<p class="hint">Planned energies at the mains, over the same seconds; nothing here is measured.</p>'
+        f"{table(heads, cells)}"
+        f'<p class="hint">{text(savings.sentence)}; program {text(savings.program_id)}.</p></section>'
+    )
+
+
+def savings_lines(analysis: Analysis) -> list[str]:
+    """A sentence for each figure; none where the recording carries no savings."""
+    savings = analysis.savings
+    if savings is None:
+        return []
+    return [
+        f"{name}: {_share(saving)} saved by plan, {joules(saving.planned)} instead of "
+        f"{joules(saving.common)} in {seconds(saving.seconds)}, against {baseline}"
+        for name, saving, baseline in _rows(analysis, savings)
+    ]
+
+
+def _rows(analysis: Analysis, savings: ProgramSavings) -> list[Row]:
+    """Name, figures and baseline; the row of pauses only where there are any."""
+    common = (
+        f"synchronous S-curve PTP at 100 % through the same stations ({savings.around} of {savings.across} "
+        "around bodies)"
+    )
+    shortened = " (pauses shortened)" if analysis.recording.fact(contents.UNSHORTENED_PAUSES) else ""
+    rows = [("movements", savings.movements, common)]
+    if savings.pauses.seconds > 0.0:
+        rows.append(("pauses", savings.pauses, f"the controller's own timers{shortened}"))
+    return [*rows, ("total", savings.total, f"both{shortened}")]
+
+
+def _share(saving: Saving) -> str:
+    return f"{100.0 * saving.share:.1f} %"

@@ -1,0 +1,3 @@
+"""The recorder's services."""
+
+__all__: list[str] = []

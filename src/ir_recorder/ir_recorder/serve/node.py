@@ -1,0 +1,79 @@
+"""Answers to ~/start and ~/stop: a refusal is a status, and no request ends the node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from rclpy.node import Node
+
+from ir_msgs.srv import StartRecording, StopRecording
+from ir_msgs_py.checks import one_line
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.ros.conversions import status_to_msg
+from ir_msgs_py.ros.quality import SERVICE
+from ir_msgs_py.status import Status, StatusCode
+from ir_recorder.errors import NothingRecordedError, RecorderError
+from ir_recorder.write.writer import RecordingSummary
+
+
+class Recorder(Protocol):
+    """What the services ask for."""
+
+    def start(self, path: str, overwrite: bool, topics: Sequence[str]) -> str:
+        """Begin a recording and return its path."""
+
+    def finish(self) -> RecordingSummary | None:
+        """End the recording; its summary, None when there was none."""
+
+    @property
+    def unmet(self) -> tuple[str, ...]:
+        """Wanted topics without a publisher so far."""
+
+    @property
+    def failure(self) -> str:
+        """Why the last recording ended on its own, "" when it didn't."""
+
+
+class Services:
+    """Offers start and stop on `node` for `recorder`."""
+
+    def __init__(self, node: Node, recorder: Recorder) -> None:
+        self._recorder, self._source = recorder, node.get_name()
+        node.create_service(StartRecording, "~/start", self._on_start, qos_profile=SERVICE)
+        node.create_service(StopRecording, "~/stop", self._on_stop, qos_profile=SERVICE)
+
+    def _on_start(self, request: Any, response: Any) -> Any:
+        def start() -> str:
+            response.path = self._recorder.start(request.path, request.overwrite, request.topics)
+            return f"recording into {response.path}{without_publisher(self._recorder.unmet, 'is seen yet')}"
+
+        return self._answer(response, start)
+
+    def _on_stop(self, request: Any, response: Any) -> Any:
+        def stop() -> str:
+            unmet = self._recorder.unmet
+            summary = self._recorder.finish()
+            if summary is None:
+                raise NothingRecordedError(self._recorder.failure or "nothing is being recorded")
+            response.path = str(summary.path)
+            response.messages, response.seconds = summary.messages, summary.seconds
+            seconds = f"{summary.messages} messages over {summary.seconds:.1f} s"
+            return f"{seconds}{without_publisher(unmet, 'was seen')}"
+
+        return self._answer(response, stop)
+
+    def _answer(self, response: Any, work: Callable[[], str]) -> Any:
+        try:
+            code, sentence = StatusCode.SUCCESS, work()
+        except (RecorderError, MsgsError) as error:
+            code, sentence = StatusCode.FAILURE, str(error)
+        except Exception as error:  # a bug in one answer must not end a recording
+            code, sentence = StatusCode.FAILURE, f"the request failed: {error!r}"
+        response.status = status_to_msg(Status(code, one_line(sentence), self._source))
+        return response
+
+
+def without_publisher(topics: Sequence[str], when: str) -> str:
+    """The end of a sentence: the wanted topics without a publisher."""
+    return f"; no publisher {when} of {', '.join(topics)}" if topics else ""

@@ -1,0 +1,71 @@
+"""What the plant's thread publishes: joint states at every stamp, the rest when it is due."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+
+from ir_msgs.msg import ControllerState, PlcInputs, PlcOutputs, PowerState
+from ir_msgs_py import names
+from ir_msgs_py.ros.conversions import (
+    plc_inputs_to_msg,
+    plc_outputs_to_msg,
+    power_state_to_msg,
+    time_to_msg,
+)
+from ir_msgs_py.ros.quality import LATCHED
+from ir_sim_driver.controller import Frame
+from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state
+
+_NS = 1_000_000_000
+# Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged yet. What
+# is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
+_STREAM = QoSProfile(depth=2000)
+_CLOCK_RATE = 200  # messages of /clock per second of real time at most: each wakes every node
+
+
+class Streams:
+    """Publishers of `node` for frames of the joints of these names."""
+
+    def __init__(self, node: Node, joint_names: Sequence[str]) -> None:
+        self._node, self._names = node, joint_names
+        self._joint_states = node.create_publisher(JointState, names.JOINT_STATES, _STREAM)
+        self._power_states = node.create_publisher(PowerState, names.POWER_STATE, _STREAM)
+        self._controller_states = node.create_publisher(ControllerState, names.CONTROLLER_STATE, _STREAM)
+        self._outputs = node.create_publisher(PlcOutputs, names.PLC_OUTPUTS, LATCHED)
+        self._in_force = node.create_publisher(PlcInputs, names.PLC_INPUTS_IN_FORCE, LATCHED)
+        self._joint_state = JointState(name=list(joint_names))
+        self._joint_state.header.frame_id = names.BASE_FRAME
+        self._clock = None
+        self._clock_period = 1
+
+    def give_time(self, rate: int, factor: float) -> None:
+        """Publish /clock from now on, for `rate` stamps per second that passes `factor` times as fast."""
+        self._clock = self._node.create_publisher(Clock, "/clock", 10)
+        self._clock_period = math.ceil(rate * factor / _CLOCK_RATE) * (_NS // rate)
+
+    def publish(self, frame: Frame) -> None:
+        """Publish what the frame holds."""
+        stamp_ns = frame.stamp_ns
+        if self._clock is not None and stamp_ns % self._clock_period == 0:
+            self._clock.publish(Clock(clock=time_to_msg(stamp_ns)))
+        if frame.q is not None and frame.qd is not None and frame.torque is not None:
+            fill_joint_state(self._joint_state, stamp_ns, frame.q, frame.qd, frame.torque)
+            self._joint_states.publish(self._joint_state)
+        if frame.power is not None:
+            self._power_states.publish(power_state_to_msg(frame.power))
+        if frame.following is not None:
+            state = ControllerState()
+            fill_controller_state(state, self._names, stamp_ns, frame.following)
+            self._controller_states.publish(state)
+        if frame.outputs is not None:
+            msg = plc_outputs_to_msg(frame.outputs)
+            msg.header.stamp = time_to_msg(stamp_ns)
+            self._outputs.publish(msg)
+        if frame.inputs is not None:
+            self._in_force.publish(plc_inputs_to_msg(frame.inputs))
