@@ -14,17 +14,18 @@ def take_offered_cell(simulation: Simulation) -> None:
     surroundings = simulation.surroundings
     if surroundings.offered is None or not simulation.stands:
         return
-    before = surroundings.cell
-    if not surroundings.take():
+    planned = surroundings.take()
+    if planned is None:
         return
-    simulation.cell = cell = surroundings.cell
+    simulation.cell = cell = planned.cell
     notices = simulation.notices
     simulation.tool.stand_at(cell.base_pose, cell.tcp)
-    load, warning = surroundings.load_here(simulation.load, before)
+    load, warning = surroundings.load_in(cell, simulation.load)
     if warning:
         notices.add(Level.WARN, warning)
     try:
         simulation.set_load(load)
     except BackendError as error:
         notices.add(Level.ERROR, f"load {load.text!r} of cell {cell.name!r} can't be carried: {error}")
+    surroundings.settle(planned)
     notices.add(Level.OK, f"the robot stands in cell {cell.name!r} now, hash {surroundings.hash}")

@@ -49,15 +49,16 @@ class Surroundings:
             self.offered = planned
         return reason
 
-    def take(self) -> bool:
-        """Take what is offered, the robot stands; whether it is another cell."""
+    def take(self) -> PlannedCell | None:
+        """What is offered where it is another cell; it counts from `settle` on."""
         planned, self.offered = self.offered, None
-        if planned is None or planned.hash == self.hash:
-            return False
-        self.cell, self._hash = planned
+        return None if planned is None or planned.hash == self.hash else planned
+
+    def settle(self, planned: PlannedCell) -> None:
+        """Stand in this cell, with all that depends on it; who waits for it goes on."""
         with self._changed:
+            self.cell, self._hash = planned
             self._changed.notify_all()
-        return True
 
     def wait_for(self, expected: str) -> None:
         """Give the cell of this hash the time to come; must not be called by who steps the simulation."""
@@ -76,21 +77,21 @@ class Surroundings:
             return f"the trajectory was planned with load {goal.load[:80]!a}, the robot carries {load.text!r}"
         return ""
 
-    def load_here(self, load: Carried, before: Cell) -> tuple[Carried, str]:
-        """What is carried as this cell describes it, and a warning: it is unknown here and stays as it is.
+    def load_in(self, cell: Cell, load: Carried) -> tuple[Carried, str]:
+        """What is carried as another cell describes it, and a warning: it is unknown there and stays as it is.
 
-        The tool of the cell before becomes the tool of this one.
+        The tool of this cell becomes the tool of that one.
         """
         if load.text == CUSTOM:
             return load, ""
-        tool, old = self.cell.tool, before.tool
+        tool, old = cell.tool, self.cell.tool
         names = load.text.split(LOAD_SEPARATOR)
         if tool is not None and old is not None:
             names = [tool.name if name == old.name else name for name in names]
         try:
-            return carried(self.cell, LOAD_SEPARATOR.join(names)), ""
+            return carried(cell, LOAD_SEPARATOR.join(names)), ""
         except RequestRefusedError as error:
-            return load, f"load {load.text!r} is kept as it is in cell {self.cell.name!r}: {error}"
+            return load, f"load {load.text!r} is kept as it is in cell {cell.name!r}: {error}"
 
     def _unlike(self, cell: Cell) -> str:
         """Why a cell can't be this robot's, "" when it can."""
