@@ -21,6 +21,7 @@ COMMAND_MODULES = {
     "list": "ir_cli.graph_commands",
     "send_goal": "ir_cli.action_commands",
     "cancel": "ir_cli.action_commands",
+    "front": "ir_cli.front_command",
     "cell": "ir_cli.cell_commands",
     "report": "ir_cli.report_command",
 }
