@@ -4,7 +4,7 @@ from ir_planner.optimize.descents import Descents, path_of
 from ir_planner.optimize.movement_over import movement_over
 from ir_planner.optimize.path_timing import QUICK_TIMING, PathTiming, TimingEffort, along_its_path
 from ir_planner.optimize.portfolio import Portfolio
-from ir_planner.optimize.refinement import FEWEST, MOST, QUICK, SPACING, Refinement
+from ir_planner.optimize.refinement import FEWEST, MOST, QUICK, SPACING, THOROUGH, Refinement
 from ir_planner.optimize.rescaling import rescaled
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "QUICK",
     "QUICK_TIMING",
     "SPACING",
+    "THOROUGH",
     "Descents",
     "PathTiming",
     "Portfolio",

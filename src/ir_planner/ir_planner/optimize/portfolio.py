@@ -2,9 +2,10 @@
 it.
 
 Each new free path is shortened and gets a coarse solution: a short descent on a coarse spline estimates what
-it may come to, and paths whose coarse solutions are alike count once. The cheapest coarse solutions are
-refined, which is where the clearance is proved; the best refined movement is the answer, and more work makes
-it better.
+it may come to, and paths whose coarse solutions are alike count once. Guesses, which need not be free,
+descend too: a few evaluations show which of them are worth as many as a free path gets. The cheapest coarse
+solutions are refined, which is where the clearance is proved; the best refined movement is the answer, and
+more work makes it better.
 """
 
 from dataclasses import dataclass
@@ -13,10 +14,12 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
 from ir_planner.optimize.refinement import QUICK, THOROUGH, Effort, Refinement, Solution
-from ir_planner.search import COARSE, apart, at_nine_shares, fewest_corners
+from ir_planner.search import COARSE, apart, at_nine_shares, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
 
 _BETTER = 0.99  # share of the cost below which an alike path replaces another
+_FIRST_LOOK = 16  # evaluations from every guess
+_FOLLOWED = 6  # guesses that are followed further
 _OUT_OF_REACH = 1.25  # times the cost of the best: coarse solutions above are not refined
 
 
@@ -45,13 +48,29 @@ class Portfolio:
         weights = self.space.scene.weights
         for free in paths:
             path = fewest_corners(free, self.space, weights) if len(free) > 2 else free
-            candidate = Candidate(method, path, self.refinement.coarse(path))
-            alike = [other for other in self.candidates if _alike(other.solution, candidate.solution)]
-            if all(candidate.solution.cost < _BETTER * other.solution.cost for other in alike):
-                self.candidates = [c for c in self.candidates if c not in alike or c.refined]
-                self.candidates.append(candidate)
-                new += 1
+            new += self._take(Candidate(method, path, self.refinement.coarse(path)))
+        return new
+
+    def _take(self, candidate: Candidate) -> bool:
+        """Keep a candidate unless one that is alike costs no more."""
+        alike = [other for other in self.candidates if _alike(other.solution, candidate.solution)]
+        if any(candidate.solution.cost >= _BETTER * other.solution.cost for other in alike):
+            return False
+        self.candidates = [c for c in self.candidates if c not in alike or c.refined]
+        self.candidates.append(candidate)
         self.candidates.sort(key=lambda candidate: candidate.solution.cost)
+        return True
+
+    def descend(self, method: str, guesses: list[FloatArray]) -> int:
+        """Optimise guesses (M, n), which need not be free: all of them a little, then the cheapest that
+        differ as far as free paths are; the number of them that are new.
+        """
+        looks = [(self.refinement.coarse(guess, _FIRST_LOOK), guess) for guess in guesses]
+        looks.sort(key=lambda look: look[0].cost)
+        new = 0
+        for look, guess in first_different(looks, _FOLLOWED, COARSE, lambda look: _places(look[0])):
+            solution = self.refinement.coarse_from(look.spline, guess, QUICK.coarse)
+            new += self._take(Candidate(method, solution.spline.knots()[0], solution))
         return new
 
     def refine_best(self, count: int, effort: Effort = QUICK) -> int:
@@ -68,7 +87,8 @@ class Portfolio:
         """Optimise the path of the best movement thoroughly; False where that was done."""
         for candidate in self.candidates:
             if candidate.refined == 1:
-                candidate.solution = self.refinement.coarse(candidate.path, THOROUGH.coarse)
+                spline = candidate.solution.spline
+                candidate.solution = self.refinement.coarse_from(spline, candidate.path, THOROUGH.coarse)
                 self._refine(candidate, THOROUGH)
                 return True
         return False
@@ -111,5 +131,9 @@ class Portfolio:
 
 def _alike(a: Solution, b: Solution) -> bool:
     """Whether two coarse solutions pass the same configurations."""
-    first, second = (at_nine_shares(solution.spline.control) for solution in (a, b))
-    return apart(first, second) < COARSE
+    return apart(_places(a), _places(b)) < COARSE
+
+
+def _places(solution: Solution) -> FloatArray:
+    """Configurations (9, n) by which coarse solutions are compared."""
+    return at_nine_shares(solution.spline.control)

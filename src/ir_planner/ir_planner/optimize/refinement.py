@@ -86,6 +86,7 @@ class Refinement:
             rows.append(context.thresholds() - PROOF_TOLERANCE / 2)
         self._kept = np.stack(rows)
         self.shortest = np.inf  # s, of movements that were tried for a requested duration
+        self._costs: dict[tuple[object, ...], SplineCost] = {}  # where no pair has a larger margin
 
     def coarse(self, path: FloatArray, evaluations: int = QUICK.coarse) -> Solution:
         """The coarse solution near a free path (M, n), M >= 2: enough to compare paths."""
@@ -171,7 +172,12 @@ class Refinement:
         penalty = weights.power * (_FINEST_STIFFNESS if solution.level == 2 else _STIFFNESS)
         penalty *= _STIFFER if self.context.options.duration > 0.0 else 1.0
         limits = self.limits.with_torque_share(TORQUE_SHARES[0]).for_speed(solution.speed)
-        return spline_cost(self.context, limits, weights, penalty, solution.kept)
+        if solution.kept is not self._kept:
+            return spline_cost(self.context, limits, weights, penalty, solution.kept)
+        key = (penalty, solution.speed, weights.travel.tobytes())
+        if key not in self._costs:
+            self._costs[key] = spline_cost(self.context, limits, weights, penalty, solution.kept)
+        return self._costs[key]
 
     def _rows(self, spline: UniformSpline) -> RowArray:
         """Which thresholds hold in each interval: the station's where the tcp stays in the zone."""

@@ -5,8 +5,10 @@ request.
 from collections.abc import Callable
 
 from ir_msgs_py.status import Status
+from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.regional.safeguards import DIRECT
+from ir_planner.regional.waypoints import over_free_steps
 from ir_planner.request import Context
 from ir_planner.timing import Movement, straight_steps
 
@@ -44,7 +46,8 @@ def _as_named(context: Context) -> bool:
 def _own(common: Movement, context: Context) -> Movement | None:
     """The movement over the free path that the synchronous one came from; None where it isn't certified."""
     try:
-        movement = straight_steps(common.path, context)
+        space = FreeSpace.of(context.scene, context.safety_distance, context.work)
+        movement = straight_steps(over_free_steps(common, space).path, context)
     except (TimingError, RequestError) as error:
         context.journal.reject(f"own laws: {error}")
         return None

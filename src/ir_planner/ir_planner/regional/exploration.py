@@ -1,7 +1,8 @@
 """Which searches look for the first free path, and which for paths of other homotopy classes.
 
 A request that names a planner gets that search alone. The default portfolio asks the cheap ones first: each
-with little work, and then those that can do more.
+with little work, and then those that can do more. Which class is the best is decided by guesses, before the
+first refinement and whatever the seed; searches of other seeds only add to them.
 """
 
 from collections import Counter
@@ -11,9 +12,9 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
-from ir_planner.optimize import Portfolio
+from ir_planner.optimize import QUICK, THOROUGH, Portfolio
 from ir_planner.request import Context
-from ir_planner.search import Ends, Search, quick
+from ir_planner.search import Ends, Search, guesses, quick
 
 Searches = Mapping[str, Search]
 Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)
@@ -21,6 +22,8 @@ Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M,
 FIRST = ("direct", "tree", "detours", "retract")
 # that find other homotopy classes with another seed
 EXPLORERS = ("detours", "tree", "genetic")
+GUESS = "guess"  # the method of movements that a guess became
+_GOALS, _FEWEST_GUESSES = 6, 8  # that guesses lead to, and so many to each of them
 _REFINED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
 
 
@@ -55,8 +58,8 @@ def _attempts(planner_id: str, searches: Searches) -> Iterator[tuple[str, Search
 def improve(
     ends: Ends, paths: list[Path], portfolio: Portfolio, context: Context, searches: Searches
 ) -> None:
-    """Optimise the first paths, then look for other homotopy classes and optimise the best of all, turn by
-    turn, until the work is spent.
+    """Optimise the first paths and guesses of many homotopy classes, refine the best of them; then look for
+    other classes by chance and optimise the best of all, turn by turn, until the work is spent.
     """
     work, journal = context.work, context.journal
     until = work.iterations + work.improvement
@@ -66,7 +69,10 @@ def improve(
 
     with journal.stage("refine") as notes:
         portfolio.add(paths[0][0], [path for _, path in paths])
-        notes.append(f"{portfolio.refine_best(1)} certified")
+        guided = context.options.planner_id == "" and more()
+        if guided:
+            notes.append(f"{_guessed(ends, portfolio)} local minima from guesses")
+        notes.append(f"{portfolio.refine_best(1, THOROUGH if guided else QUICK)} certified")
     explorers = [name for name in EXPLORERS if context.options.planner_id in ("", name)]
     turn = 0
     with journal.stage("improve") as notes:
@@ -87,6 +93,15 @@ def improve(
                 break  # nothing left to do
         others = ", ".join(f"{count} by {name}" for name, count in new.items() if count)
         notes.append(f"{turn} turns, new paths: {others or 'none'}; {certified} certified")
+
+
+def _guessed(ends: Ends, portfolio: Portfolio) -> int:
+    """Descend from guesses to the nearest goals, which share them; how many new local minima there are."""
+    space = portfolio.space
+    park, nearest = np.array(space.scene.cell.park), ends.goals[:_GOALS]
+    paths = [guesses(ends.start, goal, park, space.low, space.high) for goal in nearest]
+    share = max(len(paths[0]) // len(nearest), _FEWEST_GUESSES)
+    return portfolio.descend(GUESS, [path for of_goal in paths for path in of_goal[:share]])
 
 
 def _seed(seed: int, turn: int, name: str) -> int:

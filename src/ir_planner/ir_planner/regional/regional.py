@@ -1,8 +1,8 @@
 """Regional movement: from one free configuration to another, around everything, at least cost.
 
 First the straight movement of all joints (PTP, cost W of eq. 9); where it collides, the searches of the
-registry. From the first free path on the answer gets better with work: paths of other homotopy classes are
-looked for, and the cheapest descend by gradient to the best path and time scaling near them, certified.
+registry. From the first free path on the answer gets better with work: guesses and paths of many homotopy
+classes descend by gradient, and the cheapest to the best path and time scaling near them, certified.
 Nothing found is an answer too: which pair blocks, where, by how much, and what was tried.
 """
 
@@ -18,6 +18,7 @@ from ir_planner.regional.asynchronous import with_own_laws
 from ir_planner.regional.exploration import Path, Searches, first_paths
 from ir_planner.regional.refusal import refusal
 from ir_planner.regional.safeguards import DIRECT, Exploration, best_found, not_worse_than_baseline
+from ir_planner.regional.waypoints import over_free_steps
 from ir_planner.request import Context
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
@@ -76,6 +77,8 @@ def _search(
     if best is None:
         return refusal(start, ends.goals[0], space, context.journal), None
     context.journal.planner_id, movement = best
+    if context.options.objective == "movement_cost":  # W of its waypoints is asked for
+        movement = over_free_steps(movement, space)
     return Status.success(), movement
 
 

@@ -1,8 +1,9 @@
 """Searches for free paths between configurations: one port, one file each, one registry."""
 
+from ir_planner.search.guesses import guesses
 from ir_planner.search.port import Ends, Found, Search, quick
 from ir_planner.search.registry import SEARCHES, registered
-from ir_planner.search.shortcuts import fewest_corners, pulled
+from ir_planner.search.shortcuts import fewest_corners, pulled, straight_along
 from ir_planner.search.tree import connect, joint_scale
 from ir_planner.search.variety import COARSE, EXIT, apart, at_nine_shares, first_different
 
@@ -18,8 +19,10 @@ __all__ = [
     "connect",
     "fewest_corners",
     "first_different",
+    "guesses",
     "joint_scale",
     "pulled",
     "quick",
     "registered",
+    "straight_along",
 ]

@@ -43,6 +43,23 @@ def fewest_corners(
     return points[chosen[::-1]]
 
 
+def straight_along(points: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray | None:
+    """The cheapest path of free straight steps over some of the points (N, n) of a free curve; None where
+    they are too few to follow it.
+    """
+    chosen = np.linspace(0, len(points) - 1, _POINTS).round().astype(int)
+    blocked = chosen[:-1][~space.edges_free(points[chosen[:-1]], points[chosen[1:]])]
+    while len(blocked):
+        following = chosen[np.searchsorted(chosen, blocked) + 1]
+        middle = (blocked + following) // 2
+        if (middle == blocked).any():
+            return None
+        chosen = np.union1d(chosen, middle)
+        begin, end = np.concatenate([blocked, middle]), np.concatenate([middle, following])
+        blocked = np.sort(begin[~space.edges_free(points[begin], points[end])])
+    return fewest_corners(points[chosen], space, weights)
+
+
 def densified(path: FloatArray, count: int) -> FloatArray:
     """The path (M, n) with points added in its longest steps until there are `count`."""
     points = np.array(path)

@@ -90,6 +90,12 @@ class Movement:
         """J, or joules where the objective is not J, sampled coarsely: for comparisons on one path."""
         return coarse_energy_cost(self.trajectory, self.context)
 
+    def passing(self, path: FloatArray) -> "Movement":
+        """The same trajectory with other waypoints (M, n); what is known about it stays known."""
+        other = replace(self, path=path)
+        other.__dict__.update({**self.__dict__, "path": path})
+        return other
+
     def stretched_by(self, factor: float) -> "Movement":
         """The same path, slower by `factor` >= 1."""
         return replace(self, trajectory=stretched(self.trajectory, factor))
