@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, Status
-from ir_msgs.srv import CheckState
+from ir_msgs.srv import CheckState, SetCell
 from ir_msgs_py.ros.quality import SERVICE
 from ir_planner.node import node as planner_module
 from ir_planner.node.node import PlannerNode
@@ -82,7 +82,40 @@ def test_more_plans_than_may_wait_are_refused_in_words(
     assert planner_module._GOALS_WAITING > 1
 
 
-def test_four_hundred_calls_at_once_are_all_answered(
+def test_a_thousand_cancels_are_all_answered(
+    send: Callable[[int], list[Any]], ros_executor: Any, wait_for: Any
+) -> None:
+    goal = send(1)[0]
+    answer = ros_executor.run(goal.get_result_async)
+    cancels = [ros_executor.run(goal.cancel_goal_async) for _ in range(1000)]
+    wait_for(lambda: all(cancel.done() for cancel in cancels), timeout=120.0, what="cancels are answered")
+    wait_for(answer.done, timeout=60.0, what="the goal ends")
+    assert answer.result().status == CANCELLED
+
+
+def test_a_large_cell_holds_up_no_quick_request(
+    planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any, call: Callable[..., Any]
+) -> None:
+    client = ros_executor.run(lambda: ros_node.create_client(SetCell, "/ir_planner/set_cell"))
+    wait_for(client.service_is_ready, what="set_cell is offered")
+    loading = ros_executor.run(lambda: client.call_async(SetCell.Request(cell_yaml=large_cell(3000))))
+    answered = 0
+    while not loading.done():
+        assert call(CheckState, "check_state", state=STATE, timeout=30.0).status.code == Status.SUCCESS
+        answered += 1
+    assert answered >= 3
+    assert loading.result().status.code == Status.SUCCESS, loading.result().status.message
+    assert planner_node.planner.cell.name == "large"
+
+
+def large_cell(bodies: int) -> str:
+    """A cell of many small boxes, two metres before the robot."""
+    head = "format: ir_cell/1\nname: large\nrobot: kr210_r2700_extra\nequipment:\n- name: m\n  bodies:\n"
+    row = "  - {{name: b{0}, kind: box, size: [0.01, 0.01, 0.01], xyz: [{1:.2f}, {2:.2f}, 0.02]}}"
+    return head + "\n".join(row.format(k, 3.0 + 0.02 * (k % 100), 0.02 * (k // 100)) for k in range(bodies))
+
+
+def test_two_thousand_calls_at_once_are_all_answered(
     planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> None:
     clients = [
@@ -96,8 +129,8 @@ def test_four_hundred_calls_at_once_are_all_answered(
     begin = time.monotonic()
     futures = [
         ros_executor.run(lambda c=client: c.call_async(CheckState.Request(state=STATE)))
-        for _ in range(20)
+        for _ in range(100)
         for client in clients
     ]
-    wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+    wait_for(lambda: all(future.done() for future in futures), timeout=120.0, what="all are answered")
     assert all(future.result().valid for future in futures), time.monotonic() - begin

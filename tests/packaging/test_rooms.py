@@ -18,7 +18,8 @@ ROOMS = {
         "current_cell", "certificates", "asked_states", "planner", "node",
     ),
     "ir_description": (
-        "errors", "arrays", "poses", "shapes", "robot", "cell", "files", "library", "cell_review",
+        "errors", "arrays", "poses", "shapes", "robot", "cell", "files", "library", "cell_process",
+        "cell_review",
     ),
     "ir_sim_driver": ("errors", "notices", "plant", "power", "motion", "plc", "controller", "node"),
 }  # fmt: skip

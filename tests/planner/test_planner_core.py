@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ir_description import load_cell
+from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -24,7 +25,7 @@ from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import scene_with, with_parts
 from ir_planner.service.service_lines import line_poses, service_lines
-from ir_planner.store import Store
+from ir_planner.store import trajectory_store
 from ir_planner.trajectories.through_points import Reference
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
@@ -189,12 +190,27 @@ def test_a_state_that_is_not_free_names_the_pair(planner: Planner) -> None:
 
 
 def test_the_store_forgets_the_oldest_and_says_so() -> None:
-    store: Store[JointTrajectory] = Store("trajectory", 2, lambda trajectory: trajectory.trajectory_id)
+    store = trajectory_store(2, megabytes=1)
     ids = [store.add(JointTrajectory(("a",), np.array([0]), np.array([[float(k)]]))) for k in range(3)]
     assert len(store) == 2
     assert store.get(ids[2]).positions[0, 0] == 2.0
-    with pytest.raises(RequestError, match="the last 2 of at most 2 are kept"):
+    with pytest.raises(RequestError, match="the last 2 are kept, at most 2 and 1 MB"):
         store.get(ids[0])
+
+
+def test_the_memory_of_trajectories_is_bounded_in_bytes_too() -> None:
+    store = trajectory_store(500, megabytes=1)
+    rng, count = np.random.default_rng(1), 1000  # of points: 55 numbers with the polynomials, 0.44 MB
+    times = np.arange(count)
+    ids = [store.add(JointTrajectory(JOINT_NAMES, times, rng.normal(size=(count, 6)))) for _ in range(5)]
+    assert len(store) == 2
+    store.add(store.get(ids[4]))  # the same again takes no more
+    assert len(store) == 2
+    with pytest.raises(RequestError, match="the last 2 are kept, at most 500 and 1 MB"):
+        store.get(ids[2])
+    large = JointTrajectory(JOINT_NAMES, np.arange(9000), rng.normal(size=(9000, 6)))
+    assert store.get(store.add(large)) is large
+    assert len(store) == 1
 
 
 def test_a_goal_configuration_beyond_the_limits_of_start_is_refused(planner: Planner) -> None:

@@ -13,6 +13,7 @@ from ir_description.cell import (
     Task,
     Zone,
 )
+from ir_description.cell_process import read_cell_apart
 from ir_description.cell_review import Finding, check_cell
 from ir_description.errors import (
     CellFileError,
@@ -83,5 +84,6 @@ __all__ = [
     "load_power_data",
     "load_robot",
     "moving_frames",
+    "read_cell_apart",
     "robot_urdf",
 ]

@@ -25,7 +25,11 @@ class UnknownNameError(DescriptionError, LookupError):
 
     def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
         self.known = tuple(known)
+        self._what, self._name = what, name
         super().__init__(f"{what} {shown(name)} is unknown; known are {listed(self.known)}")
+
+    def __reduce__(self) -> tuple[type[UnknownNameError], tuple[object, ...]]:
+        return type(self), (self._what, self._name, self.known)
 
 
 class DescriptionFileError(DescriptionError):
@@ -34,6 +38,9 @@ class DescriptionFileError(DescriptionError):
     def __init__(self, path: str, line: int, sentence: str) -> None:
         self.path, self.line, self.sentence = path, line, sentence
         super().__init__(f"{path}:{line}: {sentence}" if line else f"{path}: {sentence}")
+
+    def __reduce__(self) -> tuple[type[DescriptionFileError], tuple[str, int, str]]:
+        return type(self), (self.path, self.line, self.sentence)
 
 
 class CellFileError(DescriptionFileError):

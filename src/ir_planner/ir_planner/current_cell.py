@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from threading import Lock
 
 from ir_description import Cell, cell_from_yaml, cell_hash, load_cell
 from ir_kernels.power import Regeneration
@@ -12,16 +13,29 @@ from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.heard import Heard
 from ir_planner.scene import PlanningScene, load_text, scene_with
 
+ReadCell = Callable[[str, str], Cell]
+"""Gives the cell of a text, or else of a path or a bundled name."""
+
+
+def read_cell_here(cell_yaml: str, cell_file: str) -> Cell:
+    """The cell of a text, or else of a path or a bundled name; raises DescriptionError."""
+    return cell_from_yaml(cell_yaml) if cell_yaml else load_cell(cell_file)
+
 
 class CurrentCell:
     """Holds one immutable cell after the other; a scene that was taken never changes.
 
     heard: what the driver says. braking_energy: asked for each scene, what the drives' bus does with it.
+    Changes wait for each other, readers for none: a cell is replaced when it is read and its models are
+    built.
     """
 
-    def __init__(self, heard: Heard, braking_energy: Callable[[], Regeneration]) -> None:
-        self._heard, self._braking_energy = heard, braking_energy
+    def __init__(
+        self, heard: Heard, braking_energy: Callable[[], Regeneration], read: ReadCell = read_cell_here
+    ) -> None:
+        self._heard, self._braking_energy, self._read = heard, braking_energy, read
         self._cell: Cell | None = None
+        self._changing = Lock()
         self._hashed: tuple[Cell | None, str] = None, ""
         # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
         self._scenes: dict[tuple[str, str, float], tuple[Cell, PlanningScene]] = {}
@@ -49,16 +63,16 @@ class CurrentCell:
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"exactly one of cell_yaml and cell_file must be given, {given}",
             )
-        self._cell = cell_from_yaml(cell_yaml) if cell_yaml else load_cell(cell_file)
-        return self._cell
+        with self._changing:
+            return self._replaced_by(self._read(cell_yaml, cell_file))
 
     def set_equipment(self, name: str, pose: FloatArray | None, enabled: bool, state: str) -> Cell:
         """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "": unchanged)."""
-        cell = self.cell
-        if name not in [machine.name for machine in cell.equipment]:
-            raise UnknownNameError("equipment", name, (machine.name for machine in cell.equipment))
-        self._cell = cell.with_equipment(name, pose, enabled, state or None)
-        return self._cell
+        with self._changing:
+            cell = self.cell
+            if name not in [machine.name for machine in cell.equipment]:
+                raise UnknownNameError("equipment", name, (machine.name for machine in cell.equipment))
+            return self._replaced_by(cell.with_equipment(name, pose, enabled, state or None))
 
     def hash_of(self, cell: Cell) -> str:
         """Content hash of a cell; of the same one made once."""
@@ -72,13 +86,32 @@ class CurrentCell:
         """Snapshot of the cell with `load` attached; "" = what the robot carries, and while no driver says
         so the tool.
         """
-        cell, power, braking = self.cell, self._heard.data, self._braking_energy()
-        key = load or self._attached(cell), braking, power.motors_to_brakes_in_program
+        cell = self.cell
+        key = self._key(load or self._attached(cell))
         known, scene = self._scenes.get(key, (None, None))
         if scene is None or known is not cell:
-            scene = replace(scene_with(cell, key[0], power, braking), cell_hash=self.hash_of(cell))
+            scene = self._scene_of(cell, key[0])
             self._scenes[key] = cell, scene
         return scene
+
+    def _key(self, load: str) -> tuple[str, str, float]:
+        return load, self._braking_energy(), self._heard.data.motors_to_brakes_in_program
+
+    def _scene_of(self, cell: Cell, load: str) -> PlanningScene:
+        scene = scene_with(cell, load, self._heard.data, self._braking_energy())
+        return replace(scene, cell_hash=self.hash_of(cell))
+
+    def _replaced_by(self, cell: Cell) -> Cell:
+        """The cell from now on; its models of all pairs, a second's work in a large one, are built before."""
+        try:
+            load = self._attached(cell)
+        except RequestError:  # of requests without a load, as long as the driver carries that
+            load = load_text(cell)
+        scene = self._scene_of(cell, load)
+        scene.thresholds(0.0)
+        self._scenes = {self._key(load): (cell, scene)}  # nothing of former cells is kept
+        self._cell = cell
+        return cell
 
     def _attached(self, cell: Cell) -> str:
         """The load text of what is attached. Raises RequestError where the cell doesn't know that."""

@@ -23,7 +23,7 @@ from ir_planner.configurations import (
     free_configurations,
     no_configuration,
 )
-from ir_planner.current_cell import CurrentCell
+from ir_planner.current_cell import CurrentCell, ReadCell, read_cell_here
 from ir_planner.heard import Heard
 from ir_planner.program import (
     ProgramPlan,
@@ -58,7 +58,7 @@ from ir_planner.service import (
     plan_service,
 )
 from ir_planner.settings import PlannerSettings
-from ir_planner.store import Store, StoredProgram
+from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 
 Cancelled = Callable[[], bool]
@@ -68,23 +68,24 @@ _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 class Planner:
     """Answers requests about one cell. Methods raise RequestError for requests that make no sense.
 
-    clock: seconds, only for ceilings and for the times that answers report.
+    clock: seconds, only for ceilings and for the times that answers report. read_cell: what reads cells.
     """
 
     def __init__(
-        self, clock: Clock, settings: PlannerSettings | None = None, power: PowerData | None = None
+        self,
+        clock: Clock,
+        settings: PlannerSettings | None = None,
+        power: PowerData | None = None,
+        read_cell: ReadCell = read_cell_here,
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
         self.power = power or load_power_data()
         self.heard = Heard(self.power, lambda: self.settings.transitions)
-        self._current = CurrentCell(self.heard, lambda: self.settings.braking_energy)
-        self.trajectories: Store[JointTrajectory] = Store(
-            "trajectory", self.settings.stored_trajectories, lambda trajectory: trajectory.trajectory_id
-        )
-        self.programs: Store[StoredProgram] = Store(
-            "program", self.settings.stored_programs, lambda program: program.program_id
-        )
+        self._current = CurrentCell(self.heard, lambda: self.settings.braking_energy, read_cell)
+        megabytes = self.settings.stored_megabytes
+        self.trajectories = trajectory_store(self.settings.stored_trajectories, megabytes)
+        self.programs = program_store(self.settings.stored_programs, megabytes)
 
     @property
     def cell(self) -> Cell:

@@ -42,6 +42,14 @@ class PlannerSettings:
     stored_programs: int = setting(
         120, "Programs remembered by id; the oldest go first.", minimum=1, maximum=10_000, read_only=True
     )
+    stored_megabytes: int = setting(
+        200,
+        "Memory of the trajectories remembered, and of those of programs; the oldest go first.",
+        unit="MB",
+        minimum=1,
+        maximum=100_000,
+        read_only=True,
+    )
     state_max_age: float = setting(
         1.0,
         "Age from which the last joint_states no longer count as the robot's state.",

@@ -8,7 +8,15 @@ import numpy as np
 
 from ir_description.cell import BODIES_MAX, NameRegister
 from ir_description.files.items import Item, Table
-from ir_description.files.mesh import HULL_VERTICES_MAX, convex_vertices, hull_vertices, mesh_path, read_stl
+from ir_description.files.mesh import (
+    CELL_TRIANGLES_MAX,
+    CORNERS_MAX,
+    HULL_VERTICES_MAX,
+    convex_vertices,
+    hull_vertices,
+    mesh_path,
+    read_stl,
+)
 from ir_description.poses import pose_of, rotation_from_abc, rotation_from_matrix, rotation_from_quaternion
 from ir_description.shapes import KINDS, SIZE_MAX, Body
 from ir_msgs_py.arrays import FloatArray
@@ -46,7 +54,7 @@ class BodyReader:
 
     def __init__(self, shapes: NameRegister, folder: Path | None) -> None:
         self._shapes, self._folder = shapes, folder
-        self._count = 0
+        self._count = self._corners = self._triangles = 0
         self._meshes: dict[tuple[str, bool], FloatArray] = {}
 
     def read(self, item: Item) -> Body:
@@ -69,6 +77,11 @@ class BodyReader:
                     f"does not belong to a {kind}; its keys are {', '.join(shape) or 'only its pose'}"
                 )
         size, vertices = self._mesh(table) if kind == "mesh" else (_size(table, kind), np.zeros((0, 3)))
+        self._corners += len(vertices)
+        if self._corners > CORNERS_MAX:
+            item.fail(
+                f"is one mesh too many: all have {self._corners} corners, at most {CORNERS_MAX} are taken"
+            )
         with item.blamed():
             return Body(name, kind, pose_in(table), size, vertices)  # type: ignore[arg-type]
 
@@ -87,13 +100,7 @@ class BodyReader:
         take_hull = table["convex_hull"].boolean() if "convex_hull" in table else False
         with item.blamed():
             if (name, take_hull) not in self._meshes:
-                if self._folder is None:
-                    raise InvalidValueError(
-                        "a mesh file can be named only in a cell file, this is a text; give its vertices"
-                    )
-                self._meshes[name, take_hull] = convex_vertices(
-                    read_stl(mesh_path(self._folder, name)), take_hull
-                )
+                self._meshes[name, take_hull] = convex_vertices(self._read(name), take_hull)
             vertices = self._meshes[name, take_hull] * scale
             if np.abs(vertices).max() > FAR:
                 raise InvalidValueError(
@@ -101,6 +108,21 @@ class BodyReader:
                     "(scale: 0.001 for mm)"
                 )
         return np.zeros(3), vertices
+
+    def _read(self, name: str) -> FloatArray:
+        """Return the triangles (T, 3, 3) of a mesh file, in its unit."""
+        if self._folder is None:
+            raise InvalidValueError(
+                "a mesh file can be named only in a cell file, this is a text; give its vertices"
+            )
+        triangles = read_stl(mesh_path(self._folder, name))
+        self._triangles += len(triangles)
+        if self._triangles > CELL_TRIANGLES_MAX:
+            raise InvalidValueError(
+                f"the cell's mesh files have {self._triangles} triangles so far, "
+                f"must have at most {CELL_TRIANGLES_MAX} together"
+            )
+        return triangles
 
 
 _SHAPE_KEYS: dict[str, tuple[str, ...]] = {

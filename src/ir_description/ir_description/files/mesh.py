@@ -18,6 +18,10 @@ from ir_msgs_py.errors import InvalidValueError
 BYTES_MAX = 20_000_000
 TRIANGLES_MAX = 200_000
 HULL_VERTICES_MAX = 1_000
+CORNERS_MAX = 50_000
+"""Corners of all meshes of a cell together: each is compared with the robot, drawn and published."""
+CELL_TRIANGLES_MAX = 1_000_000
+"""Triangles of all mesh files of a cell together."""
 CONVEX_TOLERANCE = 1e-3
 """A mesh whose volume is this share below its hull's still counts as convex (tessellation, rounding)."""
 

@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from visualization_msgs.msg import MarkerArray
 
-from ir_description import DescriptionError
+from ir_description import DescriptionError, read_cell_apart
 from ir_kernels import compiled
 from ir_msgs.action import Plan
 from ir_msgs.msg import ProgramSavings as ProgramSavingsMsg
@@ -64,7 +64,7 @@ from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
 _GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
-_THREADS = 6  # quick and long requests, loading, the goal under way, cancelling, and one to spare
+_THREADS = 7  # quick and long requests, texts and points, changes, the goal, cancelling, one to spare
 
 
 class PlannerNode(Node):
@@ -78,7 +78,7 @@ class PlannerNode(Node):
     ) -> None:
         super().__init__(names.PLANNER, context=context, **options)
         parameters = Parameters(self, PlannerSettings, on_change=self._change_settings)
-        make = make_planner or (lambda settings: Planner(time.monotonic, settings))
+        make = make_planner or (lambda settings: Planner(time.monotonic, settings, read_cell=read_cell_apart))
         self.planner = make(parameters.value)
         self._last_state = LastState(look=self._look)
         self._requests = Requests(
@@ -109,15 +109,16 @@ class PlannerNode(Node):
     def _offer(self) -> None:
         """Advertise what works."""
         ask, quick, long = self._requests, self._quick, self._long
-        loading = MutuallyExclusiveCallbackGroup()  # a large cell holds up nobody else
+        changes = MutuallyExclusiveCallbackGroup()  # a large cell holds up nobody but other changes
+        texts = MutuallyExclusiveCallbackGroup()  # as long as what was loaded or planned
         for kind, name, handler, group in (
-            (SetCell, names.SET_CELL, ask.set_cell, loading),
-            (GetCell, names.GET_CELL, ask.get_cell, quick),
-            (SetEquipment, names.SET_EQUIPMENT, ask.set_equipment, quick),
+            (SetCell, names.SET_CELL, ask.set_cell, changes),
+            (GetCell, names.GET_CELL, ask.get_cell, texts),
+            (SetEquipment, names.SET_EQUIPMENT, ask.set_equipment, changes),
             (CheckState, names.CHECK_STATE, ask.check_state, quick),
             (ComputeIk, names.COMPUTE_IK, ask.compute_ik, quick),
-            (GetTrajectory, names.GET_TRAJECTORY, ask.get_trajectory, quick),
-            (GetProgram, names.GET_PROGRAM, ask.get_program, quick),
+            (GetTrajectory, names.GET_TRAJECTORY, ask.get_trajectory, texts),
+            (GetProgram, names.GET_PROGRAM, ask.get_program, texts),
             (PlanStandby, names.PLAN_STANDBY, ask.plan_standby, quick),
             (EvaluateTrajectory, names.EVALUATE_TRAJECTORY, ask.evaluate_trajectory, long),
             (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service, long),
