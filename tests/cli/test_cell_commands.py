@@ -30,7 +30,7 @@ def test_a_broken_cell_file_is_refused_with_its_line(
 
 
 def test_an_unknown_cell_lists_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["cell", "check", "nowhere"]) == 1
+    assert main(["cell", "check", "nowhere"]) == 2
     assert "deep_box" in capsys.readouterr().err
 
 

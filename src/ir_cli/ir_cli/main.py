@@ -7,9 +7,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 
-from .environment import apply, ros_defaults
 from .errors import CommandError
 from .suggestions import unknown_name
 
@@ -22,12 +20,40 @@ COMMAND_MODULES = {
     "send_goal": "ir_cli.action_commands",
     "cancel": "ir_cli.action_commands",
     "front": "ir_cli.front_command",
-    "cell": "ir_cli.cell_commands",
     "report": "ir_cli.report_command",
+    "plan": "ir_cli.offline.plan_command",
+    "move": "ir_cli.offline.move_command",
+    "ik": "ir_cli.offline.state_commands",
+    "check": "ir_cli.offline.state_commands",
+    "standby": "ir_cli.offline.standby_command",
+    "evaluate": "ir_cli.offline.evaluate_command",
+    "cell": "ir_cli.offline.cell_commands",
+    "robot": "ir_cli.offline.robot_commands",
 }
 """Only the module that is needed is imported: `ir cell check` does not wait for rclpy."""
 
-WITHOUT_ROS = ("cell", "report")
+HELP = {
+    "demo": "plan, drive, record and explain a cell",
+    "up": "start planner, driver, runner and recorder until Ctrl-C",
+    "call": "call a service: call /ir_planner/get_cell '{}'",
+    "echo": "print a topic's messages: echo /ir_sim_driver/power_state",
+    "list": "list services, topics or actions with their types",
+    "send_goal": "send a goal: send_goal /ir_planner/plan '{}'; Ctrl-C cancels",
+    "cancel": "cancel all goals of an action: cancel /ir_planner/plan",
+    "front": "energy over cycle time: front home infeed_pick park",
+    "report": "write the HTML report of a recording",
+    "plan": "plan a cell's program: seconds, joules, clearance; needs no ROS",
+    "move": "plan one movement from START to GOAL; needs no ROS",
+    "ik": "all configurations that reach a pose or a station; needs no ROS",
+    "check": "whether a configuration is free, and its nearest pairs; needs no ROS",
+    "standby": "the power mode of least energy for a pause; needs no ROS",
+    "evaluate": "joules, limits and clearance of a trajectory in a CSV file; needs no ROS",
+    "cell": "check cell files, list the bundled cells",
+    "robot": "list the bundled robots",
+}
+"""What `ir --help` prints without importing any of the modules."""
+
+WITHOUT_ROS = ("report", "plan", "move", "ik", "check", "standby", "evaluate", "cell", "robot")
 """Commands that need no middleware, whatever its environment is."""
 
 MISUSED = 2
@@ -50,6 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         if chosen not in WITHOUT_ROS:
+            from .environment import apply, ros_defaults
+
             apply(ros_defaults())
         code: int = parsed.run(parsed)
         sys.stdout.flush()
@@ -59,21 +87,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except _expected_errors() as error:
         sys.stderr.write(f"ir: {error}\n")
-        return 1
+        return getattr(error, "exit_code", 1)
     return code
 
 
 def _parser(chosen: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="ir", description="Energy-aware planning for industrial robots.")
-    parser.add_argument("--version", action="version", version=f"ir {_version()}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    wanted = [chosen] if chosen in COMMAND_MODULES else list(COMMAND_MODULES)
-    for module in dict.fromkeys(COMMAND_MODULES[command] for command in wanted):
-        import_module(module).add_commands(commands)
+    if chosen in COMMAND_MODULES:
+        import_module(COMMAND_MODULES[chosen]).add_commands(commands)
+        return parser
+    for command in COMMAND_MODULES:
+        commands.add_parser(command, help=HELP[command])
     return parser
 
 
+class _Version(argparse.Action):
+    """Looks the version up only where somebody asks: that takes longer than all else."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        sys.stdout.write(f"ir {_version()}\n")
+        parser.exit()
+
+
 def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version("ir_cli")
     except PackageNotFoundError:

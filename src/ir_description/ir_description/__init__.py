@@ -26,6 +26,7 @@ from ir_description.files import cell_hash, cell_to_yaml, robot_urdf
 from ir_description.library import (
     bundled_cells,
     bundled_robots,
+    cell_file_errors,
     cell_from_yaml,
     is_path,
     load_cell,
@@ -74,6 +75,7 @@ __all__ = [
     "Zone",
     "bundled_cells",
     "bundled_robots",
+    "cell_file_errors",
     "cell_from_yaml",
     "cell_hash",
     "cell_to_yaml",

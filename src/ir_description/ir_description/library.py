@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ir_description.cell import Cell
 from ir_description.errors import CellFileError, UnknownNameError, shown
-from ir_description.files import power_from_yaml, read_cell, read_regular_file, robot_from_yaml
+from ir_description.files import cell_errors, power_from_yaml, read_cell, read_regular_file, robot_from_yaml
 from ir_description.robot import PowerData, RobotModel
 from ir_msgs_py.errors import InvalidValueError
 
@@ -74,6 +74,18 @@ def load_cell(name_or_path: str | Path) -> Cell:
     except InvalidValueError as error:
         raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
     return read_cell(_decoded(content, str(path)), str(path), load_robot, path.parent)
+
+
+def cell_file_errors(path: str | Path) -> tuple[CellFileError, ...]:
+    """Return everything that is wrong with a cell file, by line; where load_cell reads it, nothing is."""
+    try:
+        content = read_regular_file(Path(path), CELL_BYTES_MAX)
+        text = _decoded(content, str(path))
+    except InvalidValueError as error:
+        return (CellFileError(shown(str(path))[1:-1], 0, str(error)),)
+    except CellFileError as error:
+        return (error,)
+    return cell_errors(text, str(path), load_robot, Path(path).parent)
 
 
 def cell_from_yaml(text: str, source: str = "<text>") -> Cell:

@@ -1,5 +1,6 @@
 """Files and texts: cells, robots, power figures and meshes in, cells and URDF out."""
 
+from ir_description.files.all_errors import cell_errors
 from ir_description.files.cell_hash import cell_hash
 from ir_description.files.cell_reader import read_cell
 from ir_description.files.cell_writer import cell_to_yaml
@@ -9,6 +10,7 @@ from ir_description.files.robot_file import robot_from_yaml
 from ir_description.files.urdf import robot_urdf
 
 __all__ = [
+    "cell_errors",
     "cell_hash",
     "cell_to_yaml",
     "power_from_yaml",

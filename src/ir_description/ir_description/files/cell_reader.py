@@ -66,7 +66,11 @@ _OPTIONAL = (
 
 def read_cell(text: str, source: str, robots: RobotSource, folder: Path | None) -> Cell:
     """Return the cell of a text; robots gives a robot by name, folder is where its meshes are."""
-    root = read_items(text, source, CellFileError)
+    return cell_of(read_items(text, source, CellFileError), robots, folder)
+
+
+def cell_of(root: Item, robots: RobotSource, folder: Path | None) -> Cell:
+    """Return the cell of a document."""
     table = root.table(_REQUIRED, _OPTIONAL)
     table["format"].choice((FORMAT,))
     with table["robot"].blamed():

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize_scalar, nnls
-from scipy.spatial import ConvexHull
 
 from ir_description.shapes.body import Body
 from ir_description.shapes.capsule import Capsule
@@ -34,6 +32,8 @@ def capsule_distance(body: Body, capsule: Capsule) -> float:
 
     The distance of a convex body to the points of a segment has one minimum.
     """
+    from scipy.optimize import minimize_scalar  # half a second of imports, for who reviews a cell
+
     step = capsule.p1 - capsule.p0
 
     def at(t: float) -> float:
@@ -50,6 +50,9 @@ def _outside_or_depth(excess: FloatArray) -> float:
 
 def _hull_distance(vertices: FloatArray, point: FloatArray) -> float:
     """Inside: the nearest facet. Outside: the nearest convex combination of the vertices."""
+    from scipy.optimize import nnls
+    from scipy.spatial import ConvexHull
+
     facets = ConvexHull(vertices).equations
     depth = float((facets[:, :3] @ point + facets[:, 3]).max())
     if depth <= 0.0:

@@ -1,0 +1,46 @@
+"""`ir evaluate`: what a trajectory in a CSV file costs, and the first limit or clearance that it violates."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .asking import FAILED, add_cell, add_margin, planner_of, sentences
+from .move_command import figures_of, sentence_of
+from .output import add_formats, print_json
+from .trace_file import read_trace
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add evaluate."""
+    evaluate = commands.add_parser(
+        "evaluate", help="joules, limits and clearance of a trajectory in a CSV file; needs no ROS"
+    )
+    add_cell(evaluate)
+    evaluate.add_argument(
+        "trace", type=Path, metavar="TRACE.csv", help="columns: time, then the joints in rad"
+    )
+    evaluate.add_argument("--station", default="", help="whose allowed contacts hold in its zone")
+    add_margin(evaluate)
+    add_formats(evaluate, comma=False)
+    evaluate.set_defaults(run=run_evaluate)
+
+
+def run_evaluate(arguments: argparse.Namespace) -> int:
+    """Evaluate and print; exit code 1 where a limit or the clearance is violated."""
+    with sentences():
+        planner = planner_of(arguments.cell)
+        trajectory = read_trace(arguments.trace, planner.cell.robot.joint_names)
+        margin, load, station = arguments.safety_distance, arguments.load, arguments.station
+        found = planner.evaluate(trajectory, margin, load, station)
+    verification = found.verification
+    if arguments.json:
+        violations = [v for v in (verification.violation, *verification.others) if v is not None]
+        listed = [{"what": v.what, "seconds": v.time, "sentence": v.sentence} for v in violations]
+        print_json({**figures_of(found.report), "violations": listed})
+    else:
+        sys.stdout.write(sentence_of(found.report) + "\n")
+        if verification.violation is not None:
+            sys.stdout.write(f"violated: {verification.status.message}\n")
+    return 0 if verification.certified else FAILED

@@ -1,0 +1,95 @@
+"""`ir move`: one movement between two configurations, with what it costs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ir_msgs_py.report import TrajectoryReport
+
+from .asking import (
+    add_cell,
+    add_options,
+    configuration_of,
+    failed,
+    goal_of,
+    options_of,
+    planner_of,
+    sentences,
+)
+from .output import Row, add_formats, print_json
+from .trace_file import write_trace
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add move."""
+    move = commands.add_parser("move", help="plan one movement from START to GOAL; needs no ROS")
+    add_cell(move)
+    form = 'a posture, a station, "A1 0 A2 -90 ..." in degrees or "X 1.8 Y 0 ..." in m and degrees'
+    move.add_argument("start", metavar="START", help=form)
+    move.add_argument("goal", metavar="GOAL", help="the same")
+    move.add_argument("--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)")
+    move.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
+    add_options(move)
+    add_formats(move, comma=False)
+    move.set_defaults(run=run_move)
+
+
+def run_move(arguments: argparse.Namespace) -> int:
+    """Plan and print; exit code 1 where nothing is found."""
+    with sentences():
+        planner = planner_of(arguments.cell)
+        start = configuration_of(arguments.start, planner, arguments.safety_distance, arguments.load)
+        goal = goal_of(arguments.goal, planner)
+        plan = planner.plan_regional(start, goal, options_of(arguments, arguments.duration))
+    if plan.trajectory is None:
+        return failed(plan.status.message)
+    if arguments.trajectory:
+        write_trace(arguments.trajectory, plan.trajectory)
+    if arguments.json:
+        print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures_of(plan.report)})
+    else:
+        sys.stdout.write(sentence_of(plan.report) + "\n")
+    return 0
+
+
+def figures_of(report: TrajectoryReport) -> Row:
+    """What a trajectory costs and keeps, SI units."""
+    closest = report.closest
+    return {
+        "seconds": report.duration,
+        "joules": report.energy,
+        "base_joules": report.base_energy,
+        "dissipated_joules": report.burnt_energy,
+        "joint_joules": report.joint_energy,
+        "peak_watts": report.peak_power,
+        "clearance": report.min_clearance,
+        "closest": None if closest is None else [closest.body_a, closest.body_b],
+        "certified": report.certified,
+        "velocity_share": report.velocity_ratio,
+        "acceleration_share": report.acceleration_ratio,
+        "jerk_share": report.jerk_ratio,
+        "torque_share": report.torque_ratio,
+    }
+
+
+def sentence_of(report: TrajectoryReport) -> str:
+    """The same for people."""
+    near = report.closest
+    pair = "" if near is None else f" between {near.body_a} and {near.body_b} at {report.closest_time:.2f} s"
+    used = max(
+        float(share.max(initial=0.0))
+        for share in (
+            report.velocity_ratio,
+            report.acceleration_ratio,
+            report.jerk_ratio,
+            report.torque_ratio,
+        )
+    )
+    return (
+        f"{report.duration:.3f} s, {report.energy:.0f} J from the mains, "
+        f"at most {report.peak_power / 1e3:.1f} kW\n"
+        f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a limit; "
+        f"{'certified' if report.certified else 'NOT certified'}"
+    )

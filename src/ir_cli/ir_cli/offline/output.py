@@ -1,0 +1,98 @@
+"""Answers as people and programs want them: a table, JSON or CSV; and a progress line on stderr."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TextIO
+
+from ..terminal import table
+
+Row = Mapping[str, Any]
+Columns = Mapping[str, tuple[str, Callable[[Any], str]]]  # title and format by key
+NOTHING = "-"
+
+
+def add_formats(parser: argparse.ArgumentParser, comma: bool = True) -> None:
+    """--json, and --csv where the answer is a table."""
+    formats = parser.add_mutually_exclusive_group()
+    formats.add_argument("--json", action="store_true", help="print the answer as JSON")
+    if comma:
+        formats.add_argument("--csv", action="store_true", help="print the table as CSV, SI units")
+
+
+def print_json(answer: Mapping[str, Any]) -> None:
+    """One JSON document; what is not finite is null."""
+    sys.stdout.write(json.dumps(_plain(answer), indent=1, allow_nan=False) + "\n")
+
+
+def print_csv(rows: Sequence[Row]) -> None:
+    """Rows with the same keys."""
+    writer = csv.DictWriter(sys.stdout, list(rows[0]) if rows else [], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_plain(dict(row)) for row in rows)
+
+
+def print_table(rows: Sequence[Row], columns: Columns) -> None:
+    """Rows as text."""
+    titles = [title for title, _ in columns.values()]
+    cells = [[shown(row[key]) for key, (_, shown) in columns.items()] for row in rows]
+    sys.stdout.write(table(titles, cells) + "\n")
+
+
+def number(digits: int, scale: float = 1.0) -> Callable[[Any], str]:
+    """A format of numbers; nothing where there is none."""
+
+    def shown(value: Any) -> str:
+        return (
+            NOTHING
+            if value is None or not math.isfinite(value)
+            else f"{round(scale * value, digits) + 0.0:.{digits}f}"
+        )
+
+    return shown
+
+
+def text(value: Any) -> str:
+    """A format of words."""
+    return str(value) or NOTHING
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value
+
+
+class ProgressLine:
+    """One line on stderr that is kept up to date, and gone at the end; quiet where nobody looks."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._live = self._stream.isatty()
+
+    def __enter__(self) -> ProgressLine:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._write("")
+
+    def show(self, phase: str, done: int, total: int, cost: float) -> None:
+        """Phase, steps done of all, cost of the best answer so far (0, inf: none yet)."""
+        best = f", best {cost:.0f}" if math.isfinite(cost) and cost > 0.0 else ""
+        self._write(f"… {phase} {done} of {total}{best}")
+
+    def _write(self, line: str) -> None:
+        if self._live:
+            self._stream.write(f"\r\x1b[2K{line}")
+            self._stream.flush()

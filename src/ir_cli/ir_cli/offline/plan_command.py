@@ -1,0 +1,121 @@
+"""`ir plan`: a cell's program as a table of seconds, joules and clearance."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from ir_msgs_py.report import PlannedMovement
+from ir_planner import ProgramPlan, Savings
+
+from .asking import add_cell, add_options, configuration_of, failed, options_of, planner_of, sentences
+from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
+
+J_PER_KWH = 3.6e6
+COLUMNS: Columns = {
+    "step": ("step", text),
+    "kind": ("kind", text),
+    "from": ("from", text),
+    "to": ("to", text),
+    "seconds": ("s", number(2)),
+    "joules": ("J", number(0)),
+    "clearance": ("clearance mm", number(1, 1e3)),
+    "load": ("load", text),
+    "power_mode": ("mode", text),
+}
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add plan."""
+    plan = commands.add_parser("plan", help="plan a cell's program: seconds, joules, clearance; needs no ROS")
+    add_cell(plan)
+    plan.add_argument("--stations", nargs="+", default=[], metavar="NAME", help="visit these instead")
+    plan.add_argument("--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)")
+    plan.add_argument("--start", default="park", help="posture or joint values (park)")
+    plan.add_argument(
+        "--saving", action="store_true", help="also against a common program in equal time: plans twice"
+    )
+    add_options(plan)
+    add_formats(plan)
+    plan.set_defaults(run=run_plan)
+
+
+def run_plan(arguments: argparse.Namespace) -> int:
+    """Plan and print; exit code 1 where nothing is found."""
+    with sentences(), ProgressLine() as line:
+        planner, stations = planner_of(arguments.cell), tuple(arguments.stations)
+        start = configuration_of(arguments.start, planner, arguments.safety_distance)
+        options = options_of(arguments)
+        plan = planner.plan_program(stations, arguments.cycle_time, options, start, line.show)
+        savings = None
+        if arguments.saving and plan.status.ok:
+            line.show("saving", 0, 1, 0.0)
+            savings = planner.plan_savings(stations, options, start).savings
+    if not plan.status.ok:
+        return failed(plan.status.message)
+    rows = rows_of(plan.movements)
+    if arguments.json:
+        print_json({**totals_of(plan), "steps": rows, "saving": None if savings is None else asdict(savings)})
+    elif arguments.csv:
+        print_csv(rows)
+    else:
+        print_table(rows, COLUMNS)
+        sys.stdout.write("\n".join(sentences_of(plan, savings)) + "\n")
+    return 0
+
+
+def rows_of(movements: Sequence[PlannedMovement]) -> list[Row]:
+    """One row per step, SI units."""
+    return [
+        {
+            "step": k,
+            "kind": str(step.kind),
+            "from": step.from_station,
+            "to": step.to_station,
+            "seconds": step.duration,
+            "joules": step.report.energy,
+            "clearance": None if step.is_pause else step.report.min_clearance,
+            "certified": None if step.is_pause else step.report.certified,
+            "load": step.load,
+            "power_mode": (step.power_mode or "STAND_ON_MOTORS") if step.is_pause else "",
+        }
+        for k, step in enumerate(movements, start=1)
+    ]
+
+
+def totals_of(plan: ProgramPlan) -> Row:
+    """Figures of the whole program."""
+    pauses = [step for step in plan.movements if step.is_pause]
+    standing = sum(step.duration for step in pauses), sum(step.report.energy for step in pauses)
+    return {
+        "program_id": plan.program_id,
+        "seconds": plan.report.duration,
+        "joules": plan.report.energy,
+        "moving_seconds": plan.report.duration - standing[0],
+        "moving_joules": plan.report.energy - standing[1],
+        "clearance": plan.report.min_clearance,
+        "certified": plan.report.certified,
+        "planning_seconds": plan.info.planning_time,
+        "truncated": plan.info.truncated,
+    }
+
+
+def sentences_of(plan: ProgramPlan, savings: Savings | None) -> list[str]:
+    """The totals for people, and what is saved."""
+    totals = totals_of(plan)
+    standing = totals["seconds"] - totals["moving_seconds"]
+    waiting = totals["joules"] - totals["moving_joules"]
+    proof = "free of collision and within all limits at every instant, proved"
+    lines = [
+        f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
+        f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
+        f"cycle {totals['seconds']:.2f} s, {totals['joules'] / J_PER_KWH:.4f} kWh from the mains; "
+        f"{proof if totals['certified'] else 'NOT certified'}",
+    ]
+    if totals["truncated"]:
+        lines.append("cut by --planning-time: more time may give a better program")
+    if savings is not None:
+        lines.append(f"saving: {savings.sentence}")
+    return lines

@@ -1,0 +1,170 @@
+"""Everything that is wrong with a cell file, in one run.
+
+The reader stops at the first error. Here what it refused is left out and the rest is read again, until
+nothing is wrong any more. Errors that only follow from what was left out (a missing key, a name that was in
+it) are not reported.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from ir_description.errors import CellFileError
+from ir_description.files.cell_reader import RobotSource, cell_of
+from ir_description.files.items import Item
+from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
+
+ERRORS_MAX = 100
+"""Errors of one file; after so many the rest is not looked for."""
+
+_PLACE = re.compile(r"[A-Za-z_]\w*(?:\[\d+\]|\.[A-Za-z_][\w-]*)*")
+_STEP = re.compile(r"\[(\d+)\]|([A-Za-z_][\w-]*)")
+_UNKNOWN_KEY = re.compile(r"has the unknown key '([^']*)'")
+_MISSING = re.compile(r"has no (\w+)|must have exactly one of")
+
+Step = str | int
+
+
+def cell_errors(
+    text: str, source: str, robots: RobotSource, folder: Path | None
+) -> tuple[CellFileError, ...]:
+    """All errors of the text of a cell, by line; none: it can be read."""
+    found: list[CellFileError] = []
+    try:
+        document = _Document(parse_yaml(text, source, CellFileError))
+    except CellFileError as error:
+        return (error,)
+    for _ in range(ERRORS_MAX):
+        try:
+            cell_of(Item(document.root, source, CellFileError, ""), robots, folder)
+            break
+        except CellFileError as error:
+            place = document.place_of(error.sentence)
+            if not document.follows(error.sentence, place):
+                found.append(CellFileError(source, error.line, document.renumbered(error.sentence, place)))
+            if not document.leave_out(place):
+                break
+    return tuple(sorted(found, key=lambda error: error.line))
+
+
+class _Document:
+    """A tree whose wrong parts are left out one after the other."""
+
+    def __init__(self, root: Node) -> None:
+        self.root = root
+        self._names: set[str] = set()  # that stood in what was left out
+        self._thinned: dict[int, Node] = {}  # by id: what misses something now, and what that is a part of
+        self._numbers: dict[int, list[int]] = {}  # of the entries that a list still has
+
+    def place_of(self, sentence: str) -> tuple[Step, ...]:
+        """The steps from the root to what a sentence blames; an unknown key is the last of them."""
+        found = _PLACE.match(sentence)
+        steps: list[Step] = []
+        for number, key in _STEP.findall(found.group()) if found else ():
+            step = int(number) if number else key
+            if self._child(self._at(tuple(steps)), step) is None:
+                break
+            steps.append(step)
+        unknown = _UNKNOWN_KEY.search(sentence)
+        return (*steps, unknown.group(1)) if unknown else tuple(steps)
+
+    def follows(self, sentence: str, place: tuple[Step, ...]) -> bool:
+        """Whether the error is only there because something was left out before."""
+        missing = _MISSING.search(sentence) is not None
+        thinned = any(id(node) in self._thinned for node in self._along(place))
+        return (missing and thinned) or any(f"'{name}' is unknown" in sentence for name in self._names)
+
+    def leave_out(self, place: tuple[Step, ...]) -> bool:
+        """Remove the smallest part at a place that stands for itself; False where there is none."""
+        while place and isinstance(place[-1], int) and not isinstance(self._at(place).content, dict):
+            place = place[:-1]  # a number of a vector is nothing without the others
+        if not place:
+            return False
+        *above, last = place
+        parent = self._at(tuple(above))
+        gone = self._child(parent, last)
+        if gone is None:
+            return False
+        self._names.update(_names_in(gone))
+        self._thinned.update((id(node), node) for node in self._along(tuple(above)))
+        if isinstance(parent.content, list):
+            assert isinstance(last, int)  # place_of gives a list numbers
+            del self._numbers_of(parent.content)[last]
+            del parent.content[last]
+        elif isinstance(parent.content, dict):
+            del parent.content[str(last)]
+        return True
+
+    def renumbered(self, sentence: str, place: tuple[Step, ...]) -> str:
+        """The sentence with the numbers that entries have in the file; without known names where some are
+        gone.
+        """
+        if self._names:
+            sentence = sentence.partition("; known are")[0] if "is unknown" in sentence else sentence
+        for steps in (place, place[:-1]):  # an unknown key stands after its mapping
+            if steps and sentence.startswith(_named(steps)):
+                return _named(self._in_file(steps)) + sentence[len(_named(steps)) :]
+        return sentence
+
+    def _in_file(self, place: tuple[Step, ...]) -> tuple[Step, ...]:
+        node, steps = self.root, list[Step]()
+        for step in place:
+            if isinstance(step, int) and isinstance(node.content, list):
+                steps.append(self._numbers_of(node.content)[step])
+            else:
+                steps.append(step)
+            node = self._at_child(node, step)
+        return tuple(steps)
+
+    def _numbers_of(self, entries: list[Node]) -> list[int]:
+        return self._numbers.setdefault(id(entries), list(range(len(entries))))
+
+    def _at(self, place: tuple[Step, ...]) -> Node:
+        node = self.root
+        for step in place:
+            node = self._at_child(node, step)
+        return node
+
+    def _along(self, place: tuple[Step, ...]) -> list[Node]:
+        """The nodes from the root to a place, without those that everything is a part of: the root (unless it
+        is the place) and its lists.
+        """
+        nodes = [self.root]
+        for step in place:
+            child = self._child(nodes[-1], step)
+            nodes += [child] if child is not None else []
+        first = 2 if len(nodes) > 1 and isinstance(nodes[1].content, list) else 1
+        return nodes[first:] if place else nodes
+
+    def _at_child(self, node: Node, step: Step) -> Node:
+        child = self._child(node, step)
+        assert child is not None  # place_of goes no farther
+        return child
+
+    def _child(self, node: Node, step: Step) -> Node | None:
+        if isinstance(node.content, list) and isinstance(step, int) and step < len(node.content):
+            return node.content[step]
+        if isinstance(node.content, dict) and step in node.content:
+            return node.content[str(step)].node
+        return None
+
+
+def _named(place: tuple[Step, ...]) -> str:
+    """A place as sentences name it."""
+    text = ""
+    for step in place:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text
+
+
+def _names_in(node: Node) -> Iterator[str]:
+    if isinstance(node.content, list):
+        for entry in node.content:
+            yield from _names_in(entry)
+    elif isinstance(node.content, dict):
+        for key, value in node.content.items():
+            if key == "name" and isinstance(value.node.content, Scalar):
+                yield value.node.content.text
+            yield from _names_in(value.node)
