@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from ir_cli.main import COMMAND_MODULES, HELP, WITHOUT_ROS, _parser, main
-from ir_cli.offline import plan_command
 from ir_description import load_cell
 from ir_planner import Planner
 
@@ -195,10 +194,9 @@ def test_what_can_not_be_planned_ends_with_one(capsys: pytest.CaptureFixture[str
 def test_an_interrupt_ends_with_130_and_a_clean_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(self: Planner, *_: object) -> None:
+    def interrupted(self: Planner, *_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan_command, "rows_of", lambda movements: [])
     monkeypatch.setattr(Planner, "plan_program", interrupted)
     assert main(["plan", "demo"]) == 130
     assert capsys.readouterr().out == ""

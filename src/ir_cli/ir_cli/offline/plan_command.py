@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from ir_msgs_py.report import PlannedMovement
-from ir_planner import ProgramPlan, Savings
+from ir_planner import ProgramPlan
 
 from .asking import add_cell, add_options, configuration_of, failed, options_of, planner_of, sentences
 from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
 
 J_PER_KWH = 3.6e6
+HOW_TO_SAVE = "--saving holds it against a common program in equal time, which takes some seconds more"
 COLUMNS: Columns = {
     "step": ("step", text),
     "kind": ("kind", text),
@@ -35,7 +36,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     plan.add_argument("--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)")
     plan.add_argument("--start", default="park", help="posture or joint values (park)")
     plan.add_argument(
-        "--saving", action="store_true", help="also against a common program in equal time: plans twice"
+        "--saving", action="store_true", help="hold it against a common program in equal time as well"
     )
     add_options(plan)
     add_formats(plan)
@@ -48,21 +49,20 @@ def run_plan(arguments: argparse.Namespace) -> int:
         planner, stations = planner_of(arguments.cell), tuple(arguments.stations)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         options = options_of(arguments)
-        plan = planner.plan_program(stations, arguments.cycle_time, options, start, line.show)
-        savings = None
-        if arguments.saving and plan.status.ok:
-            line.show("saving", 0, 1, 0.0)
-            savings = planner.plan_savings(stations, options, start).savings
+        plan = planner.plan_program(
+            stations, arguments.cycle_time, options, start, line.show, savings=arguments.saving
+        )
     if not plan.status.ok:
         return failed(plan.status.message)
     rows = rows_of(plan.movements)
     if arguments.json:
-        print_json({**totals_of(plan), "steps": rows, "saving": None if savings is None else asdict(savings)})
+        saving = asdict(plan.savings) if plan.savings.available else None
+        print_json({**totals_of(plan), "steps": rows, "saving": saving})
     elif arguments.csv:
         print_csv(rows)
     else:
         print_table(rows, COLUMNS)
-        sys.stdout.write("\n".join(sentences_of(plan, savings)) + "\n")
+        sys.stdout.write("\n".join(sentences_of(plan)) + "\n")
     return 0
 
 
@@ -102,7 +102,7 @@ def totals_of(plan: ProgramPlan) -> Row:
     }
 
 
-def sentences_of(plan: ProgramPlan, savings: Savings | None) -> list[str]:
+def sentences_of(plan: ProgramPlan) -> list[str]:
     """The totals for people, and what is saved."""
     totals = totals_of(plan)
     standing = totals["seconds"] - totals["moving_seconds"]
@@ -116,6 +116,5 @@ def sentences_of(plan: ProgramPlan, savings: Savings | None) -> list[str]:
     ]
     if totals["truncated"]:
         lines.append("cut by --planning-time: more time may give a better program")
-    if savings is not None:
-        lines.append(f"saving: {savings.sentence}")
+    lines.append(f"saving: {plan.savings.sentence if plan.savings.available else HOW_TO_SAVE}")
     return lines
