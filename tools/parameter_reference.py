@@ -5,24 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+from ir_cli.node_settings import FIXED, NODES
 from ir_msgs_py.settings import settings_table
-from ir_msgs_py.transitions import PREFIX, TransitionTimes
-from ir_planner import PlannerSettings
 from ir_planner.search import registered
-from ir_program_runner import LinkSettings, ProgramSettings
-from ir_recorder.settings import RecorderSettings
-from ir_sim_driver import (
-    LINKS,
-    ControllerSettings,
-    ControlSettings,
-    ExecutionSettings,
-    IdleTimes,
-    PlcSettings,
-)
-from ir_sim_driver.controller import SupervisionSettings
-from ir_sim_driver.node.parameters import NodeSettings
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "parameters.md"
@@ -31,24 +17,6 @@ HEAD = """# Parameters
 Written by `make docs` from the settings classes; edit those. A setting is the ROS parameter of the same
 name. It is checked against its range when the node starts and whenever it is changed.
 """
-FIXED = "fixed: "  # the node takes these at its start only
-NODES: dict[str, tuple[tuple[str, Any], ...]] = {
-    "ir_planner": (("", PlannerSettings()),),
-    "ir_sim_driver": (
-        ("", NodeSettings()),
-        ("", ControllerSettings()),
-        *(("", link()) for link in LINKS),
-        ("control.", ControlSettings()),
-        ("execution.", ExecutionSettings()),
-        ("supervision.", SupervisionSettings()),
-        (f"{FIXED}{PREFIX}", TransitionTimes()),
-        (PREFIX, IdleTimes()),
-        ("plc.", PlcSettings()),
-    ),
-    "ir_program_runner": (("", ProgramSettings()), (PREFIX, TransitionTimes()), ("", LinkSettings())),
-    "ir_recorder": (("", RecorderSettings()),),
-}
-"""Settings of each node with the prefix of their names."""
 
 
 def searches() -> str:

@@ -14,7 +14,7 @@ from ir_cli.processes import NodeCommand, NodeProcesses
 
 def write_module(folder: Path, name: str, body: str) -> dict[str, str]:
     (folder / f"{name}.py").write_text(body)
-    return {"PYTHONPATH": str(folder)}
+    return {"PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
 
 
 def wait_for(path: Path, text: str) -> None:

@@ -20,14 +20,17 @@ STOP_SECONDS = 10.0
 
 @dataclass(frozen=True)
 class NodeCommand:
-    """A node to start: the module that runs it, and its ROS parameters."""
+    """A node to start: the module that runs it, its ROS parameters, and its namespace ("" for none)."""
 
     module: str
     parameters: Mapping[str, object] = field(default_factory=dict)
+    namespace: str = ""
 
     def arguments(self) -> list[str]:
         """Return the command line; strings are quoted so that YAML keeps them strings."""
-        line = [sys.executable, "-m", self.module, "--ros-args", "--log-level", "warn"]
+        line = [sys.executable, "-m", "ir_cli.child", self.module, "--ros-args", "--log-level", "warn"]
+        if self.namespace:
+            line += ["-r", f"__ns:={self.namespace}"]
         for name, value in self.parameters.items():
             line += ["-p", f"{name}:={_yaml(value)}"]
         return line
@@ -52,7 +55,9 @@ def ending(code: int) -> str:
 
 
 class NodeProcesses:
-    """A group of node processes; leaving the context stops all that were started."""
+    """A group of node processes; leaving the context stops all that were started, and so does the end of
+    this process, however it ends.
+    """
 
     def __init__(self, log_folder: Path, environment: Mapping[str, str]) -> None:
         self._log_folder = log_folder
@@ -76,7 +81,7 @@ class NodeProcesses:
                 self._running[name] = subprocess.Popen(
                     command.arguments(),
                     env=self._environment,
-                    stdin=subprocess.DEVNULL,
+                    stdin=subprocess.PIPE,
                     stdout=log,
                     stderr=subprocess.STDOUT,
                     start_new_session=True,
@@ -110,6 +115,8 @@ class NodeProcesses:
             except subprocess.TimeoutExpired:
                 process.kill()
                 codes[name] = process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
         self._running.clear()
         return codes
 

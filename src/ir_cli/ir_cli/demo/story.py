@@ -7,7 +7,6 @@ clock is never scaled.
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from ir_cli.errors import DemonstrationError
 from ir_cli.nodes import cell_nodes
+from ir_cli.ports import UDP, free_port
 from ir_cli.processes import NodeProcesses
 from ir_cli.terminal import Progress
 from ir_description import Cell, cell_to_yaml, load_cell
@@ -60,7 +60,7 @@ class Demonstration:
         self._full_pauses = [step.dwell for step in full.program if step.kind == "PAUSE"]
         self._cell = with_short_pauses(full, LONGEST_PAUSE)
         self._options = PlanOptions(seed=seed)
-        self._link = LinkSettings(wake_port=free_udp_port())
+        self._link = LinkSettings(wake_port=free_port(UDP))
         self._loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
 
     def run(self) -> Outcome:
@@ -168,13 +168,6 @@ def _naming_the_dead(nodes: NodeProcesses) -> Iterator[None]:
         nodes.check()
         raise
     nodes.check()
-
-
-def free_udp_port() -> int:
-    """A port that is free now: another cell may run on this machine."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def with_short_pauses(cell: Cell, longest: float) -> Cell:

@@ -71,7 +71,8 @@ class Client:
         self._context = Context() if context is None else context
         if self._own_context:
             apply_network()
-            rclpy.init(context=self._context, domain_id=domain_id)
+            # a script's own words are none for ROS, which takes every "a:=b" for a remapping
+            rclpy.init(args=[], context=self._context, domain_id=domain_id)
         self.node = Node(
             node_name, namespace=namespace or None, context=self._context, start_parameter_services=False
         )

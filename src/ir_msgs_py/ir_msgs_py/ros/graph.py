@@ -37,6 +37,11 @@ class Graph:
             if "/_action/" not in name
         }
 
+    def nodes(self) -> list[str]:
+        """Full names of the nodes."""
+        found = self._node.get_node_names_and_namespaces()
+        return [f"{namespace.rstrip('/')}/{name}" for name, namespace in found]
+
     def publishers(self, topic: str) -> list[Any]:
         """End points that publish the topic."""
         infos: list[Any] = self._node.get_publishers_info_by_topic(topic)

@@ -1,0 +1,48 @@
+"""The settings of the four nodes, each with the prefix of its parameters' names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ir_msgs_py.settings import Setting, tree
+from ir_msgs_py.transitions import PREFIX, TransitionTimes
+from ir_planner import PlannerSettings
+from ir_program_runner import LinkSettings, ProgramSettings
+from ir_recorder.settings import RecorderSettings
+from ir_sim_driver import (
+    LINKS,
+    ControllerSettings,
+    ControlSettings,
+    ExecutionSettings,
+    IdleTimes,
+    PlcSettings,
+)
+from ir_sim_driver.controller import SupervisionSettings
+from ir_sim_driver.node.parameters import NodeSettings
+
+FIXED = "fixed: "  # the node takes these at its start only
+NODES: dict[str, tuple[tuple[str, Any], ...]] = {
+    "ir_planner": (("", PlannerSettings()),),
+    "ir_sim_driver": (
+        ("", NodeSettings()),
+        ("", ControllerSettings()),
+        *(("", link()) for link in LINKS),
+        ("control.", ControlSettings()),
+        ("execution.", ExecutionSettings()),
+        ("supervision.", SupervisionSettings()),
+        (f"{FIXED}{PREFIX}", TransitionTimes()),
+        (PREFIX, IdleTimes()),
+        ("plc.", PlcSettings()),
+    ),
+    "ir_program_runner": (("", ProgramSettings()), (PREFIX, TransitionTimes()), ("", LinkSettings())),
+    "ir_recorder": (("", RecorderSettings()),),
+}
+
+
+def parameters_of(node: str) -> dict[str, Setting]:
+    """Every parameter of a node by its full name."""
+    return {
+        f"{prefix.removeprefix(FIXED)}{name}": each
+        for prefix, settings in NODES[node]
+        for name, each in tree(settings).items()
+    }
