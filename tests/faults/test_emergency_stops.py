@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pymodbus.client import ModbusTcpClient
 
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
-from ir_msgs_py.plc import OperatingMode, PlcInputs
+from ir_msgs_py.plc import PlcInputs
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver import (
@@ -20,9 +22,11 @@ from ir_sim_driver import (
     TrajectoryGoal,
     make_simulation,
 )
-from ir_sim_driver.plc import SERVICE, TOPIC
+from ir_sim_driver.plc import BITS, SERVICE, TOPIC
 from ir_sim_driver.plc.modbus_link import ModbusTcp
-from ir_sim_driver.plc.modbus_map import COILS
+from ir_sim_driver.plc.modbus_map import COILS, MODBUS
+from ir_sim_driver.plc.modbus_pdu import answered
+from ir_sim_driver.plc.modbus_tables import ControllerTables
 
 QUICK = TransitionTimes(
     stand_on_brakes_enter=0.05,
@@ -63,7 +67,7 @@ class Cell:
 
     def bring_into(self, mode: Mode) -> None:
         """By the shortest route from standing on motors."""
-        self.run(1.0)
+        self.run(0.1)
         bits = {"BRAKES": "drives_off", "BUS_POWER_OFF": "ab", "HIBERNATION": "hib"}
         bit = next((bit for ending, bit in bits.items() if mode.name.endswith(ending)), None)
         if bit is not None:
@@ -81,8 +85,9 @@ class Cell:
                 self.driver.press(SERVICE, "ab", False)
         if mode is Mode.MOVING:
             q, rest = self.simulation.backend.q, np.zeros((2, 6))
-            names = self.simulation.robot.joint_names
-            goal = TrajectoryGoal(JointTrajectory.from_seconds(names, [0.0, 2.0], [q, q + 0.3], rest, rest))
+            home, names = np.array(self.simulation.cell.machine_home), self.simulation.robot.joint_names
+            target = home + (0.3 if np.abs(q - home).max() < 0.15 else 0.0)
+            goal = TrajectoryGoal(JointTrajectory.from_seconds(names, [0.0, 2.0], [q, target], rest, rest))
             self.simulation.execute(self.simulation.vet(goal, 0), 0)
             self.run(0.5)
         self.until(mode)
@@ -95,6 +100,23 @@ class Cell:
             self.run(0.1)
             self.driver.plc.wake()
         self.run(0.5)
+
+    def settle(self) -> None:
+        """Whatever it was doing, until it stands on motors or in the emergency stop, all levels at 0."""
+        for _ in range(20):
+            self.driver.plc.write_all_inputs(TOPIC, PlcInputs())
+            self.driver.plc.wake()
+            self.run(0.05)
+            if self.simulation.modes.mode in (Mode.EMERGENCY_STOP, Mode.STAND_ON_MOTORS):
+                return
+
+    def recover(self) -> None:
+        """Stand on motors, ready for anything."""
+        self.driver.recover()
+        self.driver.press(SERVICE, "drives_on", True)
+        self.run(0.1)
+        self.driver.press(SERVICE, "drives_on", False)
+        self.until(Mode.STAND_ON_MOTORS)
 
 
 @pytest.fixture
@@ -203,33 +225,51 @@ def test_a_modbus_client_that_writes_1_and_0_while_asleep_is_answered_and_latche
     assert cell.simulation.modes.mode is Mode.EMERGENCY_STOP
 
 
+def by_modbus_pulse(driver: Driver) -> None:
+    """As a field bus writes: 1, and 0 in the next request."""
+    tables, coil = ControllerTables(driver.plc, 2.0), COILS.index("emergency_stop")
+    assert answered(struct.pack(">BHH", 5, coil, 0xFF00), tables)[0] == 5
+    answered(struct.pack(">BHH", 5, coil, 0), tables)
+
+
+def traffic(driver: Driver, writer: str) -> None:
+    """A PLC writes all its levels again, and knows of no emergency stop."""
+    levels = replace(driver.plc.inputs(), emergency_stop=False)
+    if writer == TOPIC:
+        driver.plc.write_all_inputs(TOPIC, levels)
+    else:
+        driver.plc.write_inputs(writer, {bit: bool(getattr(levels, bit)) for bit in BITS})
+
+
 def lost(presses: int, seed: int) -> list[str]:
-    """Presses at random instants amid a PLC's traffic, and those of them that were not latched."""
+    """Presses in every mode at random instants amid a PLC's traffic, and those that were not latched."""
     generator = np.random.default_rng(seed)
     cell, missing = Cell(), []
+    every = (*PRESSES, by_modbus_pulse)
     for k in range(presses):
-        by, rate = PRESSES[int(generator.integers(3))], int(generator.choice([20, 100, 250]))
-        at = int(generator.integers(1, 60))
-        for tick in range(at + 10):
-            cell.run(0.002)
-            if tick % max(1, 500 // rate) == 0:
-                cell.driver.plc.write_all_inputs(TOPIC, PlcInputs(operating_mode=OperatingMode.EXT))
+        mode, press = MODES[k % len(MODES)], every[int(generator.integers(len(every)))]
+        rate, writer = int(generator.choice([20, 100, 250])), str(generator.choice([TOPIC, MODBUS]))
+        cell.bring_into(mode)
+        at = int(generator.integers(20))
+        for tick in range(at + 26):
             if tick == at:
-                by(cell.driver)
-        if cell.simulation.modes.mode is not Mode.EMERGENCY_STOP:
-            missing.append(f"press {k} {by.__name__} at {rate} Hz")
-        cell.driver.plc.write_all_inputs(TOPIC, PlcInputs())
-        cell.run(0.1)
-        cell.driver.recover()
-        cell.until(Mode.STAND_ON_MOTORS)
+                press(cell.driver)
+            if tick % (500 // rate) == 0:
+                traffic(cell.driver, writer)
+            cell.run(0.002)
+        latched = cell.simulation.stopped
+        cell.settle()
+        if not latched or cell.simulation.modes.mode is not Mode.EMERGENCY_STOP:
+            missing.append(f"press {k} {press.__name__} in {mode.name} at {rate} Hz of {writer}")
+        cell.recover()
     cell.driver.close()
     return missing
 
 
-def test_sixty_presses_amid_a_plcs_traffic_are_latched() -> None:
-    assert lost(60, seed=1) == []
+def test_eighty_presses_in_every_mode_amid_a_plcs_traffic_are_latched() -> None:
+    assert lost(84, seed=1) == []
 
 
 @pytest.mark.long
-def test_a_thousand_presses_amid_a_plcs_traffic_are_latched() -> None:
+def test_a_thousand_presses_in_every_mode_amid_a_plcs_traffic_are_latched() -> None:
     assert lost(1_000, seed=2) == []

@@ -26,7 +26,9 @@ _NS = 1_000_000_000
 # Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged yet. What
 # is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
 _STREAM = QoSProfile(depth=2000)
-_CLOCK_RATE = 200  # messages of /clock per second of real time at most: each wakes every node
+_CLOCK_RATE = (
+    125  # messages of /clock per second of real time at most, and at least 100: each wakes every node
+)
 
 
 class Streams:
