@@ -271,8 +271,8 @@ def attacked(cases: int, seed: int, backend: str = "ideal") -> tuple[Counter[str
 def test_three_hundred_hostile_requests_break_no_law() -> None:
     done, wrong = attacked(300, seed=1)
     assert wrong == []
-    assert {act.__name__ for act in ACTS} <= set(done)
-    assert done["goal"] > 0
+    assert {act.__name__ for act in ACTS} == {name.removesuffix(" refused") for name in done}
+    assert min(done[name] for name in ("goal", "harmless_goal", "broken_message", "press", "load")) > 0
 
 
 @pytest.mark.long

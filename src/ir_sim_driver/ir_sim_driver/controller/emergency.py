@@ -30,6 +30,11 @@ class EmergencyStop:
         self._running: Excursion | None = None
         self.excursion = 0.0
 
+    @property
+    def stopping(self) -> bool:
+        """Whether the robot still rolls on or slows down."""
+        return self._running is not None
+
     def start(self, sentence: str, braked: bool) -> None:
         """Switch the motors off; the goal ends with this sentence. braked: the brakes are closed."""
         executor, q = self._executor, self._backend.q

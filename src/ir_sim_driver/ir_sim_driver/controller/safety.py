@@ -31,6 +31,7 @@ class Safety:
         settings: SimulationSettings,
     ) -> None:
         self._backend, self._executor, self._plc, self._notices = backend, executor, plc, notices
+        self._tool = tool
         self._supervision = Supervision(robot, settings.dt, settings.supervision)
         reaction = round(settings.supervision.brake_reaction / settings.dt)
         self.emergency = EmergencyStop(backend, executor, tool, notices, reaction)
@@ -60,9 +61,8 @@ class Safety:
 
     def supervise(self, motors_on: bool, tube: float) -> None:
         """Look at the robot after a step; tube [m]: how far the tool may be from its command."""
-        executor, braking = self._executor, self.stopped or not motors_on
-        command = Command(executor.command, executor.deviation, tube)
-        fault = self._supervision.look(self._backend, command, braking)
+        command = Command(self._executor.command, self._deviation(motors_on), tube)
+        fault = self._supervision.look(self._backend, command, self.stopped or not motors_on)
         if fault is not None and not self.fault:
             self._stop_for(fault)
 
@@ -81,10 +81,20 @@ class Safety:
         q = self._backend.q
         if self._broken:
             self._backend.reset(q)
+        if not self.emergency.stopping:
             self._executor.hold(q)
         self.fault, self._broken = "", False
         self._supervision.recovered(q)
         self._plc.reset_stop()
+
+    def _deviation(self, motors_on: bool) -> float:
+        """How far the tool is from its command [m]; behind closed brakes, from where they closed."""
+        executor, q = self._executor, self._backend.q
+        if motors_on:
+            return executor.deviation
+        if self.emergency.stopping or self._broken or q is executor.command:
+            return 0.0
+        return self._tool.deviation(executor.command, q)
 
     def _stop_for(self, fault: Fault) -> None:
         """STOP 0: the brakes close at once, and stay so until somebody recovers."""

@@ -114,7 +114,7 @@ class Supervision:
         self._bounds = np.concatenate((high, -low, speed, speed, change, change))
 
     def look(self, backend: Backend, command: Command, braking: bool) -> Fault | None:
-        """What is wrong now. command: of the last step; braking: nobody follows it, the brakes close."""
+        """What is wrong now. command: of the last step; braking: motors are off, the brakes close or hold."""
         q = backend.q
         if q is self._seen and not backend.saturated:  # nothing has moved since
             self._speeds.clear()
@@ -125,9 +125,8 @@ class Supervision:
         change = self._change_of(qd, braking)
         everything = np.concatenate((q, -q, qd, -qd, change, -change))
         fault = None if (everything <= self._bounds).all() else self._exceeded(q, qd, change)
-        if braking:
-            return fault
-        return fault or self._left_tube(q, command) or self._saturation(backend)
+        fault = fault or self._left_tube(q, command)
+        return fault if braking else fault or self._saturation(backend)
 
     def _change_of(self, qd: FloatArray, braking: bool) -> FloatArray:
         """Change (n,) of the speed over the window; zero while it is not full."""
