@@ -75,7 +75,7 @@ def test_the_common_program_goes_to_the_nearest_configuration_every_time(movemen
 def test_a_movement_of_the_common_program_is_a_straight_segment_at_full_speed(
     common: CommonProgram,
 ) -> None:
-    across = [m for m in common.steps if m.kind == MovementKind.REGIONAL]
+    across = [m for m in common.steps() if m.kind == MovementKind.REGIONAL]
     assert (common.across, common.around) == (len(across), 0)
     for movement in across:
         trajectory = movement.trajectory
@@ -96,9 +96,9 @@ def test_both_programs_last_equally_long_and_the_planned_one_costs_less(
     assert savings.available
     assert compared is not None
     assert savings.program_id == compared.program_id != plan.program_id
-    seconds = sum(step.duration for step in common.steps)
+    seconds = sum(step.duration for step in common.steps())
     assert compared.report.duration == pytest.approx(seconds, abs=1e-4)
-    assert savings.movements.common == pytest.approx(sum(step.report.energy for step in common.steps))
+    assert savings.movements.common == pytest.approx(sum(step.report.energy for step in common.steps()))
     assert savings.total.planned == pytest.approx(compared.report.energy)
     assert 0.0 < savings.total.share < 0.4
     assert compared.report.certified
@@ -109,20 +109,20 @@ def test_both_programs_last_equally_long_and_the_planned_one_costs_less(
 def test_in_a_longer_cycle_both_programs_wait(
     planned: Callable[[float], ProgramPlan], common: CommonProgram
 ) -> None:
-    seconds = sum(step.duration for step in common.steps)
+    seconds = sum(step.duration for step in common.steps())
     plan = planned(seconds + 40.0)
     savings = plan.savings
     assert savings.program_id == plan.program_id  # the answer itself
     assert savings.movements.seconds == pytest.approx(plan.report.duration, abs=1e-4)
     assert savings.movements.planned == pytest.approx(plan.report.energy)
-    assert savings.movements.common > sum(step.report.energy for step in common.steps)
+    assert savings.movements.common > sum(step.report.energy for step in common.steps())
     assert "the common program waits 40.00 s at its end" in savings.sentence
 
 
 def test_a_cycle_that_the_common_program_cannot_keep_is_compared_in_its_own_time(
     planned: Callable[[float], ProgramPlan], common: CommonProgram
 ) -> None:
-    seconds = sum(step.duration for step in common.steps)
+    seconds = sum(step.duration for step in common.steps())
     plan = planned(0.98 * seconds)
     assert plan.report.duration == pytest.approx(0.98 * seconds, abs=1e-4)
     assert plan.savings.movements.seconds == pytest.approx(seconds, abs=1e-4)
@@ -154,14 +154,13 @@ def test_the_three_figures_are_kept_apart() -> None:
         step(regional, 1.0, 700.0),
         step(pause, 0.5, 300.0),  # the wait at the end belongs to the movements' time
     )
-    nowhere = cast(Choice, None)
-    savings = savings_of(CommonProgram(nowhere, common, 2, 1), (), planned)
+    program = CommonProgram(cast(Choice, None), {}, 1)
+    savings = savings_of(common, planned, 1, program)
     assert savings.movements == Saving(4000.0, 3000.0, 3.0)
     assert savings.movements.share == pytest.approx(0.25)
     assert savings.pauses == Saving(28_000.0, 20_000.0, 60.0)
     assert savings.total == Saving(32_000.0, 23_000.0, 63.0)
-    assert (savings.across, savings.around) == (2, 1)
-    waits = (step(pause, 10.0, 5000.0),)  # of the common program, in a longer cycle
-    longer = savings_of(CommonProgram(nowhere, common, 2, 1), waits, planned)
+    assert (savings.across, savings.around) == (0, 1)
+    longer = savings_of((*common, step(pause, 10.0, 5000.0)), planned, 1, program)  # both wait
     assert longer.movements == Saving(9000.0, 3000.0, 13.0)
     assert longer.pauses == savings.pauses

@@ -2,7 +2,7 @@
 
 from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
 from ir_planner.checks.clearance_checks import clearance_violation
-from ir_planner.checks.energy import holding_watts, movement_energy
+from ir_planner.checks.energy import MovementEnergy, carried, holding_watts, movement_energy
 from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
@@ -19,11 +19,13 @@ __all__ = [
     "Colour",
     "Evaluation",
     "FreeSpace",
+    "MovementEnergy",
     "Shape",
     "StateCheck",
     "TorqueProof",
     "Verification",
     "Violation",
+    "carried",
     "cell_shapes",
     "clearance_violation",
     "end_in_collision",

@@ -1,15 +1,15 @@
 """Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is always drawn.
 
 Energy = base + sum of the axes (signed) + dissipated + change of the capacitor. The power is taken at the
-middles of steps of at most 1 ms. Each movement starts with an empty capacitor; what is left in it at the
-end is not credited.
+middles of steps of at most 1 ms. Alone, a movement starts with an empty capacitor; what is left in it at the
+end is not credited, but given to the next movement of a program (`carried`).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ir_kernels import dc_bus
+from ir_kernels import DcBus, dc_bus
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene import PlanningScene
@@ -23,7 +23,8 @@ class MovementEnergy:
     """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), dissipated,
     capacitor.
 
-    peak [W] at the mains; times (N,) s (middles of the steps) and watts (N,) at the mains: its profile.
+    peak [W] at the mains; dt [s]: of the steps; times (N,) s (their middles) and watts (N,) at the mains: its
+    profile; axes (N,) W: what all joints together take from the DC bus (none: where nothing is shared).
     """
 
     total: float
@@ -32,8 +33,10 @@ class MovementEnergy:
     dissipated: float
     capacitor: float
     peak: float
+    dt: float
     times: FloatArray
     watts: FloatArray
+    axes: FloatArray
 
 
 def movement_energy(
@@ -49,18 +52,36 @@ def movement_energy(
     axes = np.concatenate([_axis_power(trajectory, scene, piece) for piece in pieces])
     if dt <= 0.0:  # a single point: nothing lasts
         nothing = np.zeros(0)
-        return MovementEnergy(0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, 0.0, nothing, nothing)
+        return MovementEnergy(0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, 0.0, dt, nothing, nothing, nothing)
     bus = dc_bus(axes, dt, scene.dc_bus)
-    watts = bus.mains + scene.base_watts
+    shares = scene.dc_bus.regeneration != "none"
+    taken = axes.sum(axis=1) if shares else np.zeros(0)
+    return _on_bus(bus, dt, scene.base_watts, axes.sum(axis=0) * dt, times, taken)
+
+
+def carried(energy: MovementEnergy, charge: float, scene: PlanningScene) -> MovementEnergy:
+    """The same movement begun with `charge` J in the capacitor."""
+    if charge <= 0.0 or not len(energy.axes):
+        return energy
+    bus = dc_bus(energy.axes[:, None], energy.dt, scene.dc_bus, charge)
+    return _on_bus(bus, energy.dt, scene.base_watts, energy.joints, energy.times, energy.axes)
+
+
+def _on_bus(
+    bus: DcBus, dt: float, base: float, joints: FloatArray, times: FloatArray, axes: FloatArray
+) -> MovementEnergy:
+    watts = bus.mains + base
     return MovementEnergy(
         total=float(watts.sum() * dt),
-        base=scene.base_watts * span,
-        joints=axes.sum(axis=0) * dt,
+        base=base * dt * len(times),
+        joints=joints,
         dissipated=float(bus.dissipated.sum() * dt),
         capacitor=float(bus.stored[-1]),
         peak=float(watts.max()),
+        dt=dt,
         times=times,
         watts=watts,
+        axes=axes,
     )
 
 

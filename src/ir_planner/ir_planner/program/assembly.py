@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
+from ir_planner.program.charge import Charge
 from ir_planner.program.pauses import Pause
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
@@ -58,9 +59,10 @@ def assembled(  # long: what a step does, in its order
     scenes: Scenes,
     start: FloatArray,
     pause: MakePause,
+    charge: Charge,
 ) -> tuple[PlannedMovement, ...]:
     """Movements and pauses in order, from start (n,). `legs`: by the step they belong to. pause: how pauses
-    are spent.
+    are spent. charge: what the capacitor holds at first; carried from step to step.
 
     A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
     """
@@ -71,7 +73,7 @@ def assembled(  # long: what a step does, in its order
         waiting = tuple(signal_text(signal) for signal in step.wait_for)
         setting = tuple(signal_text(signal) for signal in step.set_signals)
         leg = legs.get(k)
-        moves = [] if leg is None else _moves(leg)
+        moves = [] if leg is None else _moves(leg, charge)
         if leg is not None:
             here = leg.to_name
             q = leg.movements[-1][1].trajectory.positions[-1] if leg.movements else q
@@ -83,7 +85,8 @@ def assembled(  # long: what a step does, in its order
         if step.dwell > 0.0 or (not moves and (handling or waiting)):
             late = not moves
             scene = scenes.of(placed.after if moves else placed.before)
-            standing = pause(Pause(here, step.dwell, step.power_mode, q, scene))
+            spent = Pause(here, step.dwell, step.power_mode, q, scene)
+            standing = charge.stood(pause(spent), spent)
             result.append(
                 replace(
                     standing,
@@ -96,20 +99,19 @@ def assembled(  # long: what a step does, in its order
     return tuple(result)
 
 
-def _moves(leg: Leg) -> list[PlannedMovement]:
+def _moves(leg: Leg, charge: Charge) -> list[PlannedMovement]:
     moves = []
     for kind, movement in leg.movements:
         station = leg.station_of(kind)
-        moves.append(
-            PlannedMovement(
-                kind=kind,
-                from_station=station or leg.from_name,
-                to_station=station or leg.to_name,
-                trajectory_id=movement.trajectory.trajectory_id,
-                trajectory=movement.trajectory,
-                report=movement.report,
-                duration=movement.trajectory.duration,
-                load=leg.scene.load_text,
-            )
+        step = PlannedMovement(
+            kind=kind,
+            from_station=station or leg.from_name,
+            to_station=station or leg.to_name,
+            trajectory_id=movement.trajectory.trajectory_id,
+            trajectory=movement.trajectory,
+            report=movement.report,
+            duration=movement.trajectory.duration,
+            load=leg.scene.load_text,
         )
+        moves.append(charge.moved(step, movement))
     return moves

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from ir_msgs_py.report import PlannedMovement
 from ir_planner.program.assembly import assembled, legs_of
 from ir_planner.program.chain import parts_of
+from ir_planner.program.charge import Charge
 from ir_planner.program.ladder import Ladder
 from ir_planner.program.movements import Failure, Movements
 from ir_planner.program.pauses import AUTO, Pause, pause_by_itself, planned_pause
@@ -13,6 +14,7 @@ from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.station_graph import Chain, Part
 from ir_planner.timing import Movement
 
+_NO_WAIT = 1e-3  # s: durations are whole nanoseconds, stretched by millionths
 Steps = tuple[PlannedMovement, ...]
 Found = Mapping[Part, Movement]
 
@@ -52,28 +54,33 @@ class Choice:
             notes.append(f"{len(result)} movements")
         return result
 
-    def steps(self, found: Found, *, by_itself: bool = False) -> Steps:
-        """The steps of the program with these movements. by_itself: its pauses as the controller spends them
-        when nobody asks for a mode.
+    def steps(self, found: Found, *, until: float = 0.0, by_itself: bool = False) -> Steps:
+        """The steps of the program with these movements, and a wait at its end that lasts until `until` s.
+        by_itself: pauses as the controller spends them when nobody asks for a mode.
         """
         route, pause = self.movements.route, self._pause(by_itself)
+        charge = Charge(self.request.settings.transitions)
         legs = legs_of(route, parts_of(self.chain, self.movements), found)
-        return assembled(route.steps, legs, route.scenes, self.request.start, pause)
+        steps = assembled(route.steps, legs, route.scenes, self.request.start, pause, charge)
+        left = until - duration_of(steps)
+        if left <= _NO_WAIT:
+            return steps
+        wait = self._end(left)
+        return (*steps, charge.stood(pause(wait), wait))
 
     def standing(self, found: Found) -> float:
         """Seconds of the pauses in the program."""
         return sum(step.duration for step in self.steps(found) if step.is_pause)
 
-    def wait(self, seconds: float, *, by_itself: bool = False) -> PlannedMovement:
-        """A wait at the end of the program: in the mode of least energy, or as the controller spends it."""
+    def waiting(self, seconds: float) -> float:
+        """Joules of a wait at the end, in the mode of least energy."""
+        return self._pause(by_itself=False)(self._end(seconds)).report.energy
+
+    def _end(self, seconds: float) -> Pause:
         route = self.movements.route
         end = route.scenes.of(route.steps[-1].after)
         q = self.movements.layers[-1][self.chain.chosen[-1]].interaction
-        return self._pause(by_itself)(Pause(route.name(len(route) - 1), seconds, AUTO, q, end))
-
-    def waiting(self, seconds: float) -> float:
-        """Joules of a wait at the end."""
-        return self.wait(seconds).report.energy
+        return Pause(route.name(len(route) - 1), seconds, AUTO, q, end)
 
     def _pause(self, by_itself: bool) -> Callable[[Pause], PlannedMovement]:
         times = self.request.settings.transitions

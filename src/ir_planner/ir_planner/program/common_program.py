@@ -6,6 +6,7 @@ as fast as they can; the same pauses, left to the controller's own timers. Where
 movement runs along the planner's path in straight steps with blended corners; `around` counts these.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,14 +23,22 @@ from ir_planner.timing import Movement, baseline, straight_steps
 
 @dataclass(frozen=True, eq=False)
 class CommonProgram:
-    """Movements and pauses in order, and the chain they go along; `around` of its `across` regional movements
-    run around bodies.
+    """Its chain with the movements of all parts; `around` of its `across` regional movements run around
+    bodies.
     """
 
     choice: Choice
-    steps: Steps
-    across: int
+    found: Mapping[Part, Movement]
     around: int
+
+    @property
+    def across(self) -> int:
+        """How many regional movements it has."""
+        return sum(part.kind == ACROSS for part in self.found)
+
+    def steps(self, until: float = 0.0) -> Steps:
+        """Movements and pauses in order, and a wait at the end that lasts until `until` s."""
+        return self.choice.steps(self.found, until=until, by_itself=True)
 
 
 def common_program(choice: Choice) -> CommonProgram:
@@ -47,8 +56,7 @@ def common_program(choice: Choice) -> CommonProgram:
             plain, by_path = _planned(part, fastest), part.kind == ACROSS
             around += by_path
         chosen[part] = plain
-    across = sum(part.kind == ACROSS for part in chosen)
-    return CommonProgram(nearest, nearest.steps(chosen, by_itself=True), across, around)
+    return CommonProgram(nearest, chosen, around)
 
 
 def nearest_chain(movements: Movements) -> Chain:

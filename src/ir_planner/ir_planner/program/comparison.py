@@ -14,8 +14,6 @@ from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.savings import savings_of
 
-_SAME = 1e-3  # s: a shorter wait is none
-
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -36,17 +34,23 @@ def held_against_common(
     with choice.movements.context.journal.stage("savings") as notes:
         try:
             common = common_program(choice)
-            seconds = duration_of(common.steps)
+            plain = common.steps()
+            seconds = duration_of(plain)
             if cycle_time >= seconds:
-                left = cycle_time - seconds
-                waits = (common.choice.wait(left, by_itself=True),) if left > _SAME else ()
+                waiting = common.steps(until=cycle_time)
                 words = f"both in the cycle time of {cycle_time:g} s"
-                words += f", of which the common program waits {left:.2f} s at its end" if waits else ""
-                return Comparison(savings_of(common, waits, own), own, words)
+                if len(waiting) > len(plain):
+                    words += f", of which the common program waits {waiting[-1].duration:.2f} s at its end"
+                savings = savings_of(waiting, own, _pauses(plain), common)
+                return Comparison(savings, own, words)
             steps = timed_choice(choice, seconds, standing, progress).steps
         except (StageError, RequestError) as error:
             notes.append("none")
             return f"no savings: {error}"
         words = f"both in the common program's {seconds:.2f} s"
         words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
-        return Comparison(savings_of(common, (), steps), steps, words)
+        return Comparison(savings_of(plain, steps, _pauses(plain), common), steps, words)
+
+
+def _pauses(steps: Steps) -> int:
+    return sum(step.is_pause for step in steps)

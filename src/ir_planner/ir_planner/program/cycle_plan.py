@@ -7,7 +7,7 @@ import numpy as np
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain
-from ir_planner.program.choice import Choice, Steps, duration_of
+from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.cycle_time import Task, Timed, shared_out
 from ir_planner.program.ladder import FASTEST
 from ir_planner.program.request import Progress, StageError
@@ -30,10 +30,8 @@ class TimedChoice:
     @property
     def steps(self) -> Steps:
         """The steps of the program, with the wait that fills its cycle."""
-        planned = self.choice.steps(self.timed.movements)
-        if self.timed.wait <= 0.0:
-            return planned
-        return (*planned, self.choice.wait(self.cycle_time - duration_of(planned)))
+        until = self.cycle_time if self.timed.wait > 0.0 else 0.0
+        return self.choice.steps(self.timed.movements, until=until)
 
 
 def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: Progress) -> TimedChoice:

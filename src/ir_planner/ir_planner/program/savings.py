@@ -14,20 +14,23 @@ from ir_planner.program.choice import Steps, duration_of
 from ir_planner.program.common_program import CommonProgram
 
 
-def savings_of(common: CommonProgram, waits: Steps, planned: Steps) -> ProgramSavings:
-    """The savings of a program over a common one with the same pauses in the same time; both may wait at
-    their ends (waits: of the common one).
+def savings_of(common: Steps, planned: Steps, pauses: int, program: CommonProgram) -> ProgramSavings:
+    """The savings of `planned` steps over those of the common `program` in the same time; the first `pauses`
+    of both are the program's own, one more is a wait at the end.
     """
-    pauses = [step for step in common.steps if step.is_pause]
-    own = [step for step in planned if step.is_pause][: len(pauses)]
-    moved = (*(step for step in common.steps if not step.is_pause), *waits)
+    standing, own = (_first_pauses(steps, pauses) for steps in (common, planned))
+    seconds = duration_of(common) - duration_of(standing)
     return ProgramSavings(
         available=True,
-        movements=Saving(_energy(moved), _energy(planned) - _energy(own), duration_of(moved)),
-        pauses=Saving(_energy(pauses), _energy(own), duration_of(pauses)),
-        across=common.across,
-        around=common.around,
+        movements=Saving(_energy(common) - _energy(standing), _energy(planned) - _energy(own), seconds),
+        pauses=Saving(_energy(standing), _energy(own), duration_of(standing)),
+        across=program.across,
+        around=program.around,
     )
+
+
+def _first_pauses(steps: Steps, count: int) -> list[PlannedMovement]:
+    return [step for step in steps if step.is_pause][:count]
 
 
 def named(savings: ProgramSavings, program_id: str, compared: str) -> ProgramSavings:

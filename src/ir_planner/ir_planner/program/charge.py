@@ -1,0 +1,52 @@
+"""The charge of the DC link's capacitor, carried from step to step of a program.
+
+A movement leaves what its braking gave, the next one takes it first. While the motors hold the arm the charge
+feeds the holding torque; with the brakes closed it stays.
+"""
+
+from dataclasses import replace
+
+from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.transitions import TransitionTimes
+from ir_planner.checks import carried, holding_watts
+from ir_planner.program.pauses import Pause
+from ir_planner.program.standby import MOTORS
+from ir_planner.timing import Movement
+
+
+class Charge:
+    """stored [J] after the steps so far; empty at first."""
+
+    def __init__(self, times: TransitionTimes) -> None:
+        self.stored, self._times = 0.0, times
+
+    def moved(self, step: PlannedMovement, movement: Movement) -> PlannedMovement:
+        """The step of a movement with the energy that it takes from the mains now."""
+        alone = movement.evaluation.energy
+        energy = carried(alone, self.stored, movement.context.scene)
+        self.stored = energy.capacitor
+        report = step.report
+        if energy is not alone:
+            report = replace(
+                report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=energy.peak
+            )
+        return replace(step, report=report)
+
+    def stood(self, step: PlannedMovement, pause: Pause) -> PlannedMovement:
+        """The step of a pause, whose holding torque takes the charge first."""
+        scene = pause.scene
+        watts = holding_watts(pause.q, scene) - scene.base_watts
+        fed = min(self.stored, max(watts, 0.0) * self._holding(step, pause))
+        self.stored -= fed
+        report = step.report
+        energy = report.energy - fed
+        return replace(step, report=replace(report, energy=energy, base_energy=energy))
+
+    def _holding(self, step: PlannedMovement, pause: Pause) -> float:
+        """How long the motors hold the arm [s]; the controller's own timer closes the brakes long after the
+        charge has gone.
+        """
+        mode, times = step.power_mode or MOTORS, self._times
+        if mode == MOTORS:
+            return pause.seconds
+        return min(times.enter(mode) + times.leave(mode), pause.seconds)
