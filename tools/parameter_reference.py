@@ -30,8 +30,8 @@ def searches() -> str:
 
 def table(node: str) -> Iterator[str]:
     """Lines of the table of a node's parameters."""
-    for k, (prefix, settings) in enumerate(NODES[node]):
-        lines = settings_table(settings, prefix.removeprefix(FIXED)).splitlines()
+    for k, (prefix, make) in enumerate(NODES[node]):
+        lines = settings_table(make(), prefix.removeprefix(FIXED)).splitlines()
         yield from () if k else lines[:2]
         for line in lines[2:]:
             yield f"{line[:-2]} Fixed at start. |" if prefix.startswith(FIXED) else line

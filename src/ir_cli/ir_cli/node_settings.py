@@ -1,7 +1,8 @@
-"""The settings of the four nodes, each with the prefix of its parameters' names."""
+"""The settings classes of the four nodes, each with the prefix of its parameters' names."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from ir_msgs_py.settings import Setting, tree
@@ -21,21 +22,21 @@ from ir_sim_driver.controller import SupervisionSettings
 from ir_sim_driver.node.parameters import NodeSettings
 
 FIXED = "fixed: "  # the node takes these at its start only
-NODES: dict[str, tuple[tuple[str, Any], ...]] = {
-    "ir_planner": (("", PlannerSettings()),),
+NODES: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {
+    "ir_planner": (("", PlannerSettings),),
     "ir_sim_driver": (
-        ("", NodeSettings()),
-        ("", ControllerSettings()),
-        *(("", link()) for link in LINKS),
-        ("control.", ControlSettings()),
-        ("execution.", ExecutionSettings()),
-        ("supervision.", SupervisionSettings()),
-        (f"{FIXED}{PREFIX}", TransitionTimes()),
-        (PREFIX, IdleTimes()),
-        ("plc.", PlcSettings()),
+        ("", NodeSettings),
+        ("", ControllerSettings),
+        *(("", link) for link in LINKS),
+        ("control.", ControlSettings),
+        ("execution.", ExecutionSettings),
+        ("supervision.", SupervisionSettings),
+        (f"{FIXED}{PREFIX}", TransitionTimes),
+        (PREFIX, IdleTimes),
+        ("plc.", PlcSettings),
     ),
-    "ir_program_runner": (("", ProgramSettings()), (PREFIX, TransitionTimes()), ("", LinkSettings())),
-    "ir_recorder": (("", RecorderSettings()),),
+    "ir_program_runner": (("", ProgramSettings), (PREFIX, TransitionTimes), ("", LinkSettings)),
+    "ir_recorder": (("", RecorderSettings),),
 }
 
 
@@ -43,6 +44,6 @@ def parameters_of(node: str) -> dict[str, Setting]:
     """Every parameter of a node by its full name."""
     return {
         f"{prefix.removeprefix(FIXED)}{name}": each
-        for prefix, settings in NODES[node]
-        for name, each in tree(settings).items()
+        for prefix, make in NODES[node]
+        for name, each in tree(make()).items()
     }
