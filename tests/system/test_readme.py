@@ -41,25 +41,41 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     assert process.wait(30) == 130
 
 
-def shell(line: str) -> subprocess.CompletedProcess[str]:
+def shell(line: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     assert line.startswith(".venv/bin/ir ")
     command = subprocess.list2cmdline(IR) + line.removeprefix(".venv/bin/ir")
     return subprocess.run(
-        command, shell=True, capture_output=True, text=True, timeout=120, env=dict(os.environ), check=False
+        command,
+        shell=True,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=dict(os.environ),
+        check=False,
+        cwd=folder,
     )
 
 
 def test_the_readme_names_the_two_commands_and_starts_the_nodes_first() -> None:
     assert "make demo" in README
     assert "make test" in README
-    assert commands()[0] == START
-    assert len(commands()) >= 10
+    _, service_calls, _ = blocks("bash")
+    assert service_calls.startswith(START)
+    assert len(commands()) >= 17
+
+
+def test_what_needs_no_ros_runs_before_anything_is_started(tmp_path: Path) -> None:
+    for line in commands()[: len(blocks("bash")[0].splitlines())]:
+        done = shell(line, tmp_path)
+        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+        assert done.stdout
 
 
 @pytest.mark.usefixtures("nodes")
 def test_every_line_of_the_readme_runs() -> None:
-    service_calls, plc = blocks("bash")[:2]
-    for line in commands()[1 : len(service_calls.splitlines())]:
+    offline, service_calls, plc = blocks("bash")
+    first = len(offline.splitlines())
+    for line in commands()[first + 1 : first + len(service_calls.splitlines())]:
         done = shell(line)
         assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
     for script in [blocks("python")[0], (ROOT / "examples" / "plan_and_drive.py").read_text()]:

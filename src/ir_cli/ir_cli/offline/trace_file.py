@@ -30,6 +30,7 @@ def write_trace(path: Path, trajectory: JointTrajectory) -> None:
     given = [(ending, each) for ending, each in zip(ENDINGS, kinds, strict=True) if each is not None]
     header = ["time", *(f"{name}{ending}" for ending, _ in given for name in names)]
     rows = np.column_stack([trajectory.times, *(values for _, values in given)])
+    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
