@@ -1,27 +1,36 @@
-"""What does the driver survive: goals that run away, lost emergency stops, loads that no wrist can carry?
+"""What does the driver survive: goals that run away, lost emergency stops, impossible loads, floods?
 
     python benchmarks/hostile.py [--seeds N] [--quick] [--json FILE]
 
 The cases and their independent judge are those of tests/faults, with other seeds: finite differences of the
-executed positions against the robot's limits, presses of the emergency stop amid a PLC's traffic, random
-loads on the physics.
+executed positions against the robot's limits, presses of the emergency stop in every mode amid a PLC's
+traffic, random loads on the physics, requests of every kind in any order, deviations in every mode. Then the
+node is flooded as a process of its own: what it loses, and its memory, descriptors, threads and log.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import resource
 import time
+from collections import Counter
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+from _hostile_node import attack
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
 
 from ir_description import load_cell
+from ir_msgs_py import names
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver import Driver, TrajectoryGoal, make_simulation
 
 FAULTS = Path(__file__).resolve().parents[1] / "tests" / "faults"
 FIRST_SEED = 1_000  # none that a test uses
+HOUR = 3600.0  # s
 
 
 def cases_of(name: str) -> ModuleType:
@@ -61,11 +70,56 @@ def load_row(cases: int, seed: int) -> dict[str, Any]:
     return {"case": "loads", "seed": seed, "cases": cases, "carried": carried, "failed": len(wrong)}
 
 
+def fuzz_row(cases: int, seed: int) -> dict[str, Any]:
+    """Hostile requests of every kind, and how many laws were broken."""
+    done, wrong = cases_of("test_fuzz_driver").attacked(cases, seed)
+    return {"case": "fuzz", "seed": seed, "cases": cases, "taken": _taken(done), "broken": len(wrong)}
+
+
+def _taken(done: Counter[str]) -> int:
+    return sum(count for name, count in done.items() if not name.endswith("refused"))
+
+
+def deviation_row(cases: int, seed: int) -> dict[str, Any]:
+    """Deviations in every mode, and how many the supervision judged wrongly."""
+    large, wrong = cases_of("test_fuzz_supervision").unseen(cases, seed)
+    return {"case": "deviations", "seed": seed, "cases": cases, "large": large, "wrong": len(wrong)}
+
+
+def driving_row(seconds: float) -> dict[str, Any]:
+    """Simulated driving without a pause, stepped: memory of this process after a tenth and at the end."""
+    simulation = make_simulation("open", backend="ideal")
+    driver = Driver(simulation)
+    generator, home = np.random.default_rng(FIRST_SEED), np.array(simulation.cell.machine_home)
+    stamp, early = 0, 0.0
+    while simulation.time < seconds:
+        target = home + generator.uniform(-0.4, 0.4, 6)
+        path = JointTrajectory.from_seconds(names.JOINT_NAMES, [2.5], target[None], np.zeros((1, 6)))
+        simulation.execute(simulation.vet(TrajectoryGoal(path), stamp), stamp)
+        for _ in range(1_300):
+            stamp += 2_000_000
+            driver.tick(stamp)
+        simulation.notices.take()
+        if simulation.time > 0.1 * seconds:
+            early = early or memory()
+    driver.close()
+    return {"case": "driving", "s": seconds, "rss_mb_before": early, "rss_mb_after": memory()}
+
+
+def memory() -> float:
+    """Resident memory of this process [MB]."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+
+
 def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     """Counts over all seeds."""
 
     def total(case: str, key: str) -> int:
         return sum(row[key] for row in rows if row["case"] == case)
+
+    def grown(case: str, key: str) -> float:
+        of_case = (row for row in rows if row["case"] == case)
+        return max((float(row[f"{key}_after"] - row[f"{key}_before"]) for row in of_case), default=0.0)
 
     return [
         at_least("goals that were accepted and judged", total("goals", "accepted"), "", 10),
@@ -73,6 +127,14 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
         at_most("emergency stops lost", total("stops", "lost"), "", 0),
         at_least("loads carried", total("loads", "carried"), "", 10),
         at_most("loads that made the physics fail", total("loads", "failed"), "", 0),
+        at_most("laws broken by requests of every kind", total("fuzz", "broken"), "", 0),
+        at_most("deviations judged wrongly", total("deviations", "wrong"), "", 0),
+        at_most("requests and presses of the node lost", total("node", "lost"), "", 0),
+        at_most("memory that driving takes", grown("driving", "rss_mb"), "MB", 5.0),
+        at_most("memory that the node gains, at most", grown("node", "rss_mb"), "MB", 30.0),
+        at_most("descriptors that the node gains, at most", grown("node", "descriptors"), "", 2),
+        at_most("threads that the node gains, at most", grown("node", "threads"), "", 1),
+        at_most("log that the node writes, at most", grown("node", "log_kb"), "kB", 1_000.0),
     ]
 
 
@@ -82,15 +144,22 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=4, help="default: 4")
-    add_ending(parser, "1 seed, 300 goals, 60 presses, 60 loads")
+    add_ending(parser, "1 seed, 300 goals, 84 presses, 60 loads, 300 requests, 10 minutes of driving")
     given = parser.parse_args()
-    goals, presses, loads = (300, 60, 60) if given.quick else (4_000, 1_000, 500)
+    counts = (300, 84, 60, 300, 70) if given.quick else (4_000, 1_000, 500, 5_000, 500)
+    makers = (goal_row, stop_row, load_row, fuzz_row, deviation_row)
     rows: list[dict[str, Any]] = []
-    for k in range(1 if given.quick else given.seeds):
-        seed = FIRST_SEED + k
-        for row in (goal_row(goals, seed), stop_row(presses, seed), load_row(loads, seed)):
-            rows.append(row)
-            print(line_of(row), flush=True)
+
+    def show(row: dict[str, Any]) -> None:
+        rows.append(row)
+        print(line_of(row), flush=True)
+
+    show(driving_row(HOUR / 6.0 if given.quick else HOUR))
+    for seed in range(FIRST_SEED, FIRST_SEED + (1 if given.quick else given.seeds)):
+        for make, count in zip(makers, counts, strict=True):
+            show(make(count, seed))
+    for row in attack(200, 12) if given.quick else attack(5_000, 334):
+        show(row)
     finish(given.json, rows, claims_of(rows))
 
 
