@@ -6,6 +6,8 @@ from collections import deque
 from enum import IntEnum
 from typing import NamedTuple
 
+from ir_msgs_py.checks import one_line
+
 
 class Level(IntEnum):
     """How bad it is; numbers of diagnostic_msgs/DiagnosticStatus."""
@@ -31,8 +33,8 @@ class Notices:
         self.last: Notice | None = None
 
     def add(self, level: Level, sentence: str) -> None:
-        """Keep the notice."""
-        notice = Notice(level, sentence)
+        """Keep the notice, as one bounded line."""
+        notice = Notice(level, one_line(sentence))
         if not self._pending or self._pending[-1] != notice:
             self._pending.append(notice)
         self.last = notice

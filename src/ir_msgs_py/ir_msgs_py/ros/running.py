@@ -11,6 +11,8 @@ import os
 import signal
 import sys
 import threading
+import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
@@ -20,11 +22,14 @@ from rclpy.executors import Executor, ExternalShutdownException, ShutdownExcepti
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.network import apply_network
 
 N = TypeVar("N", bound=Node)
 _POLL = 0.1  # s
+FAILURES_MAX, FAILURES_WITHIN = 50, 60.0
+"""So many callbacks may fail within so many seconds: a node that fails more often does nothing useful."""
 
 
 class Spinning:
@@ -88,7 +93,7 @@ def run_node(
         try:
             spins = executor()
             spins.add_node(node)
-            spinning.run(spins, None if goes_on is None else lambda: goes_on(node))
+            spin(spinning, spins, node, None if goes_on is None else lambda: goes_on(node))
             spins.remove_node(node)
         finally:
             node.destroy_node()
@@ -98,6 +103,20 @@ def run_node(
     finally:
         rclpy.try_shutdown()
     return 0
+
+
+def spin(spinning: Spinning, executor: Executor, node: Node, goes_on: Callable[[], bool] | None) -> None:
+    """Spin to the end; what a callback raises is logged, and ends the node only when it comes too often."""
+    failures: deque[float] = deque(maxlen=FAILURES_MAX)
+    while True:
+        try:
+            return spinning.run(executor, goes_on)
+        except Exception as error:  # one callback must not end the node for all others
+            now = time.monotonic()
+            if len(failures) == FAILURES_MAX and now - failures[0] < FAILURES_WITHIN:
+                raise
+            failures.append(now)
+            node.get_logger().error(one_line(f"a callback failed: {error!r}"))
 
 
 def _on_signals(act: Callable[[], None]) -> None:

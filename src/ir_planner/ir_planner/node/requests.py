@@ -3,7 +3,6 @@
 Whatever makes no sense is answered by its status: the node lives on and its state is unchanged.
 """
 
-import traceback
 from collections.abc import Callable
 from typing import Any
 
@@ -15,6 +14,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError, PoseError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.refusals import answered, unexpected
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -28,7 +28,6 @@ from ir_planner.node.answers import (
     fill_service,
     fill_standby,
     fill_state_check,
-    fill_status,
     fill_stored_program,
     stations_to_msg,
 )
@@ -46,8 +45,8 @@ from ir_planner.program import ProgramPlan
 from ir_planner.service import ServicePlan
 
 
-def refused(error: Exception) -> Status:
-    """The status of a request that an error ended."""
+def known_status(error: Exception) -> Status | None:
+    """The status of a request that an error ended, None for one that nobody thought of."""
     if isinstance(error, RequestError):
         return error.status
     if isinstance(error, CancelledError):
@@ -60,7 +59,12 @@ def refused(error: Exception) -> Status:
         return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error))
     if isinstance(error, (PlannerError, KernelError)):
         return Status(StatusCode.FAILURE, str(error))
-    return Status(StatusCode.FAILURE, f"unexpected {type(error).__name__}: {error}")
+    return None
+
+
+def refused(error: Exception) -> Status:
+    """The status of a request that an error ended."""
+    return known_status(error) or unexpected(error)
 
 
 class Requests:
@@ -92,13 +96,7 @@ class Requests:
         """The handler as a service callback: its status goes into the response, whatever happens."""
 
         def callback(request: Any, response: Any) -> Any:
-            try:
-                status = handler(request, response)
-            except Exception as error:  # one request must not end the node for all others
-                status = refused(error)
-                if status.code == StatusCode.FAILURE:
-                    self.log(traceback.format_exc())
-            return fill_status(response, status, PLANNER)
+            return answered(response, PLANNER, lambda: handler(request, response), known_status, self.log)
 
         return callback
 

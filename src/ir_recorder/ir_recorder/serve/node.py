@@ -8,10 +8,9 @@ from typing import Any, Protocol
 from rclpy.node import Node
 
 from ir_msgs.srv import StartRecording, StopRecording
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.quality import SERVICE
+from ir_msgs_py.ros.refusals import answered
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.errors import NothingRecordedError, RecorderError
 from ir_recorder.write.writer import RecordingSummary
@@ -40,6 +39,7 @@ class Services:
 
     def __init__(self, node: Node, recorder: Recorder) -> None:
         self._recorder, self._source = recorder, node.get_name()
+        self._log = node.get_logger().error
         node.create_service(StartRecording, "~/start", self._on_start, qos_profile=SERVICE)
         node.create_service(StopRecording, "~/stop", self._on_stop, qos_profile=SERVICE)
 
@@ -64,14 +64,13 @@ class Services:
         return self._answer(response, stop)
 
     def _answer(self, response: Any, work: Callable[[], str]) -> Any:
-        try:
-            code, sentence = StatusCode.SUCCESS, work()
-        except (RecorderError, MsgsError) as error:
-            code, sentence = StatusCode.FAILURE, str(error)
-        except Exception as error:  # a bug in one answer must not end a recording
-            code, sentence = StatusCode.FAILURE, f"the request failed: {error!r}"
-        response.status = status_to_msg(Status(code, one_line(sentence), self._source))
-        return response
+        return answered(response, self._source, lambda: Status.success(work()), _known, self._log)
+
+
+def _known(error: Exception) -> Status | None:
+    if isinstance(error, (RecorderError, MsgsError)):
+        return Status(StatusCode.FAILURE, str(error))
+    return None
 
 
 def without_publisher(topics: Sequence[str], when: str) -> str:

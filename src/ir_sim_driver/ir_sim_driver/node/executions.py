@@ -6,6 +6,7 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
 
+from ir_msgs_py.checks import one_line
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.motion import ErrorCode, Outcome
 from ir_sim_driver.node.messages import fill_points, goal_from_action
@@ -101,7 +102,7 @@ class Executions:
 
     def _result(self, handle: Any, outcome: Outcome) -> Any:
         result = self._type.Result()
-        result.error_code, result.error_string = int(outcome.code), outcome.sentence
+        result.error_code, result.error_string = int(outcome.code), one_line(outcome.sentence)
         if hasattr(result, "max_tool_deviation"):  # ours; FollowJointTrajectory knows neither
             result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
         if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):

@@ -12,7 +12,8 @@ import numpy as np
 
 from ir_description import Cell
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import plc_inputs_to_msg, power_mode_to_msg, status_to_msg
+from ir_msgs_py.ros.conversions import plc_inputs_to_msg, power_mode_to_msg
+from ir_msgs_py.ros.refusals import answered
 from ir_msgs_py.status import Status, StatusCode
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.errors import DriverError, RequestRefusedError
@@ -100,13 +101,12 @@ class Services:
 
     def _answer(self, response: Any, work: Callable[[], str]) -> Any:
         """Run `work`; what it returns is the remark, what it raises the refusal."""
-        try:
-            answer = Status.success(work(), self._source)
-        except RequestRefusedError as error:
-            answer = Status(error.code, str(error), self._source)
-        except (MsgsError, DriverError) as error:
-            answer = Status(StatusCode.FAILURE, str(error), self._source)
-        except Exception as error:  # a bug in one answer must not end the node
-            answer = Status(StatusCode.FAILURE, f"the request failed: {error!r}"[:500], self._source)
-        response.status = status_to_msg(answer)
-        return response
+        return answered(response, self._source, lambda: Status.success(work()), _known, self._driver.warn)
+
+
+def _known(error: Exception) -> Status | None:
+    if isinstance(error, RequestRefusedError):
+        return Status(error.code, str(error))
+    if isinstance(error, (MsgsError, DriverError)):
+        return Status(StatusCode.FAILURE, str(error))
+    return None

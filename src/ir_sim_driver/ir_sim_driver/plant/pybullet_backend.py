@@ -104,29 +104,38 @@ class PyBulletBackend:
         raise BackendError(f"PyBullet cannot compute with the inertia of {names or 'the robot'}")
 
     def _build(self) -> None:
-        text = self._urdf(self._robot, self._loads)
-        bullet = self._bullet
-        # a new server: the inverse dynamics of a removed body live on in the old one
-        if bullet.isConnected(self._client):
-            bullet.disconnect(physicsClientId=self._client)
-        self._client = client = _connect(bullet, self._dt, self._gravity)
+        """Make a new server: the inverse dynamics of a removed body live on in the old one. Where that is not
+        possible the old one stays.
+        """
+        text, old = self._urdf(self._robot, self._loads), self._client
+        self._client = _connect(self._bullet, self._dt, self._gravity)
+        try:
+            self._body = self._load(text)
+        except (OSError, BackendError) as error:
+            self._bullet.disconnect(physicsClientId=self._client)
+            self._client = old
+            raise BackendError(f"PyBullet can't be given the robot: {error}") from error
+        if self._bullet.isConnected(old):
+            self._bullet.disconnect(physicsClientId=old)
+        self._prepare()
+
+    def _load(self, text: str) -> int:
+        """The body of a URDF."""
         file = os.memfd_create("robot.urdf")  # a full or read-only disk is no reason to have no robot
         try:
             os.write(file, text.encode())
-            path, flags = f"/proc/self/fd/{file}", bullet.URDF_USE_INERTIA_FROM_FILE
-            self._body = self._call(bullet.loadURDF, path, useFixedBase=True, flags=flags)
+            path, flags = f"/proc/self/fd/{file}", self._bullet.URDF_USE_INERTIA_FROM_FILE
+            return int(self._call(self._bullet.loadURDF, path, useFixedBase=True, flags=flags))
         finally:
             os.close(file)
+
+    def _prepare(self) -> None:
+        """Take from the body what Bullet adds: damping, collisions, motors."""
+        bullet, client = self._bullet, self._client
+        undamped = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0.0)
         self._joints = self._movable_joints()
         for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
-            bullet.changeDynamics(
-                self._body,
-                link,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                jointDamping=0.0,
-                physicsClientId=client,
-            )
+            bullet.changeDynamics(self._body, link, **undamped, physicsClientId=client)
             bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=client)
         for joint in self._joints:  # the built-in motors off
             bullet.setJointMotorControl2(
