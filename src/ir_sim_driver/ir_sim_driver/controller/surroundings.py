@@ -78,7 +78,7 @@ class Surroundings:
         return ""
 
     def load_in(self, cell: Cell, load: Carried) -> tuple[Carried, str]:
-        """What is carried as another cell describes it, and a warning: it is unknown there and stays as it is.
+        """What is carried as another cell describes it, and a warning: unknown there, it stays as it is.
 
         The tool of this cell becomes the tool of that one.
         """
