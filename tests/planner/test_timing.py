@@ -226,6 +226,20 @@ def test_a_spline_through_points_keeps_its_limits(demo_scene: PlanningScene, deg
     assert used > 0.7, "the spline is slower than it needs to be"
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("count", [3, 10, 100])
+def test_points_at_which_the_arm_can_stand_are_passed_however_many(
+    demo_scene: PlanningScene, seed: int, count: int
+) -> None:
+    home = np.array(demo_scene.cell.machine_home)
+    points = home + np.random.default_rng(seed).uniform(-0.3, 0.3, (count, 6))
+    still = np.zeros_like(points)
+    assert torque_use(demo_scene.dynamics, points, still, still).max() < 0.7
+    trajectory = time_spline(points, NAMES, demo_scene.limits, demo_scene.dynamics)
+    motion = trajectory.sample(trajectory.times)
+    assert torque_use(demo_scene.dynamics, motion.q, motion.qd, motion.qdd).max() <= 1.0
+
+
 def test_limits_scale_with_the_request() -> None:
     one = np.ones(2)
     scaled = MotionLimits(one, 2 * one, 3 * one).scaled(0.5, 0.25)

@@ -16,7 +16,7 @@ from ir_description.robot import Load, RobotModel, total_mass
 from ir_description.shapes import Body, Capsule
 from ir_msgs_py.errors import InvalidValueError
 
-BODIES_MAX = 20_000
+BODIES_MAX = 10_000
 """Most bodies a cell may have."""
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ir_description.cell import (
     APPROACH_MAX,
+    BODIES_MAX,
     ZONE_KINDS,
     ZONE_MAX,
     AllowedContact,
@@ -25,7 +26,7 @@ from ir_msgs_py.arrays import FloatArray
 def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tuple[Item, Station]]]:
     """Return a machine and its stations, each with the item it came from."""
     table = item.table(("name", "bodies"), ("pose", "zone", "states", "state", "enabled", "stations"))
-    read = tuple(bodies.read(body) for body in table["bodies"].list(0, 20_000))
+    read = tuple(bodies.read(body) for body in table["bodies"].list(0, BODIES_MAX))
     states = _states(table)
     machine = Equipment(
         name=table["name"].name(),

@@ -22,6 +22,7 @@ from ir_planner.timing.time_law import GRID_NS, GRID_S
 
 _ROUNDS = 14
 _STRETCHES = 12
+_LEAST_STRETCH = 5e-4  # of the first; each one is at least twice the one before
 _SHORTEST = 20  # grid steps of an interval
 
 
@@ -44,13 +45,14 @@ def time_spline(
             steps = _even(steps * GRID_S * np.clip(use, 0.6, 1.7) ** 0.6)
     else:
         steps = _even(given)
-    for _ in range(_STRETCHES):
+    for k in range(_STRETCHES):
         trajectory = _spline(points, steps, joint_names)
         use = _interval_use(trajectory, len(points), limits, dynamics)
         worst = float(use.max())
         if worst <= 1.0:
             return trajectory
-        steps = _even(steps * GRID_S * max(worst, 1.002))
+        # gravity doesn't fall with speed: for torque the factor is too small, the more the nearer it comes
+        steps = _even(steps * GRID_S * max(worst, 1.0 + _LEAST_STRETCH * 2**k))
     joint = int(np.argmax(torque_per_segment(trajectory, dynamics).max(axis=0)))
     raise TimingError(f"joint {joint + 1}: its torque does not carry the load along these points", joint)
 
