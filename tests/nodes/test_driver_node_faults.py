@@ -172,6 +172,20 @@ def test_a_bad_trajectory_on_the_topic_is_reported_in_diagnostics(client, ros_no
     wait_for(reported, timeout=20.0)
 
 
+def test_a_huge_trajectory_on_the_topic_is_refused_by_its_bytes(client, ros_node, wait_for):
+    received = []
+    ros_node.create_subscription(DiagnosticArray, names.DIAGNOSTICS, received.append, 10)
+    publisher = ros_node.create_publisher(JointTrajectoryMsg, names.COMMANDED_TRAJECTORY, 10)
+    wait_for(lambda: publisher.get_subscription_count() > 0)
+    publisher.publish(JointTrajectoryMsg(joint_names=["j" * 6_000_000]))
+
+    def reported():
+        return any("bytes: at most" in status.message for msg in received for status in msg.status)
+
+    wait_for(reported, timeout=20.0)
+    assert client.execute(movement(), timeout=30.0).energy > 0.0
+
+
 def test_a_trajectory_on_the_topic_runs_and_overrides_the_action(client, ros_node, wait_for):
     states = []
     ros_node.create_subscription(JointState, names.JOINT_STATES, states.append, 100)

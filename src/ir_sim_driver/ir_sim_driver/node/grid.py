@@ -30,9 +30,9 @@ class ClockPolicy:
     catch_up: float
 
 
-SYSTEM = ClockPolicy(gap=1.0, lag=inf, catch_up=2.0)
-"""The host's clock: a loaded machine lags as long as it is loaded, and a second without a look at the clock
-is no load: schedulers of a loaded machine make a thread wait for tenths of it."""
+SYSTEM = ClockPolicy(gap=2.0, lag=inf, catch_up=2.0)
+"""The host's clock: a loaded machine lags as long as it is loaded. Two seconds without a look at the clock
+are no load: its threads wait for tenths of one, and for a whole one while a huge message is read."""
 FOREIGN = ClockPolicy(gap=5.0, lag=5.0, catch_up=inf)
 """Somebody's /clock, which comes in steps and at any speed."""
 OWN = ClockPolicy(gap=inf, lag=inf, catch_up=inf)

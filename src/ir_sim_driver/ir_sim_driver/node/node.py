@@ -14,7 +14,6 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_msgs.msg import Float64
-from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_description import DescriptionError
@@ -27,18 +26,18 @@ from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
 from ir_msgs_py.ros.running import run_node
 from ir_sim_driver.controller import Driver, Frame, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, PlantStoppedError
-from ir_sim_driver.motion import ErrorCode, Outcome
 from ir_sim_driver.node.announcements import Announcements
 from ir_sim_driver.node.executions import Executions
 from ir_sim_driver.node.grid import FOREIGN, OWN, SYSTEM
 from ir_sim_driver.node.links import open_links
 from ir_sim_driver.node.markers import robot_markers
-from ir_sim_driver.node.messages import condition_of, goal_from_trajectory
+from ir_sim_driver.node.messages import condition_of
 from ir_sim_driver.node.parameters import DriverParameters
 from ir_sim_driver.node.plc_topic import PlcTopic
 from ir_sim_driver.node.real_time import GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
 from ir_sim_driver.node.streams import Streams
+from ir_sim_driver.node.trajectory_topic import TrajectoryTopic
 from ir_sim_driver.node.transforms import open_transforms
 from ir_sim_driver.notices import Level, Notice
 
@@ -101,7 +100,7 @@ class SimDriver(Node):
         self._streams = Streams(self, self._driver.joint_names)
         self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
         self._diagnostics = Diagnostics(self)
-        self.create_subscription(JointTrajectory, names.COMMANDED_TRAJECTORY, self._on_trajectory, 10)
+        self._trajectory_topic = TrajectoryTopic(self, self._driver)
         self._plc_topic = PlcTopic(self, self._driver)
         self.create_subscription(
             Float64, names.SPEED_SCALING, lambda msg: self._driver.set_speed_scaling(float(msg.data)), 10
@@ -197,16 +196,6 @@ class SimDriver(Node):
     def goes_on(self) -> bool:
         """Whether the plant runs, or has stopped so recently that goals are still being answered."""
         return not self._driver.failure or time.monotonic() < self._last_words
-
-    # topics in
-
-    def _on_trajectory(self, msg: JointTrajectory) -> None:
-        limit = self._driver.max_points
-        self._driver.submit(len(msg.points), lambda: goal_from_trajectory(msg, limit), self._topic_ended)
-
-    def _topic_ended(self, outcome: Outcome) -> None:
-        if outcome.code is not ErrorCode.SUCCESSFUL:
-            self._driver.warn(f"trajectory of the topic: {outcome.sentence} ({outcome.code.name})")
 
     # slow topics out
 
