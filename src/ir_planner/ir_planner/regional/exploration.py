@@ -27,10 +27,16 @@ _GOALS, _FEWEST_GUESSES = 6, 8  # that guesses lead to, and so many to each of t
 _REFINED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
 
 
-def first_paths(ends: Ends, space: FreeSpace, context: Context, searches: Searches) -> list[Path]:
-    """The first free paths, by the first search that finds any; none where all failed."""
+def first_paths(
+    ends: Ends, space: FreeSpace, context: Context, searches: Searches, *, briefly: bool
+) -> list[Path]:
+    """The first free paths, by the first search that finds any; none where all failed. briefly: by searches
+    with little work, of the default portfolio only.
+    """
     journal = context.journal
-    for name, search in _attempts(context.options.planner_id, searches):
+    for name, search in _attempts(context.options.planner_id, searches, briefly):
+        if journal.work.exhausted:
+            break
         with journal.stage(name) as notes:
             found = search.find(ends, space, context.options.seed, space.work)
             if found.paths:
@@ -39,19 +45,18 @@ def first_paths(ends: Ends, space: FreeSpace, context: Context, searches: Search
                 notes.append("nothing free" + (f", {found.note}" if found.note else ""))
         if found.paths:
             return [(name, path) for path in found.paths]
-        if journal.work.exhausted:
-            break
     return []
 
 
-def _attempts(planner_id: str, searches: Searches) -> Iterator[tuple[str, Search]]:
+def _attempts(planner_id: str, searches: Searches, briefly: bool) -> Iterator[tuple[str, Search]]:
     if planner_id:
-        yield planner_id, searches[planner_id]
+        if not briefly:
+            yield planner_id, searches[planner_id]
         return
     for name in FIRST:
-        yield name, quick(searches[name])
-    for name in FIRST:
-        if quick(searches[name]) != searches[name]:
+        if briefly:
+            yield name, quick(searches[name])
+        elif quick(searches[name]) != searches[name]:
             yield name, searches[name]
 
 

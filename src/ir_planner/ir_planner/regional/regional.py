@@ -15,6 +15,7 @@ from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.regional.answer import MovementPlan
 from ir_planner.regional.asynchronous import with_own_laws
+from ir_planner.regional.enclosure import enclosure, refused
 from ir_planner.regional.exploration import Path, Searches, first_paths
 from ir_planner.regional.refusal import refusal
 from ir_planner.regional.safeguards import DIRECT, Exploration, best_found, not_worse_than_baseline
@@ -61,7 +62,14 @@ def _search(
     blocked = end_in_collision(start, ends.goals[0], space, context.safety_distance)
     if blocked is not None:
         return blocked, None
-    paths = first_paths(ends, space, context, searches)
+    paths = first_paths(ends, space, context, searches, briefly=True)
+    if not paths and context.options.planner_id == "":
+        with context.journal.stage("enclosure") as notes:
+            enclosed = enclosure(ends, space)
+            notes.append(f"the {enclosed.end} is enclosed" if enclosed else "none is proved")
+        if enclosed is not None:
+            return refused(enclosed), None
+    paths = paths or first_paths(ends, space, context, searches, briefly=False)
     if not paths:
         return refusal(start, ends.goals[0], space, context.journal), None
     there = np.abs(ends.goals - start).max(axis=1).min() < STILL
