@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
+from textwrap import indent
+from typing import TYPE_CHECKING
 
 from ir_description import (
     Cell,
     DescriptionFileError,
-    Finding,
     UnknownNameError,
     bundled_cells,
     cell_file_errors,
@@ -20,7 +22,10 @@ from ir_description import (
 from ..errors import InputError
 from ..suggestions import unknown_name
 from ..terminal import table
-from .output import Columns, Row, add_formats, number, print_csv, print_json, print_table, text
+from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
+
+if TYPE_CHECKING:
+    from .deep import Suggestion
 
 STATIONS: Columns = {
     "station": ("station", text),
@@ -45,6 +50,9 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     verbs = cell.add_subparsers(dest="verb", required=True)
     check = verbs.add_parser("check", help="everything that is wrong with a cell file, and its stations")
     check.add_argument("file", metavar="CELL", help="a path, or the name of a bundled cell")
+    check.add_argument(
+        "--deep", action="store_true", help="also contacts, exits and the program, with lines to paste"
+    )
     add_formats(check, comma=False)
     check.set_defaults(run=run_check)
     listing = verbs.add_parser("list", help="the bundled cells")
@@ -60,16 +68,23 @@ def run_check(arguments: argparse.Namespace) -> int:
     from .stations import stations_of  # a planner, only for a cell that can be read
 
     findings, stations = check_cell(cell), stations_of(cell)
+    suggestions = _suggestions(cell) if arguments.deep else []
     if arguments.json:
-        print_json({"cell": cell.name, "stations": stations, "findings": [_row(f) for f in findings]})
+        listed = {"findings": [asdict(f) for f in findings], "suggestions": [asdict(s) for s in suggestions]}
+        print_json({"cell": cell.name, "stations": stations, **listed})
     else:
         _print_cell(cell)
         if stations:
             print_table(stations, STATIONS)
         for finding in findings:
             sys.stdout.write(f"{finding.severity}: {finding.subject}: {finding.sentence}\n")
+        for suggestion in suggestions:
+            sys.stdout.write(f"{suggestion.severity}: {suggestion.subject}: {suggestion.sentence}\n")
+            if suggestion.yaml:
+                sys.stdout.write(indent(suggestion.yaml, "    ") + "\n")
     unreached = any(not row["free"] for row in stations)
-    return 1 if unreached or any(finding.severity == "error" for finding in findings) else 0
+    severities = [*(each.severity for each in findings), *(each.severity for each in suggestions)]
+    return 1 if unreached or "error" in severities else 0
 
 
 def run_list(arguments: argparse.Namespace) -> int:
@@ -120,5 +135,9 @@ def _print_cell(cell: Cell) -> None:
         sys.stdout.write(table(["equipment", "zone", "bodies", "state"], rows) + "\n")
 
 
-def _row(finding: Finding) -> Row:
-    return {"severity": finding.severity, "subject": finding.subject, "sentence": finding.sentence}
+def _suggestions(cell: Cell) -> list[Suggestion]:
+    from .deep import suggestions_of
+
+    with ProgressLine() as line:
+        line.show("deep check", 0, len(cell.stations), 0.0)
+        return list(suggestions_of(cell))

@@ -2,55 +2,63 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 
-from ir_description import Cell, cell_to_yaml
-from ir_planner import Planner, parse_goal
+from ir_description import Cell, PartPlaces, Station, load_power_data
+from ir_planner.configurations import free_configurations, no_configuration
+from ir_planner.program.steps import Scenes
+from ir_planner.scene import PlanningScene
 
 from .output import Row
 
 MARGIN = 0.02  # m, the default of a request
 
 
-def stations_of(cell: Cell) -> list[Row]:
-    """One row per station and load: configurations that reach it, how many of them keep 20 mm (or what the
-    station allows), the best clearance, and the obstructing pairs where none does.
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """A station with what is held there and where the parts lie."""
+
+    station: Station
+    scene: PlanningScene
+
+
+def visits(cell: Cell) -> Iterator[Visit]:
+    """Every station as the program finds it when it arrives and as it leaves it; as it is before the program
+    where that does not go. Each situation once.
     """
-    planner = Planner(time.monotonic)
-    planner.set_cell(cell_to_yaml(cell), "")
-    return [_row(planner, station, load) for station, load in _visits(cell)]
-
-
-def _row(planner: Planner, station: str, load: str) -> Row:
-    cell = planner.cell
-    answer = planner.compute_ik(parse_goal(station, cell), "analytic", MARGIN, cell.machine_home, load)
-    dropped = sum(rejection.count for rejection in answer.info.rejected)
-    clearances = [solution.clearance for solution in answer.solutions]
-    return {
-        "station": station,
-        "load": load,
-        "reached": dropped + len(clearances),
-        "free": len(clearances),
-        "clearance": max(clearances, default=None),
-        "obstacle": "" if clearances else answer.status.message,
-    }
-
-
-def _visits(cell: Cell) -> list[tuple[str, str]]:
-    """Every station with what the program holds there when it arrives and when it leaves; the tool where the
-    program does not go.
-    """
-    places = cell.parts_at_start()
-    held: dict[str, dict[str, None]] = {station.name: {} for station in cell.stations}
+    scenes = Scenes(cell, load_power_data(), "shared")
+    start = cell.parts_at_start()
+    found: dict[str, list[PartPlaces]] = {station.name: [] for station in cell.stations}
+    places = start
     for step in cell.program:
         after = places.after(step)
         if step.kind == "STATION":
-            for each in (places, after):
-                held[step.target][_load_text(cell, each.held)] = None
+            found[step.target] += [places, after]
         places = after
-    return [(name, load) for name, loads in held.items() for load in (loads or [_load_text(cell, "")])]
+    for name, situations in found.items():
+        scenes_there = {id(scene): scene for scene in map(scenes.of, situations or [start])}
+        yield from (Visit(cell.station(name), scene) for scene in scenes_there.values())
 
 
-def _load_text(cell: Cell, held: str) -> str:
-    names = [cell.tool.name] if cell.tool is not None else []
-    return "+".join([*names, held] if held else names) or "none"
+def stations_of(cell: Cell) -> list[Row]:
+    """One row per situation at a station: configurations that reach it, how many of them keep 20 mm (or what
+    the station allows), the best clearance, and the obstructing pairs where none does.
+    """
+    return [_row(visit, cell) for visit in visits(cell)]
+
+
+def _row(visit: Visit, cell: Cell) -> Row:
+    station, scene = visit.station, visit.scene
+    threshold = scene.thresholds(MARGIN, station.name)
+    found = free_configurations(station.pose, scene, threshold, cell.machine_home)
+    none = "" if len(found.q) else no_configuration(station.pose, scene, found, station.name).message
+    clearances = scene.collision.min_distance(found.q, threshold).distance if len(found.q) else ()
+    return {
+        "station": station.name,
+        "load": scene.load_text,
+        "reached": found.reached,
+        "free": len(found.q),
+        "clearance": float(max(clearances)) if len(found.q) else None,
+        "obstacle": none,
+    }
