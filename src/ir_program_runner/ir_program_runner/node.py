@@ -282,7 +282,8 @@ class ProgramRunnerNode(Node):
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is ended."""
     refusals = (ParameterError, DescriptionError, ValueError)
-    return run_node(names.PROGRAM_RUNNER, ProgramRunnerNode, arguments, refusals=refusals)
+    about = "Runs planned programs: movements, pauses in their power modes, signals of the machines."
+    return run_node(names.PROGRAM_RUNNER, ProgramRunnerNode, arguments, refusals=refusals, about=about)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
+from ir_msgs_py.ros.command_line import CommandLineError, own_words
 from ir_msgs_py.ros.running import run_node
 from ir_recorder.arguments import record_parser
 from ir_recorder.diagnose.node import RecorderDiagnostics
@@ -235,7 +235,11 @@ class RecorderNode(Node):
 def main(arguments: Sequence[str] | None = None) -> int:
     """`ir-record PATH [--overwrite] [--topics ...] [--cell NAME]`: records until SIGINT or SIGTERM."""
     everything = sys.argv[1:] if arguments is None else list(arguments)
-    options = record_parser().parse_args(remove_ros_args(["ir-record", *everything])[1:])
+    try:
+        options = record_parser().parse_args(own_words("ir-record", everything))
+    except CommandLineError as error:
+        sys.stderr.write(f"ir-record: {error}\n")
+        return 1
 
     recorders: list[RecorderNode] = []
 

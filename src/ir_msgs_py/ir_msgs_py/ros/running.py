@@ -20,10 +20,10 @@ import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import Executor, ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import ParameterError
+from ir_msgs_py.ros.command_line import CommandLineError, answer_before_start, init_ros
 from ir_msgs_py.ros.network import apply_network
 
 N = TypeVar("N", bound=Node)
@@ -74,21 +74,24 @@ def run_node(
     executor: Callable[[], Executor] = SingleThreadedExecutor,
     refusals: tuple[type[Exception], ...] = (),
     goes_on: Callable[[N], bool] | None = None,
+    about: str = "",
 ) -> int:
     """Make the node and spin it until a signal comes, or soon after goes_on(node) is False; the exit code.
 
-    refusals: what `make` or the clean-up raises for reasons that a sentence on stderr explains (exit code
-    1). Call it in the main thread, as the last thing of a process: its signals stay taken.
+    about: what the node does, for --help; "" where somebody else has read the node's own words. refusals:
+    what `make` or the clean-up raises for reasons that a sentence on stderr explains (exit code 1). Call it
+    in the main thread, as the last thing of a process: its signals stay taken.
     """
+    words = sys.argv[1:] if arguments is None else arguments
+    answer = answer_before_start(name, words, about) if about else None
+    if answer is not None:
+        return answer
+    expected: tuple[type[Exception], ...] = (CommandLineError, ParameterError, *refusals)
     spinning = Spinning()
+    _on_signals(spinning.end)
     try:
         apply_network()
-    except ParameterError as error:
-        sys.stderr.write(f"{name}: {error}\n")
-        return 1
-    _on_signals(spinning.end)
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    try:
+        init_ros(arguments)
         node = make()
         try:
             spins = executor()
@@ -97,7 +100,7 @@ def run_node(
             spins.remove_node(node)
         finally:
             node.destroy_node()
-    except refusals as error:
+    except expected as error:
         sys.stderr.write(f"{name}: {error}\n")
         return 1
     finally:

@@ -1,5 +1,7 @@
 """`python -m ir_planner.node` starts the node."""
 
+import sys
+
 from ir_planner.node import main
 
-main()
+sys.exit(main())

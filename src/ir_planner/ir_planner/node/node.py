@@ -42,7 +42,7 @@ from ir_msgs.srv import (
     SetEquipment,
 )
 from ir_msgs_py import names
-from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.errors import InvalidValueError, MsgsError
 from ir_msgs_py.ros.conversions import configuration_from_msg, program_savings_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.parameters import Parameters
@@ -53,6 +53,7 @@ from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import cell_shapes, movement_shapes
+from ir_planner.errors import PlannerError
 from ir_planner.node.announcements import Announcements
 from ir_planner.node.answers import fill_status
 from ir_planner.node.goal_queue import GoalQueue
@@ -233,7 +234,12 @@ class PlannerNode(Node):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped."""
     return run_node(
-        names.PLANNER, PlannerNode, arguments, executor=lambda: MultiThreadedExecutor(num_threads=_THREADS)
+        names.PLANNER,
+        PlannerNode,
+        arguments,
+        executor=lambda: MultiThreadedExecutor(num_threads=_THREADS),
+        refusals=(PlannerError, MsgsError),
+        about="Plans certified movements and programs of a robot cell, with their joules.",
     )
 
 

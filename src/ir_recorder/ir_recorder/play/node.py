@@ -17,12 +17,12 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError, UnknownTypeError
 from ir_msgs_py.file_roots import FileRoots
+from ir_msgs_py.ros.command_line import CommandLineError, own_words
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.types import interface_type
 from ir_recorder.arguments import add_roots
@@ -170,11 +170,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--clock", action="store_true", help="publish recorded time on /clock")
     parser.add_argument("--delay", type=float, default=0.5, help="s before the first message")
     add_roots(parser)
-    options = parser.parse_args(remove_ros_args(["ir-play", *everything])[1:])
     try:
+        options = parser.parse_args(own_words("ir-play", everything))
         settings = PlaySettings(options.rate, options.loop, tuple(options.topics))
         recording = read_raw(options.file, FileRoots.of(options.roots))
-    except (RecorderError, MsgsError) as error:
+    except (CommandLineError, RecorderError, MsgsError) as error:
         sys.stderr.write(f"ir-play: {error}\n")
         return 1
     for problem in recording.problems:

@@ -243,4 +243,5 @@ class SimDriver(Node):
 def main() -> int:
     """Spin the driver until it is interrupted."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
-    return run_node(names.SIM_DRIVER, SimDriver, goes_on=SimDriver.goes_on, refusals=REFUSALS)
+    about = "Simulates a KR210 with its drives, power modes, PLC bits and mains meter; executes trajectories."
+    return run_node(names.SIM_DRIVER, SimDriver, goes_on=SimDriver.goes_on, refusals=REFUSALS, about=about)
