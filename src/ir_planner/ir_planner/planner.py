@@ -44,6 +44,7 @@ from ir_planner.request import (
     bounded,
     checked_options,
     chosen,
+    examinable,
     noted,
     safety_distance,
     within_limits,
@@ -149,7 +150,7 @@ class Planner:
         scene = self.scene(load)
         if station:
             scene.station(station)
-        found = evaluate_trajectory(trajectory, scene, margin, station)
+        found = evaluate_trajectory(examinable(trajectory), scene, margin, station)
         return replace(found, report=in_scene(scene)(found.report))
 
     def standby(self, pause: float, q: FloatArray | None, load: str) -> Standby:
@@ -228,7 +229,7 @@ class Planner:
         options, note = self._checked(options or PlanOptions())
         scene = self.scene(options.load)
         original, work = trajectory.reordered(scene.cell.robot.joint_names), self._work(options, cancelled)
-        plan = optimize_trajectory(original, scene, options, work, self.settings.searches)
+        plan = optimize_trajectory(examinable(original), scene, options, work, self.settings.searches)
         for point in plan.front:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:

@@ -4,6 +4,7 @@ from ir_planner.request.bounds import DURATION_MAX, bounded, checked_options, ch
 from ir_planner.request.context import Context
 from ir_planner.request.goals import POSTURES, Goal, one_goal, parse_goal, within_limits
 from ir_planner.request.journal import Journal, noted
+from ir_planner.request.trajectory_bounds import examinable
 from ir_planner.request.work import Clock, Work
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "bounded",
     "checked_options",
     "chosen",
+    "examinable",
     "noted",
     "one_goal",
     "parse_goal",
