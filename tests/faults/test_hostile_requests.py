@@ -210,6 +210,31 @@ def test_each_request_makes_sense_before_it_is_disturbed(name: str) -> None:
     assert response.status.code == expected, response.status.message
 
 
+def found_before() -> list[tuple[str, Any, str]]:
+    """Requests that this generator found: proofs for hours, overflows, and programs without a movement."""
+    far, fast = line(), line()
+    far.points[1].positions[2] = 1e6
+    fast.points[1].velocities[2] = 1e308
+    huge = state([1e308, *HOME[1:]])
+    program = {"stations": ["home"], "savings": False, "options": QUICK}
+    evaluate, standing = srv.EvaluateTrajectory.Request, srv.PlanProgram.Request
+    return [
+        ("evaluate_trajectory", evaluate(trajectory=far), "1e+06 rad: it must be within 100 rad"),
+        ("evaluate_trajectory", evaluate(trajectory=fast), "1e+308 rad/s: it must be within 10000 rad/s"),
+        ("check_state", srv.CheckState.Request(state=huge), "it must be within 100 rad"),
+        ("compute_ik", srv.ComputeIk.Request(goal="home", near=huge), "it must be within 100 rad"),
+        ("plan_program", standing(cycle_time=1.0, **program), "cycle_time (is 1 s)"),
+        ("plan_program", standing(front_points=3, **program), "front_points (is 3) must be 0"),
+    ]
+
+
+@pytest.mark.parametrize(("name", "request_", "sentence"), found_before())
+def test_what_was_found_is_refused_with_its_bound(name: str, request_: Any, sentence: str) -> None:
+    response = Asked().answer(name, request_)
+    assert response.status.code != Status.SUCCESS
+    assert sentence in response.status.message
+
+
 def test_hostile_requests_are_refused_in_words() -> None:
     assert judged(300, seed=1) == []
 

@@ -26,7 +26,7 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
-from ir_planner.request import Goal, one_goal
+from ir_planner.request import POSITION_MAX, Goal, one_goal
 from ir_planner.trajectories import POINTS_MAX, Reference
 
 AT_REST = 0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
@@ -117,6 +117,12 @@ def state_of(msg: Any, cell: Cell, code: StatusCode, at_rest: str = "") -> Float
         q, velocity = configuration_from_msg(msg, names), velocity_from_msg(msg, names)
     except InvalidValueError as error:
         raise RequestError(code, str(error)) from error
+    j = int(np.argmax(np.abs(q)))
+    if abs(q[j]) > POSITION_MAX:
+        raise RequestError(
+            code,
+            f"{names[j]} is {q[j]:g} rad: no joint turns that far, it must be within {POSITION_MAX:g} rad",
+        )
     if at_rest and velocity is not None:
         check_at_rest(velocity, names, at_rest, code)
     return q

@@ -30,7 +30,7 @@ class Ladder:
         rates = rates_of(own.context)
         value = rates.second / rates.joule if rates.joule else np.inf
         searched = own.context.options.objective != "movement_cost"
-        place = float(np.log(value / _LEAST) / np.log(_STEP)) if value > 0.0 else -np.inf
+        place = float((np.log(value) - np.log(_LEAST)) / np.log(_STEP)) if value > 0.0 else -np.inf
         self._place = (float(FASTEST) if np.isinf(value) else place) if searched else -np.inf
 
     @property

@@ -13,8 +13,9 @@ import numpy as np
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement, PlanningInfo
 from ir_msgs_py.savings import ProgramSavings
-from ir_msgs_py.status import Status
+from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import total_report
+from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain, layers_of
 from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.comparison import held_against_common
@@ -51,6 +52,12 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
     """
     choice = chosen(request, route, context, progress)
     cycle = request.cycle_time
+    if not choice.parts and (cycle > 0.0 or request.front_points):
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the program has no movement: cycle_time (is {cycle:g} s) and front_points "
+            f"(is {request.front_points}) must be 0",
+        )
     if cycle <= 0.0:
         _improve(choice)
     found = choice.found(progress)

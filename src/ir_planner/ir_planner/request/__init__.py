@@ -4,11 +4,12 @@ from ir_planner.request.bounds import DURATION_MAX, bounded, checked_options, ch
 from ir_planner.request.context import Context
 from ir_planner.request.goals import POSTURES, Goal, one_goal, parse_goal, within_limits
 from ir_planner.request.journal import Journal, noted
-from ir_planner.request.trajectory_bounds import examinable
+from ir_planner.request.trajectory_bounds import POSITION_MAX, examinable
 from ir_planner.request.work import Clock, Work
 
 __all__ = [
     "DURATION_MAX",
+    "POSITION_MAX",
     "POSTURES",
     "Clock",
     "Context",

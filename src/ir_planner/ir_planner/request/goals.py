@@ -111,8 +111,8 @@ def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> Flo
         if not low - 1e-9 <= value <= high + 1e-9:
             raise RequestError(
                 code,
-                f"{what}: {robot.joint_names[i]} is {np.degrees(value):g} deg: it must be in "
-                f"[{np.degrees(low):g}, {np.degrees(high):g}] deg",
+                f"{what}: {robot.joint_names[i]} is {math.degrees(value):g} deg: it must be in "
+                f"[{math.degrees(low):g}, {math.degrees(high):g}] deg",
             )
     return np.clip(q, robot.position_min, robot.position_max)
 
