@@ -63,6 +63,7 @@ compare: setup    ## the same answers, and as fast? This checkout against BEFORE
 docs: setup       ## the pages that are written from code: interfaces, parameters, rooms
 	@$(BIN)/python tools/interface_reference.py
 	@$(BIN)/python tools/parameter_reference.py
+	@$(BIN)/python tools/security_policy.py
 	@$(BIN)/python tools/architecture_page.py
 
 clean:            ## remove what was built; .venv stays (rm -rf .venv for all)

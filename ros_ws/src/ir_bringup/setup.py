@@ -1,4 +1,4 @@
-"""Installs launch file, parameters, RViz configuration and Foxglove layout below share/ir_bringup."""
+"""Installs launch file, parameters, views and the security policy below share/ir_bringup."""
 
 from glob import glob
 
@@ -15,7 +15,7 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
         *(
             (f"share/{PACKAGE}/{folder}", sorted(glob(f"{folder}/*")))
-            for folder in ("launch", "config", "rviz", "foxglove")
+            for folder in ("launch", "config", "rviz", "foxglove", "security")
         ),
     ],
     install_requires=["setuptools"],
