@@ -242,7 +242,23 @@ def test_plan_standby_wakes_in_time(call: Call) -> None:
     assert answer.status.code == Status.SUCCESS
     assert answer.chosen.name == "BUS_POWER_OFF"
     assert answer.wake_at == pytest.approx(300.0 - answer.chosen.regular_time_to_operate)
-    assert answer.energy == pytest.approx(min(answer.alternative_energies))
+    assert answer.energy <= min(answer.alternative_energies)
+    assert list(answer.modes) == ["STAND_ON_BRAKES", "BUS_POWER_OFF"]
+    assert list(answer.switch_times) == pytest.approx([0.0, 1.3])
+
+
+def test_plan_standby_takes_a_length_that_nobody_knows_and_postures(call: Call) -> None:
+    answer = call(
+        PlanStandby, "plan_standby", pause_samples=[5.0, 200.0, 4000.0], postures=["park", "home"], pause=0.0
+    )
+    assert answer.status.code == Status.SUCCESS, answer.status.message
+    assert answer.clairvoyant <= answer.expected == answer.energy <= answer.worst
+    assert np.isinf(answer.wake_at)
+    assert list(answer.switch_times) == sorted(answer.switch_times)
+    assert answer.modes[-1] == "HIBERNATION"
+    assert len(answer.posture_energies) == 2
+    assert min(answer.posture_energies) >= answer.energy
+    assert "park: " in answer.status.message
 
 
 # -- the action

@@ -155,7 +155,7 @@ def test_energy_over_cycle_time_keeps_the_law_of_waiting(
     for (t0, e0), (t1, e1) in itertools.combinations(zip(times, energies, strict=True), 2):
         wait = plan_standby(t1 - t0, park, scene, TransitionTimes()).energy
         assert e1 <= 1.005 * (e0 + wait), (t0, t1)
-    assert planned(40.0 * free).movements[-1].power_mode == "BUS_POWER_OFF"
+    assert planned(40.0 * free).movements[-1].power_mode == "STAND_ON_BRAKES>BUS_POWER_OFF"
 
 
 def test_too_short_a_cycle_names_the_shortest(planned: Callable[[float], ProgramPlan]) -> None:

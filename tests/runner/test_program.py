@@ -12,7 +12,7 @@ from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.power import PowerMode
-from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes
@@ -49,6 +49,7 @@ class World:
     packets: int = 0
     deaf_to_packets: int = 0
     ignores_bits: bool = False
+    watts: float = 0.0
     knows_modes: bool = True
     refusals: dict[str, Status] = field(default_factory=dict)
     cancel_in: Callable[[ask.Request], bool] = lambda request: False
@@ -64,7 +65,7 @@ class World:
                     request = steps.throw(CanceledError())
                     continue
                 status, modes = self.fulfil(request)
-                request = steps.send(ask.Outcome(self.now, self.mode, status, modes))
+                request = steps.send(ask.Outcome(self.now, self.mode, status, modes, self.watts * self.now))
         except StopIteration as ended:
             return ended.value
 
@@ -239,19 +240,38 @@ def test_the_robot_is_woken_as_late_as_possible():
     woken = []
     original = world.wake
     world.wake = lambda rest: (woken.append(world.now), original(rest))
-    world.run([pause(60.0, "BUS_POWER_OFF")], ProgramSettings(wake_margin=0.5))
-    assert woken == [pytest.approx(100.0 + 60.0 - LEAVE - 0.5)]
+    world.run([pause(60.0, "BUS_POWER_OFF")])
+    assert woken == [pytest.approx(100.0 + 60.0 - LEAVE)]
 
 
 def test_times_come_from_the_settings_when_the_driver_does_not_state_them():
     world = World(knows_modes=False)
-    settings = ProgramSettings(wake_margin=0.0)
     woken = []
     original = world.wake
     world.wake = lambda rest: (woken.append(world.now), original(rest))
     times = TransitionTimes(bus_power_off_leave=30.0, bus_power_off_enter=3.0)
-    world.run([pause(60.0, "BUS_POWER_OFF")], settings, times=times)
+    world.run([pause(60.0, "BUS_POWER_OFF")], times=times)
     assert woken == [pytest.approx(130.0)]
+
+
+def test_a_pause_of_several_modes_goes_deeper_as_soon_as_it_can():
+    """The bit of the next mode first: between the two the robot stays where it is."""
+    world = World()
+    result = world.run([pause(60.0, "STAND_ON_BRAKES>BUS_POWER_OFF"), move()])
+    assert result.status.ok
+    deeper = ["drives_off=1", "ab=1", "drives_off=0", "drives_on=1", "drives_on=0", "ab=0"]
+    assert world.log[2:-4] == ["0 started", *deeper, "0 ended"]
+    assert world.now == pytest.approx(100.0 + 60.0 + 2.0)
+    assert not any(world.bits.values())
+
+
+def test_a_pause_that_takes_other_joules_than_planned_says_so():
+    for measured, note in ((1000.0, ""), (1400.0, "the pause took 1400 J, 1000 J were planned")):
+        report = TrajectoryReport(duration=10.0, energy=1000.0, base_energy=1000.0)
+        world = World(watts=measured / 10.0)
+        world.run([pause(10.0, "", report=report)])
+        assert world.log[-1].removeprefix("0 ended").removeprefix(": ").startswith(note)
+        assert bool(note) == (world.log[-1] != "0 ended")
 
 
 def test_a_pause_that_is_too_short_is_spent_on_motors_and_says_so():
@@ -284,7 +304,7 @@ def test_a_lost_packet_is_sent_again_until_the_controller_wakes():
     result = world.run([pause(60.0, "HIBERNATION")], ProgramSettings(wake_repeat=1.0))
     assert result.status.ok
     assert world.packets == 4
-    assert "ready 2.80 s late" in world.log[-1]
+    assert "ready 3.00 s late" in world.log[-1]
     assert world.bits["hib"] is False
 
 

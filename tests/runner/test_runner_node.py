@@ -162,7 +162,7 @@ class Cell:
     def __init__(self, context, executor, machines=None, **overrides):
         self.executor = executor
         self.driver = executor.add_node(FakeDriver(context))
-        values = {"mac": MAC, "wake_margin": 0.0, "wake_repeat": 0.1, "silence_timeout": 0.5, **overrides}
+        values = {"mac": MAC, "wake_repeat": 0.1, "silence_timeout": 0.5, **overrides}
         parameters = [Parameter(name, value=value) for name, value in values.items()]
         self.runner = executor.add_node(
             ProgramRunnerNode(self.driver.receive, machines, context=context, parameter_overrides=parameters)
@@ -383,11 +383,11 @@ def test_parameters_do_not_change_while_a_program_runs(cell):
 
     def change(at):
         if at.phase == "moving" and not answers:
-            answers.append(cell.runner.set_parameters([Parameter("wake_margin", value=1.0)])[0].reason)
+            answers.append(cell.runner.set_parameters([Parameter("ready_timeout", value=1.0)])[0].reason)
 
     cell.run([move()], feedback=change)
-    assert answers == ["a program runs: wake_margin can be changed when it has ended"]
-    changed = cell.executor.run(lambda: cell.runner.set_parameters([Parameter("wake_margin", value=1.0)]))
+    assert answers == ["a program runs: ready_timeout can be changed when it has ended"]
+    changed = cell.executor.run(lambda: cell.runner.set_parameters([Parameter("ready_timeout", value=1.0)]))
     assert changed[0].successful
 
 

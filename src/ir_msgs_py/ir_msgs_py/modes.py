@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 
 from ir_msgs_py.errors import InvalidValueError
 
@@ -62,6 +63,8 @@ RESTS = MODES[1:]
 ROW = {row.mode: row for row in MODES}
 REST_MODES = tuple(row.mode.name for row in MODES)
 """Modes that a pause can be spent in, shallow to deep; the names that people type."""
+DEEPER = ">"
+"""Between the modes of a pause that goes through several."""
 READY = frozenset({Mode.STAND_ON_MOTORS, Mode.MOVING})
 """Modes in which the motors follow commands."""
 OFF_THE_NETWORK = frozenset(m for row in RESTS if not row.on_the_network for m in (row.mode, row.leaving))
@@ -70,6 +73,28 @@ DRIVES_ON = READY | {m for row in RESTS if row.drives_on for m in (row.mode, row
 """Modes with the drive bus up: a movement may be asked for."""
 REST_OF_BIT = {row.bit: row.mode for row in RESTS if row.bit}
 """The mode that each PLC bit of the power management asks for."""
+
+
+def modes_of(power_mode: str) -> tuple[Mode, ...]:
+    """The modes of a pause, one after the other: "STAND_ON_BRAKES>BUS_POWER_OFF" goes deeper as soon as it
+    can; none for "" and for standing on motors.
+    """
+    names = power_mode.split(DEEPER) if power_mode else []
+    for name in names:
+        if name not in REST_MODES:
+            known = ", ".join(REST_MODES)
+            raise InvalidValueError(f"power mode {name[:40]!a} of the pause is unknown: known are {known}")
+    modes = tuple(Mode[name] for name in names)
+    if any(ROW[b].depth <= ROW[a].depth for a, b in pairwise(modes)):
+        raise InvalidValueError(
+            f"power mode of the pause is {power_mode}: each must be deeper than the one before"
+        )
+    return tuple(mode for mode in modes if mode is not Mode.STAND_ON_MOTORS)
+
+
+def deepest(power_mode: str) -> str:
+    """Name of the last mode of a pause, in which most of it is spent."""
+    return power_mode.rsplit(DEEPER, 1)[-1]
 
 
 def checked_mode(number: int) -> Mode:

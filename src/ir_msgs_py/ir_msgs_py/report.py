@@ -10,7 +10,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.checks import at_least, finite, not_nan, one_of, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.modes import REST_MODES
+from ir_msgs_py.modes import modes_of
 from ir_msgs_py.trajectory import JointTrajectory
 
 
@@ -168,10 +168,11 @@ class PlanningInfo:
 class PlannedMovement:
     """One step of a program: a movement or a pause.
 
-    kind: a MovementKind. trajectory_id: "" for a pause; trajectory: None where only the id is known.
-    duration [s]. power_mode: the mode to rest in (pauses), "" = STAND_ON_MOTORS. attach, detach: load that is
-    attached or detached when this step has ended; load: what is attached while it runs ("gripper+part",
-    "none"). wait_for: signals of the machines to wait for before; set_signals: to set after, "name=0" clears.
+    kind: a MovementKind. trajectory_id: "" for a pause; trajectory: None where only the id is known. duration
+    [s]. power_mode: the mode to rest in (pauses), "" = STAND_ON_MOTORS, several as in modes_of. attach,
+    detach: load that is attached or detached when this step has ended; load: what is attached while it runs
+    ("gripper+part", "none"). wait_for: signals of the machines to wait for before; set_signals: to set after,
+    "name=0" clears.
     """
 
     kind: str
@@ -194,8 +195,7 @@ class PlannedMovement:
         set_field(self, "duration", at_least(self.duration, 0.0, "duration of the movement", "s"))
         set_field(self, "wait_for", tuple(self.wait_for))
         set_field(self, "set_signals", tuple(self.set_signals))
-        if self.power_mode:
-            one_of(self.power_mode, REST_MODES, "power mode of the pause")
+        modes_of(self.power_mode)
         if kind is MovementKind.PAUSE:
             if self.trajectory is not None or self.trajectory_id:
                 raise InvalidValueError("a pause has no trajectory")

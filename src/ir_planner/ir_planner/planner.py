@@ -26,13 +26,15 @@ from ir_planner.configurations import (
 from ir_planner.current_cell import CurrentCell, ReadCell, read_cell_here
 from ir_planner.heard import Heard
 from ir_planner.program import (
+    Lengths,
     ProgramPlan,
     ProgramRequest,
     Progress,
     Standby,
+    best_posture,
+    lengths_of,
     nobody,
     plan_program,
-    plan_standby,
 )
 from ir_planner.regional import MovementPlan, plan_regional
 from ir_planner.request import (
@@ -61,6 +63,7 @@ from ir_planner.service import (
 from ir_planner.settings import PlannerSettings
 from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
+from ir_planner.trips import trips_to
 
 Cancelled = Callable[[], bool]
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
@@ -153,10 +156,16 @@ class Planner:
         found = evaluate_trajectory(examinable(trajectory), scene, margin, station)
         return replace(found, report=in_scene(scene)(found.report))
 
-    def standby(self, pause: float, q: FloatArray | None, load: str) -> Standby:
-        """The power mode of least energy for a pause [s] at q (n,), None: machine home."""
+    def standby(
+        self, pause: float | Lengths, q: FloatArray | None, load: str, postures: tuple[str, ...] = ()
+    ) -> Standby:
+        """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
         scene = self.scene(load)
-        return plan_standby(pause, scene.cell.machine_home if q is None else q, scene, self.heard.transitions)
+        lengths = pause if isinstance(pause, Lengths) else lengths_of(pause)
+        here = scene.cell.machine_home if q is None else q
+        options = PlanOptions(load=scene.load_text)
+        trips = trips_to(postures, here, scene.cell, lambda q, goal: self.plan_regional(q, goal, options))
+        return best_posture(lengths, here, trips, scene, self.heard.transitions)
 
     def plan_regional(
         self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Cancelled = _NEVER

@@ -25,6 +25,10 @@ class DriverPort(Protocol):
         """Power mode by the meter's last reading."""
 
     @property
+    def energy(self) -> float:
+        """Energy at the mains by the meter's last reading [J]."""
+
+    @property
     def silent(self) -> bool:
         """Whether no reading of the meter has come for too long."""
 
@@ -104,7 +108,7 @@ class Fulfilment:
             status, modes = await ports.driver.query_modes()
         else:
             status = await self._fulfil(request)
-        return ask.Outcome(ports.now(), ports.driver.mode, status, modes)
+        return ask.Outcome(ports.now(), ports.driver.mode, status, modes, ports.driver.energy)
 
     async def _fulfil(self, request: ask.Request) -> Status:
         ports = self._ports

@@ -1,4 +1,4 @@
-"""A pause in a power mode: go to rest, wake in time, be ready when the pause ends.
+"""A pause in one power mode or deeper and deeper: go to rest, wake in time, be ready when the pause ends.
 
 AB switches the drive bus off, HIB hibernates, DRIVES_OFF closes the brakes. While it hibernates the
 controller reacts to nothing but a Wake-on-LAN packet; the HIB bit is cleared when it is back.
@@ -6,9 +6,9 @@ controller reacts to nothing but a Wake-on-LAN packet; the HIB bit is cleared wh
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 
-from ir_msgs_py.modes import READY, RESTS, Mode
+from ir_msgs_py.modes import READY, RESTS, Mode, modes_of
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
@@ -32,6 +32,8 @@ _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION)
 _AWAKE = (Mode.FROM_HIBERNATION, *READY, Mode.STAND_ON_BRAKES)
 _ROUNDING = 1e-6  # s; a plan may use the shortest pause exactly
 _LATE = 0.1  # s; a shorter delay is not reported: readings and answers take as long
+_SHARE, _JOULES = 0.05, 100.0  # whichever is larger: readings come every 10 ms, answers take as long
+_PULSE = 0.1  # s: a level has to stay 20 ms to count
 _BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
 
 
@@ -39,27 +41,28 @@ class Pause:
     """One pause; `run()` is the generator that returns a note, "" when all went as planned."""
 
     def __init__(self, movement: PlannedMovement, settings: ProgramSettings, times: TransitionTimes) -> None:
-        self._duration = movement.duration
-        self._mode = Mode[movement.power_mode or Mode.STAND_ON_MOTORS.name]
+        self._movement, self._duration = movement, movement.duration
+        self._modes = modes_of(movement.power_mode)
         self._settings, self._times = settings, times
-        self._bit = _BIT.get(self._mode, "")
+        self._mode = Mode.STAND_ON_MOTORS  # the deepest that was asked for
         self.restarted = False  # whether the controller has hibernated
 
     def run(self) -> Generator[Request, Outcome, str]:
         """Spend the pause; raises StepFailedError when the robot isn't ready in the end."""
-        outcome = yield Phase("pause")
-        end = outcome.now + self._duration
-        if self._mode is Mode.STAND_ON_MOTORS:
-            need((yield WaitUntil(end)))
-            return ""
-        times = self._times.of(self._mode)
+        begun = yield Phase("pause")
+        end = begun.now + self._duration
+        if not self._modes:
+            outcome = need((yield WaitUntil(end)))
+            return self._difference(outcome.energy - begun.energy)
         asked = yield AskModes()
-        times = next((mode for mode in asked.modes if mode.mode is self._mode), times)
-        shortest = times.time_to_pause + times.time_min_length_of_stay + times.regular_time_to_operate
+        known = {mode.mode: mode for mode in asked.modes}
+        times = [known.get(mode, self._times.of(mode)) for mode in self._modes]
+        shortest = sum(each.time_to_pause + each.time_min_length_of_stay for each in times)
+        shortest += times[-1].regular_time_to_operate
         if self._duration + _ROUNDING < shortest:
             need((yield WaitUntil(end)))
             return (
-                f"the pause of {self._duration:g} s is too short for {self._mode.name}, "
+                f"the pause of {self._duration:g} s is too short for {self._movement.power_mode}, "
                 f"which needs {shortest:g} s: stood on motors"
             )
         try:
@@ -67,29 +70,58 @@ class Pause:
         except (CanceledError, StepFailedError):
             yield from self._clear()
             raise
-        outcome = yield from self._wake(end, times)
+        outcome = yield from self._wake(end, times[-1])
         late = outcome.now - end
         if late > _LATE:
             return "; ".join(part for part in (note, f"ready {late:.2f} s late") if part)
-        need((yield WaitUntil(end)))
-        return note
+        outcome = need((yield WaitUntil(end)))
+        return note or self._difference(outcome.energy - begun.energy)
 
-    def _rest(self, end: float, times: PowerMode) -> Generator[Request, Outcome, str]:
-        """Enter the mode and stay until it is time to wake."""
-        yield Phase(f"pause: going to {self._mode.name}")
-        outcome = need((yield SetPlcInput(self._bit, True)))
-        wake_at = end - times.regular_time_to_operate - self._settings.wake_margin
-        patience = min(times.time_to_pause + self._settings.enter_timeout, max(0.0, wake_at - outcome.now))
-        outcome = yield WaitForMode((self._mode,), patience)
-        note = ""
-        if outcome.status.code == StatusCode.TIMED_OUT:
-            found = "not known" if outcome.mode is None else outcome.mode.name
-            note = f"{self._mode.name} was not reached within {patience:.1f} s, the mode is {found}"
-        else:
+    def _difference(self, measured: float) -> str:
+        """What a pause took where it isn't what was planned for this length, "" where it is."""
+        planned = self._movement.report
+        same = planned.energy > 0.0 and abs(planned.duration - self._duration) < _ROUNDING and measured > 0.0
+        if not same or abs(measured - planned.energy) <= max(_SHARE * planned.energy, _JOULES):
+            return ""
+        return (
+            f"the pause took {measured:.0f} J, {planned.energy:.0f} J were planned: the program was planned "
+            "for other timers, powers or loads than the driver's"
+        )
+
+    def _rest(self, end: float, times: Sequence[PowerMode]) -> Generator[Request, Outcome, str]:
+        """Enter the modes one after the other and stay until it is time to wake."""
+        wake_at = end - times[-1].regular_time_to_operate
+        stay = 0.0
+        for mode, each in zip(self._modes, times, strict=True):
+            yield Phase(f"pause: going to {mode.name}")
+            outcome = yield from self._ask_for(mode)
+            enough = stay + each.time_to_pause + self._settings.enter_timeout
+            patience = min(enough, max(0.0, wake_at - outcome.now))
+            outcome = yield WaitForMode((mode,), patience)
+            if outcome.status.code == StatusCode.TIMED_OUT:
+                found = "not known" if outcome.mode is None else outcome.mode.name
+                note = f"{mode.name} was not reached within {patience:.1f} s, the mode is {found}"
+                need((yield WaitUntil(wake_at)))
+                return note
             need(outcome)
-            yield Phase(f"pause: {self._mode.name}")
+            yield Phase(f"pause: {mode.name}")
+            stay = each.time_min_length_of_stay
         need((yield WaitUntil(wake_at)))
-        return note
+        return ""
+
+    def _ask_for(self, mode: Mode) -> Requests:
+        """Set the bit of a mode, then clear that of the one before: between the two the robot stays where it
+        is. The controller waits for the shortest stay by itself.
+        """
+        before, self._mode = self._mode, mode
+        outcome = need((yield SetPlcInput(_BIT[mode], True)))
+        if before in _BIT:
+            outcome = need((yield SetPlcInput(_BIT[before], False)))
+        if before is Mode.STAND_ON_BRAKES:  # takes the latched drives_off back
+            outcome = need((yield SetPlcInput("drives_on", True)))
+            need((yield WaitUntil(outcome.now + _PULSE)))
+            outcome = need((yield SetPlcInput("drives_on", False)))
+        return outcome
 
     def _wake(self, end: float, times: PowerMode) -> Requests:
         """Wake the robot and wait until it stands on motors; then no bit of the pause is left."""
@@ -99,7 +131,7 @@ class Pause:
         if self._mode is Mode.HIBERNATION:
             outcome = yield from self._wake_by_packets(outcome, limit)
         else:
-            outcome = need((yield SetPlcInput(self._bit, False)))
+            outcome = need((yield SetPlcInput(_BIT[self._mode], False)))
         if self._mode is Mode.STAND_ON_BRAKES:
             outcome = need((yield SetPlcInput("drives_on", True)))
         outcome = yield WaitForMode(READY, max(0.0, limit - outcome.now))
@@ -111,7 +143,7 @@ class Pause:
             raise StepFailedError(Status(StatusCode.TIMED_OUT, sentence))
         ready = need(outcome)
         if self._mode is Mode.HIBERNATION:
-            need((yield SetPlcInput(self._bit, False)))
+            need((yield SetPlcInput(_BIT[self._mode], False)))
         elif self._mode is Mode.STAND_ON_BRAKES:
             need((yield SetPlcInput("drives_on", False)))
         return ready
@@ -119,7 +151,7 @@ class Pause:
     def _wake_by_packets(self, outcome: Outcome, limit: float) -> Requests:
         """Send packets until the controller starts; one may get lost, or come before it sleeps."""
         if outcome.mode not in _ASLEEP:  # never hibernated: clear the bit instead
-            return need((yield SetPlcInput(self._bit, False)))
+            return need((yield SetPlcInput(_BIT[self._mode], False)))
         self.restarted = True
         while outcome.mode in _ASLEEP and outcome.now < limit:
             need((yield SendWakePacket()))
@@ -138,8 +170,9 @@ class Pause:
         if self._mode is Mode.HIBERNATION and outcome.mode is Mode.HIBERNATION:
             yield SendWakePacket()
             return
-        yield SetPlcInput(self._bit, False)
-        if self._mode is Mode.STAND_ON_BRAKES:
+        for mode in reversed(self._modes[: self._modes.index(self._mode) + 1]):
+            yield SetPlcInput(_BIT[mode], False)
+        if self._modes[0] is Mode.STAND_ON_BRAKES:
             yield SetPlcInput("drives_on", True)
             yield WaitForMode(READY, self._settings.ready_timeout)
             yield SetPlcInput("drives_on", False)

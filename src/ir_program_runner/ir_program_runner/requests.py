@@ -128,6 +128,7 @@ class Outcome:
     """What came of a request.
 
     now: a steady clock [s]. mode: the power mode, None before it is known. modes: the answer to AskModes.
+    energy: at the mains so far [J].
     A status ROBOT_STATE_STALE means that the driver is silent, whatever was asked.
     """
 
@@ -135,6 +136,7 @@ class Outcome:
     mode: Mode | None
     status: Status = field(default_factory=Status.success)
     modes: tuple[PowerMode, ...] = ()
+    energy: float = 0.0
 
 
 def need(outcome: Outcome) -> Outcome:

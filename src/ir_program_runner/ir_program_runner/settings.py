@@ -30,9 +30,6 @@ class ProgramSettings:
     load_timeout: float = setting(
         2.0, "How long a load is offered to a robot that still settles.", unit="s", minimum=0.0, maximum=60.0
     )
-    wake_margin: float = setting(
-        0.2, "How much earlier than needed the robot is woken.", unit="s", minimum=0.0, maximum=_HOUR
-    )
     wake_repeat: float = setting(
         1.0,
         "Time between two Wake-on-LAN packets: a packet can get lost.",

@@ -143,6 +143,10 @@ def fill_standby(response: Any, standby: Standby, timers: str) -> None:
     response.chosen = power_mode_to_msg(standby.chosen)
     response.wake_at = standby.wake_at
     response.energy = standby.energy
+    response.modes, response.switch_times = list(standby.modes), list(standby.switch_times)
+    response.expected, response.worst = standby.expected, standby.worst
+    response.clairvoyant = standby.clairvoyant
+    response.posture, response.posture_energies = standby.posture, list(standby.posture_energies)
     response.saving = standby.saving
     response.alternatives = [power_mode_to_msg(mode) for mode in standby.alternatives]
     response.alternative_energies = [float(energy) for energy in standby.energies]

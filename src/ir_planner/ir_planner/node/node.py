@@ -65,7 +65,7 @@ from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
 _GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
-_THREADS = 7  # quick and long requests, texts and points, changes, the goal, cancelling, one to spare
+_THREADS = 8  # quick and long requests, texts and points, changes, standby, the goal, cancelling, a spare
 
 
 class PlannerNode(Node):
@@ -112,6 +112,7 @@ class PlannerNode(Node):
         ask, quick, long = self._requests, self._quick, self._long
         changes = MutuallyExclusiveCallbackGroup()  # a large cell holds up nobody but other changes
         texts = MutuallyExclusiveCallbackGroup()  # as long as what was loaded or planned
+        waiting = MutuallyExclusiveCallbackGroup()  # plans movements to postures where it is asked to
         for kind, name, handler, group in (
             (SetCell, names.SET_CELL, ask.set_cell, changes),
             (GetCell, names.GET_CELL, ask.get_cell, texts),
@@ -120,7 +121,7 @@ class PlannerNode(Node):
             (ComputeIk, names.COMPUTE_IK, ask.compute_ik, quick),
             (GetTrajectory, names.GET_TRAJECTORY, ask.get_trajectory, texts),
             (GetProgram, names.GET_PROGRAM, ask.get_program, texts),
-            (PlanStandby, names.PLAN_STANDBY, ask.plan_standby, quick),
+            (PlanStandby, names.PLAN_STANDBY, ask.plan_standby, waiting),
             (EvaluateTrajectory, names.EVALUATE_TRAJECTORY, ask.evaluate_trajectory, long),
             (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service, long),
             (PlanRegionalMovement, names.PLAN_REGIONAL_MOVEMENT, ask.plan_regional, long),

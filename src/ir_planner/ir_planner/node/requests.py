@@ -41,7 +41,7 @@ from ir_planner.node.inputs import (
     trajectory_of,
 )
 from ir_planner.planner import Planner
-from ir_planner.program import ProgramPlan
+from ir_planner.program import ProgramPlan, lengths_of
 from ir_planner.service import ServicePlan
 
 
@@ -245,7 +245,9 @@ class Requests:
     def plan_standby(self, request: Any, response: Any) -> Status:
         """Where to rest during a pause."""
         q = state_of(request.state, self.planner.cell, StatusCode.INVALID_ROBOT_STATE)
-        standby = self.planner.standby(request.pause, q, request.load)
+        samples, quantiles = np.array(request.pause_samples), np.array(request.pause_quantiles)
+        lengths = lengths_of(request.pause, samples, quantiles)
+        standby = self.planner.standby(lengths, q, request.load, tuple(request.postures))
         fill_standby(response, standby, self.planner.heard.source)
         return Status.success(standby.sentence)
 

@@ -1,15 +1,20 @@
 """Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
 
+from ir_planner.program.pause_lengths import Lengths, lengths_of
 from ir_planner.program.program import plan_program
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, nobody
-from ir_planner.program.standby import Standby, plan_standby
+from ir_planner.program.standby import Standby
+from ir_planner.program.waiting import Trip, best_posture
 
 __all__ = [
+    "Lengths",
     "ProgramPlan",
     "ProgramRequest",
     "Progress",
     "Standby",
+    "Trip",
+    "best_posture",
+    "lengths_of",
     "nobody",
     "plan_program",
-    "plan_standby",
 ]

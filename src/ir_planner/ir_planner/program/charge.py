@@ -6,11 +6,11 @@ feeds the holding torque; with the brakes closed it stays.
 
 from dataclasses import replace
 
+from ir_msgs_py.modes import modes_of
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.checks import carried, holding_watts
 from ir_planner.program.pauses import Pause
-from ir_planner.program.standby import MOTORS
 from ir_planner.timing import Movement
 
 
@@ -46,7 +46,7 @@ class Charge:
         """How long the motors hold the arm [s]; the controller's own timer closes the brakes long after the
         charge has gone.
         """
-        mode, times = step.power_mode or MOTORS, self._times
-        if mode == MOTORS:
+        modes, times = modes_of(step.power_mode), self._times
+        if not modes:
             return pause.seconds
-        return min(times.enter(mode) + times.leave(mode), pause.seconds)
+        return min(times.enter(modes[0].name) + times.leave(modes[-1].name), pause.seconds)

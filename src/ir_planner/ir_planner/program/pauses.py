@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import DEEPER, modes_of
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.transitions import TransitionTimes
-from ir_planner.program.standby import BRAKES, MOTORS, late_start, pause_energy, plan_standby
+from ir_planner.program.rests import BRAKES, MOTORS, Rests, rests_at
 from ir_planner.scene import PlanningScene
 
 AUTO = "AUTO"
@@ -27,29 +28,27 @@ class Pause:
 
 
 def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
-    """In the mode that is asked for, the one of least energy (AUTO), or on motors; longer than the controller
-    stands on motors: on brakes, which it would close anyway, so that they are open again in time.
+    """In the mode that is asked for, the sequence of least energy (AUTO), or on motors; longer than the
+    controller stands on motors: on brakes, which it would close anyway, so that they are open again in time.
     """
-    mode = pause.requested
+    rests, mode = rests_at(pause.q, pause.scene, times), pause.requested
     if pause.requested == AUTO:
-        least = pause.seconds > 0.0
-        mode = plan_standby(pause.seconds, pause.q, pause.scene, times).chosen.name if least else ""
-    elif not pause.requested and late_start(pause.seconds, pause.scene, times) > 0.0:
+        mode = DEEPER.join(step.rest.name for step in rests.known(pause.seconds)[1]) or MOTORS
+    elif not pause.requested and rests.cost((), pause.seconds)[1] > 0.0:
         mode = BRAKES
-    return _spent(pause, mode, times)
+    return _spent(pause, mode, rests)
 
 
 def pause_by_itself(pause: Pause, times: TransitionTimes) -> PlannedMovement:
     """As the controller spends it when nobody asks for a mode."""
-    return _spent(pause, "", times)
+    return _spent(pause, "", rests_at(pause.q, pause.scene, times))
 
 
-def _spent(pause: Pause, mode: str, times: TransitionTimes) -> PlannedMovement:
-    energy = 0.0
-    if pause.seconds > 0.0:
-        energy = pause_energy(mode or MOTORS, pause.seconds, pause.q, pause.scene, times)
-    if not np.isfinite(energy):  # asked for by name though it is too short: the runner stands on motors
-        energy = pause_energy(MOTORS, pause.seconds, pause.q, pause.scene, times)
+def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
+    sequence = tuple(rests.named(each.name) for each in modes_of(mode))
+    energy = rests.in_time(sequence, pause.seconds) if sequence else np.inf
+    if not np.isfinite(energy):  # on motors, also where it is asked for by name though it is too short
+        energy = rests.cost((), pause.seconds)[0]
     report = TrajectoryReport(duration=pause.seconds, energy=energy, base_energy=energy, certified=True)
     return PlannedMovement(
         kind=MovementKind.PAUSE,

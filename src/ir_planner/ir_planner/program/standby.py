@@ -1,35 +1,38 @@
-"""Which power mode a pause should be spent in, and when to wake: the mode whose energy over it is least.
+"""How a pause should be spent: a sequence of power modes with its switch times, and when to wake.
 
-A mode may be entered when the pause covers going in, the shortest stay and coming out. While going in the
-power is that of the mode that is left (standing on motors), while coming out that of standing on motors as
-well: an assumption of the power data that decides every break-even. Left to itself, the controller stands on
-motors until its timer closes the brakes, and opens them when the next movement asks, which starts later then.
+Of a pause of known length the modes are entered one after the other, each as soon as it can be, so that most
+of it is spent in the deepest, and the robot is woken in time. A pause whose end is not known has a timeout
+policy (timeouts), and its end wakes the robot, which is ready later then.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.power import PowerMode
-from ir_msgs_py.status import StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-from ir_planner.checks import holding_watts
-from ir_planner.errors import RequestError
+from ir_planner.program.pause_lengths import Lengths, lengths_of
+from ir_planner.program.rests import BRAKES, MOTORS, Rests, Step, Steps, mode_watts, rests_at
+from ir_planner.program.timeouts import Timeouts
 from ir_planner.scene import PlanningScene
 
-MOTORS, BRAKES = "STAND_ON_MOTORS", "STAND_ON_BRAKES"
-PAUSE_MAX = 604_800.0  # s: a week
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Standby:
-    """chosen mode, wake_at [s from the start of the pause], energy over the pause [J].
+    """The advice. energy [J]: over the pause, where its length is not known the mean over the lengths.
 
-    saving [J]: against what the controller does by itself (`timer` s on motors, then on brakes);
+    chosen: the deepest mode that is asked for. wake_at [s] from the start of the pause, inf: its end wakes
+    the robot. saving [J]: against what the controller does by itself (`timer` s on motors, then on brakes);
     saving_on_motors [J]: against standing on motors all the time. alternatives: all modes, shallow to deep,
-    and their energies [J] (inf: the pause is too short); on motors with what the controller does itself.
+    each alone and at once, and their energies [J] (inf: the pause is too short); on motors with what the
+    controller does by itself. modes: the sequence, each asked for at its switch time [s]. expected, worst,
+    clairvoyant [J]: mean and largest energy, and the mean with each length known at the start. late, latest
+    [s]: mean and largest time from the end of the pause until the robot is ready. posture: where to wait, "":
+    where the robot stands; posture_energies [J]: at each of the postures; trips: what moving there takes, in
+    words.
     """
 
     chosen: PowerMode
@@ -40,25 +43,34 @@ class Standby:
     timer: float
     alternatives: tuple[PowerMode, ...]
     energies: tuple[float, ...]
+    modes: tuple[str, ...]
+    switch_times: tuple[float, ...]
+    expected: float
+    worst: float
+    clairvoyant: float
+    late: float = 0.0
+    latest: float = 0.0
+    posture: str = ""
+    posture_energies: tuple[float, ...] = ()
+    trips: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
-        """What is saved, against what."""
-        return (
-            f"{self.chosen.name} saves {self.saving:.0f} J against the controller's own timer (brakes after "
-            f"{self.timer:g} s on motors), {self.saving_on_motors:.0f} J against standing on motors"
+        """How the pause is spent, what is saved against what, and what it costs that its end is not known."""
+        steps = ", ".join(
+            f"{mode} at {at:g} s" for mode, at in zip(self.modes, self.switch_times, strict=True)
         )
-
-
-def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
-    """Mains power [W] in a mode at q (n,): controller, tool (its bus share while the drive bus is up),
-    holding torque.
-    """
-    if name == MOTORS:
-        return holding_watts(q, scene)
-    always = sum(load.watts_always for load in scene.loads)
-    bus = sum(load.watts_drive_bus for load in scene.loads) if name == BRAKES else 0.0
-    return scene.power.mode(name).controller_watts + always + bus
+        parts = [
+            f"{steps}: saves {self.saving:.0f} J against the controller's own timer (brakes after "
+            f"{self.timer:g} s on motors), {self.saving_on_motors:.0f} J against standing on motors"
+        ]
+        if np.isinf(self.wake_at):
+            parts.append(
+                f"the end of the pause wakes the robot: expected {self.expected:.0f} J, at worst "
+                f"{self.worst:.0f} J, {self.clairvoyant:.0f} J if the end were known; ready "
+                f"{self.late:.1f} s after it, at worst {self.latest:.1f} s"
+            )
+        return "; ".join((*parts, *self.trips))
 
 
 def pause_energy(
@@ -68,54 +80,91 @@ def pause_energy(
 
     The robot stands at q (n,). On motors: with what the controller does by itself.
     """
-    if name == MOTORS:
-        return _energy_by_itself(pause, q, scene, times)
-    change = times.enter(name) + times.leave(name)
-    if pause < change + times.minimum_stay(name):
-        return float("inf")
-    return mode_watts(MOTORS, q, scene) * change + mode_watts(name, q, scene) * (pause - change)
+    rests = rests_at(q, scene, times)
+    return rests.cost((), pause)[0] if name == MOTORS else rests.in_time((rests.named(name),), pause)
 
 
 def late_start(pause: float, scene: PlanningScene, times: TransitionTimes) -> float:
     """How much later than the end of a pause [s] on motors the next movement starts: the brakes that the
     controller has closed must open.
     """
-    begun = pause - scene.power.motors_to_brakes_in_program
-    if begun < 0.0:
-        return 0.0
-    closed = times.enter(BRAKES) + times.minimum_stay(BRAKES)
-    return max(closed - begun, 0.0) + times.leave(BRAKES)
-
-
-def _energy_by_itself(pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
-    """Energy [J] of a pause that the controller is left to, and of opening its brakes afterwards."""
-    motors, brakes = mode_watts(MOTORS, q, scene), mode_watts(BRAKES, q, scene)
-    late = late_start(pause, scene, times)
-    if late == 0.0:
-        return motors * pause
-    on_motors = scene.power.motors_to_brakes_in_program + times.enter(BRAKES) + times.leave(BRAKES)
-    return motors * on_motors + brakes * (pause + late - on_motors)
+    return rests_at(np.array(scene.cell.machine_home), scene, times).cost((), pause)[1]
 
 
 def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Standby:
-    """The mode of least energy for a pause [s] at q (n,). Raises RequestError for a pause that is none."""
-    if not (np.isfinite(pause) and 0.0 < pause <= PAUSE_MAX):
-        raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS, f"pause is {pause:g} s: it must be in (0, {PAUSE_MAX:g}] s"
-        )
-    modes = tuple(_mode(name, q, scene, times) for name in REST_MODES)
-    energies = tuple(pause_energy(name, pause, q, scene, times) for name in REST_MODES)
-    k = int(np.argmin(energies))
+    """How to spend a pause [s] at q (n,). Raises RequestError for a pause that is none."""
+    return advice(lengths_of(pause), q, scene, times)
+
+
+def advice(lengths: Lengths, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Standby:
+    """How to spend a pause of these lengths at q (n,)."""
+    rests, pause = rests_at(q, scene, times), lengths.most
+    steps, cost = _known(rests, pause) if lengths.known else _policy(rests, lengths)
+    by_itself = _mean(rests, (), lengths)
+    modes, switches = _shown(rests, steps, pause)
+    chosen = steps[-1].rest.name if steps else MOTORS
     return Standby(
-        chosen=modes[k],
-        wake_at=pause - times.leave(REST_MODES[k]),
-        energy=energies[k],
-        saving=energies[0] - energies[k],
-        saving_on_motors=mode_watts(MOTORS, q, scene) * pause - energies[k],
-        timer=scene.power.motors_to_brakes_in_program,
-        alternatives=modes,
-        energies=energies,
+        chosen=_mode(chosen, q, scene, times),
+        wake_at=pause - times.leave(chosen) if lengths.known else float("inf"),
+        energy=cost.expected,
+        saving=by_itself - cost.expected,
+        saving_on_motors=rests.motors * float(lengths.likely.mean()) - cost.expected,
+        timer=rests.timer,
+        alternatives=tuple(_mode(name, q, scene, times) for name in REST_MODES),
+        energies=_alone(rests, lengths, by_itself),
+        modes=modes,
+        switch_times=switches,
+        **cost._asdict(),
     )
+
+
+class _Cost(NamedTuple):
+    """Expected, worst and clairvoyant energy [J], mean and largest delay [s]."""
+
+    expected: float
+    worst: float
+    clairvoyant: float
+    late: float
+    latest: float
+
+
+def _known(rests: Rests, pause: float) -> tuple[Steps, _Cost]:
+    """The sequence for a pause of known length [s], and its cost."""
+    energy, steps = rests.known(pause)
+    late = 0.0 if steps else rests.cost((), pause)[1]
+    return steps, _Cost(energy, energy, energy, late, late)
+
+
+def _policy(rests: Rests, lengths: Lengths) -> tuple[Steps, _Cost]:
+    """The timeout policy for a pause of these lengths, and its cost."""
+    steps = Timeouts(rests, lengths.likely).best()
+    each = np.array([rests.cost(steps, float(pause)) for pause in lengths.likely])
+    ends = lengths.extreme(tuple(step.at for step in steps))
+    worst = np.array([rests.cost(steps, float(pause)) for pause in ends]).max(axis=0)
+    clairvoyant = float(np.mean([rests.clairvoyant(float(pause)) for pause in lengths.likely]))
+    expected, late = each.mean(axis=0)
+    return steps, _Cost(float(expected), float(worst[0]), clairvoyant, float(late), float(worst[1]))
+
+
+def _mean(rests: Rests, steps: Steps, lengths: Lengths) -> float:
+    return float(np.mean([rests.cost(steps, float(pause))[0] for pause in lengths.likely]))
+
+
+def _alone(rests: Rests, lengths: Lengths, by_itself: float) -> tuple[float, ...]:
+    """Energies [J] of every mode alone, asked for at once; inf where a pause of known length is too short."""
+    if lengths.known:
+        return (by_itself, *(rests.in_time((rest,), lengths.most) for rest in rests.modes))
+    return (by_itself, *(_mean(rests, (Step(rest, 0.0),), lengths) for rest in rests.modes))
+
+
+def _shown(rests: Rests, steps: Steps, most: float) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Names and switch times [s] of a sequence, from the mode that the pause begins in."""
+    if not steps or steps[0].at > 0.0:
+        closed = not steps and most > rests.timer
+        brakes = (Step(rests.named(BRAKES), rests.timer),) if closed else ()
+        shown = (*steps, *brakes)
+        return (MOTORS, *(step.rest.name for step in shown)), (0.0, *(step.at for step in shown))
+    return tuple(step.rest.name for step in steps), tuple(step.at for step in steps)
 
 
 def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> PowerMode:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 
+from ir_msgs_py.modes import deepest
 from ir_recorder.analysis.meter import Meter
 from ir_recorder.analysis.resting import BRAKES, MOTORS, left_alone_joules, pause_joules
 from ir_recorder.analysis.results import NAN, ProgramTotals, Share, StepResult, Unshortened
@@ -54,7 +55,7 @@ def unshortened_cycle(
         return Unshortened(NAN, NAN, sum(r.seconds for r in pauses), sum(lengths))
     energy, seconds = meter.energy(start, end), end - start
     for result, length in zip(pauses, lengths, strict=True):
-        mode = result.step.movement.power_mode
+        mode = deepest(result.step.movement.power_mode)
         motors = watts(MOTORS, result)
         if mode == MOTORS or length < change(mode):
             full = left_alone_joules(motors, watts(BRAKES, result), length, timer, change(BRAKES))

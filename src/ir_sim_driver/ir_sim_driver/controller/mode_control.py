@@ -129,4 +129,4 @@ class ModeControl:
         elif before is Mode.FROM_HIBERNATION:
             self._plc.wake()
         if now in OFF_THE_NETWORK:
-            self.pauses.rest = None
+            self.pauses.forget()

@@ -1,7 +1,7 @@
 """Power modes at work: their state machine, how long each lasts, and PROFIenergy's choice for a pause."""
 
 from ir_sim_driver.power.power_modes import NO_DEMAND, Demand, PowerModes
-from ir_sim_driver.power.profienergy import PAUSE_MAX, best_mode, energy_of, mode_table
+from ir_sim_driver.power.profienergy import PAUSE_MAX, best_mode, best_route, energy_of, mode_table
 from ir_sim_driver.power.transitions import IdleTimes, Times, times_of
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "PowerModes",
     "Times",
     "best_mode",
+    "best_route",
     "energy_of",
     "mode_table",
     "times_of",

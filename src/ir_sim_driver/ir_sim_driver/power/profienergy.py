@@ -6,15 +6,17 @@ E_enter + E_leave + P_m (T - enter - leave) is below the energy of every other c
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import ROW, Mode
 from ir_msgs_py.power import PowerMode
 from ir_sim_driver.power.transitions import Times
 
+_ROUNDING = 1e-6  # s; a pause may be just as long as a sequence
 PAUSE_MAX = 604_800.0  # s: a week
 
 
@@ -55,6 +57,35 @@ def best_mode(table: tuple[PowerMode, ...], pause: float) -> PowerMode:
     """The mode with the least energy among those that the pause [s] is long enough for."""
     fitting = [mode for mode in table if pause >= mode.time_min_pause]
     return min(fitting, key=lambda mode: energy_of(mode, pause))
+
+
+def best_route(
+    table: tuple[PowerMode, ...], pause: float, source: Mode, source_watts: float
+) -> tuple[PowerMode, ...]:
+    """The modes that a pause [s] takes least energy in, one after the other, each no longer than it must be
+    but for the last; empty: stay in `source`, which draws source_watts, on motors or in a rest.
+
+    A mode is entered at the power of the one before.
+    """
+    motors = table[0].power
+    deeper = [
+        mode for mode in table[1:] if ROW[mode.mode].depth >= ROW[source].depth and mode.mode is not source
+    ]
+    leave = next(mode.regular_time_to_operate for mode in table if mode.mode is source)
+    route: tuple[PowerMode, ...] = ()
+    best = motors * leave + source_watts * (pause - leave)
+    for count in range(1, len(deeper) + 1):
+        for modes in itertools.combinations(deeper, count):
+            energy, left, watts = 0.0, pause, source_watts
+            for mode in modes:
+                energy += watts * mode.time_to_pause + mode.power * mode.time_min_length_of_stay
+                left -= mode.time_to_pause + mode.time_min_length_of_stay
+                watts = mode.power
+            left -= modes[-1].regular_time_to_operate
+            energy += motors * modes[-1].regular_time_to_operate + watts * left
+            if left >= -_ROUNDING and energy < best:
+                best, route = energy, modes
+    return route
 
 
 def _with_break_even(table: list[PowerMode]) -> list[PowerMode]:

@@ -1,0 +1,113 @@
+"""When to rest deeper in a pause whose end is not known: the timeout policy of least expected energy.
+
+The lengths of the pause are given as equally likely samples. A policy is a sequence of modes with switch
+times; the end of the pause wakes the robot, whatever mode it is in. The best switch times are among few: the
+expected energy grows with a switch time between two samples (every pause that reaches it stays longer in the
+mode that draws more, or is ready later), and drops only where a sample is passed, because that pause ends
+before the switch. So a switch is at 0, at a sample (of the pauses longer than that), at the controller's own
+timer, or at the moment when the mode before can be left. Over these times the policy is found backwards, mode
+by mode, by dynamic programming: exact, in n log n.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ir_msgs_py.arrays import FloatArray
+from ir_planner.program.rests import BRAKES, Rest, Rests, Step, Steps
+
+
+@dataclass(frozen=True, eq=False)
+class Timeouts:
+    """Policies for the modes of `rests` and lengths (n,) [s], sorted."""
+
+    rests: Rests
+    lengths: FloatArray
+
+    def best(self) -> Steps:
+        """The policy of least expected energy."""
+        steps = self._first()
+        while steps and (following := self._next(steps[-1])) is not None:
+            steps = (*steps, following)
+        return steps
+
+    def _first(self) -> Steps:
+        """The first mode and its switch time; none: no pause outlasts standing on motors."""
+        rests, lengths = self.rests, self.lengths
+        times = np.concatenate(([0.0], lengths[lengths < rests.timer]))
+        best = float("inf"), Steps()
+        if lengths[-1] <= rests.timer:
+            best = self._until(np.array([lengths[-1]]), rests.motors, 0.0)[0], Steps()
+        for rest in rests.modes:
+            at = np.append(times, rests.timer) if rest.name == BRAKES else times
+            costs = self._until(at, rests.motors, 0.0) + self._from(at, rest, rests.motors)
+            k = int(np.argmin(costs))
+            if rest.watts <= rests.motors and costs[k] < best[0]:
+                best = float(costs[k]), (Step(rest, float(at[k])),)
+        return best[1]
+
+    def _next(self, step: Step) -> Step | None:
+        """The mode after a step and its switch time; None: it is the last."""
+        rest, lengths = step.rest, self.lengths
+        at = np.concatenate(([step.free], lengths[lengths >= step.free]))
+        least, best = self._until(lengths[-1:], rest.watts, rest.leave)[0], None
+        for deeper in self._deeper(rest):
+            costs = self._until(at, rest.watts, rest.leave) + self._from(at, deeper, rest.watts)
+            k = int(np.argmin(costs))
+            if self._longer(at)[k] and costs[k] < least:
+                least, best = costs[k], Step(deeper, float(at[k]))
+        return best
+
+    def _deeper(self, rest: Rest) -> tuple[Rest, ...]:
+        after = self.rests.modes[self.rests.modes.index(rest) + 1 :]
+        return tuple(each for each in after if each.watts <= rest.watts)
+
+    @cached_property
+    def _sums(self) -> FloatArray:
+        return np.concatenate(([0.0], np.cumsum(self.lengths)))
+
+    def _shorter(self, times: FloatArray) -> FloatArray:
+        """How many pauses end at each time or before."""
+        return np.searchsorted(self.lengths, times, side="right").astype(np.float64)
+
+    def _longer(self, times: FloatArray) -> FloatArray:
+        return len(self.lengths) - self._shorter(times)
+
+    def _until(self, times: FloatArray, watts: float, leave: float) -> FloatArray:
+        """Energy of all pauses in one mode from time 0 until each of these times, and back to motors of those
+        that end before; differences of two times are the energy between them.
+        """
+        ended = self._shorter(times)
+        lengths = self._sums[ended.astype(np.intp)]
+        staying = watts * (lengths + self._longer(times) * times)
+        back: FloatArray = ended * (self.rests.motors * leave)
+        return staying + back
+
+    def _from(self, times: FloatArray, rest: Rest, watts: float) -> FloatArray:
+        """Least energy, of all pauses that are longer, of entering a mode at each of these times from one
+        that draws `watts`, until the robot is ready.
+        """
+        longer, free = self._longer(times), times + rest.busy
+        entering = longer * (watts * rest.enter + rest.watts * rest.stay)
+        early = (longer - self._longer(free)) * (self.rests.motors * rest.leave)
+        return entering + early + self._after(free, rest)
+
+    def _after(self, free: FloatArray, rest: Rest) -> FloatArray:
+        """Least energy from each of the times on, from which a mode can be left, of all pauses that are
+        longer.
+        """
+        ends = self._onward(self.lengths, rest)
+        later = np.minimum.accumulate(ends[::-1])[::-1]
+        following = np.searchsorted(self.lengths, free, side="left")
+        at_samples = np.append(later, np.inf)[following]
+        best = np.minimum(at_samples, self._onward(free, rest)) - self._until(free, rest.watts, rest.leave)
+        return np.where(self._longer(free) > 0, best, 0.0)
+
+    def _onward(self, times: FloatArray, rest: Rest) -> FloatArray:
+        """Energy in the mode from time 0 until each of these times, then deeper; the last: to the end."""
+        staying = self._until(times, rest.watts, rest.leave)
+        options = [self._from(times, deeper, rest.watts) for deeper in self._deeper(rest)]
+        nobody = self._longer(times) == 0
+        onward: FloatArray = np.min(options, axis=0) if options else np.full(len(times), np.inf)
+        return staying + np.where(nobody, 0.0, onward)

@@ -1,0 +1,57 @@
+"""To a posture and back, planned: what a robot that waits elsewhere must do."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ir_description import Cell
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.status import StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.program import Trip
+from ir_planner.regional import MovementPlan
+from ir_planner.request import POSTURES, Goal, parse_goal
+
+POSTURES_MAX = 20  # two movements are planned for each
+Plan = Callable[[FloatArray, Goal], MovementPlan]
+
+
+def trips_to(postures: Sequence[str], here: FloatArray, cell: Cell, plan: Plan) -> tuple[Trip, ...]:
+    """Trips from here (n,) to named postures and stations and back. plan: a movement from a start to a goal.
+
+    Raises RequestError for too many, UnknownNameError for one that the cell doesn't name.
+    """
+    if len(postures) > POSTURES_MAX:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"postures has {len(postures)} names: at most {POSTURES_MAX} are planned",
+        )
+    known = (*(station.name for station in cell.stations), *POSTURES)
+    for name in postures:
+        if name not in known:
+            raise UnknownNameError("posture", name, known)
+    return tuple(_trip(name, here, cell, plan) for name in postures)
+
+
+def _trip(name: str, here: FloatArray, cell: Cell, plan: Plan) -> Trip:
+    goal = parse_goal(name, cell)
+    if goal.configuration is not None and np.array_equal(goal.configuration, here):
+        return Trip(name, here)
+    there = plan(here, goal)
+    if there.trajectory is None:
+        return Trip(name, here, problem=there.status.message)
+    q = there.trajectory.positions[-1]
+    back = plan(q, Goal(configuration=here))
+    if back.trajectory is None:
+        return Trip(name, here, problem=back.status.message)
+    return Trip(name, q, _cost(there.report), _cost(back.report), _ids(there.trajectory, back.trajectory))
+
+
+def _cost(report: TrajectoryReport) -> tuple[float, float]:
+    return report.duration, report.energy
+
+
+def _ids(there: JointTrajectory, back: JointTrajectory) -> tuple[str, str]:
+    return there.trajectory_id, back.trajectory_id

@@ -1,0 +1,129 @@
+"""What standby advice predicts is what the simulated controller measures, stepped without real time.
+
+Modes, postures, loads, lengths and times of the controller are drawn by seed. The prediction is the
+planner's, the measurement the plant's meter: two codes that share the data files alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ir_description import load_cell, load_power_data
+from ir_msgs_py.modes import Mode
+from ir_msgs_py.names import NO_LOAD
+from ir_msgs_py.transitions import TransitionTimes
+from ir_planner.program.pause_lengths import lengths_of
+from ir_planner.program.rests import Step, rests_at
+from ir_planner.program.standby import advice, plan_standby
+from ir_planner.scene import scene_with
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.power import IdleTimes
+
+CELL, POWER = load_cell("demo"), load_power_data()
+LOADS = (NO_LOAD, CELL.tool.name, f"{CELL.tool.name}+{CELL.parts[0].name}")
+SHARE, JOULES = 0.03, 20.0  # whichever is larger
+DT = 0.01  # s: nothing moves, and no time of the controller is shorter
+DEBOUNCE = 0.02  # s: how long a level has to stay
+BITS = {"STAND_ON_BRAKES": "drives_off", "BUS_POWER_OFF": "ab", "HIBERNATION": "hib"}
+
+
+class Case:
+    """A controller that stands at a posture with a load, and the planner's scene of it."""
+
+    def __init__(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        load = LOADS[seed % len(LOADS)]
+        robot = CELL.robot
+        share = rng.uniform(0.2, 0.8, robot.n)
+        self.q = robot.position_min + share * (robot.position_max - robot.position_min)
+        self.times = TransitionTimes()
+        self.timer = 20.0
+        if seed % 2:
+            drawn = {name: float(round(rng.uniform(0.05, 40.0), 2)) for name in vars(self.times)}
+            self.times, self.timer = TransitionTimes(**drawn), float(round(rng.uniform(1.0, 40.0), 2))
+        power = replace(POWER, motors_to_brakes_in_program=self.timer)
+        self.scene = scene_with(CELL, load, power)
+        idle = IdleTimes(motors_to_brakes_in_program=self.timer)
+        settings = SimulationSettings(dt=DT, transitions=self.times, idle=idle)
+        self.plant = make_simulation(CELL, load, "ideal", settings, POWER)
+        self.plant.backend.reset(self.q)
+        self.plant.executor.hold(self.q)
+        self.rng = rng
+
+    def ready(self) -> float:
+        """Step until motors are on; the seconds it took."""
+        begun = self.plant.time
+        while not self.plant.modes.motors_on:
+            self.plant.step()
+            assert self.plant.time - begun < 1000.0
+        return self.plant.time - begun
+
+
+def close(measured: float, planned: float) -> None:
+    assert abs(measured - planned) <= max(JOULES, SHARE * planned), (measured, planned)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_a_pause_of_known_length_costs_what_was_planned(seed: int) -> None:
+    """PROFIenergy's start and end; the driver goes through the modes by itself."""
+    case = Case(seed)
+    pause = float(round(10.0 ** case.rng.uniform(0.0, 3.0), 2))
+    planned = plan_standby(pause, case.q, case.scene, case.times)
+    plant = case.plant
+    begun = plant.mains.energy()
+    assert plant.pauses.start(pause, executing=False).name == planned.chosen.name
+    plant.run(planned.wake_at)
+    assert plant.modes.level in (Mode[planned.chosen.name], Mode.STAND_ON_MOTORS)
+    if plant.modes.mode is Mode.HIBERNATION:
+        plant.wake()
+    else:
+        plant.pauses.end()
+    late = planned.wake_at + case.ready() - pause
+    assert abs(late - planned.late) < 0.1
+    plant.run(max(-late, 0.0))
+    close(plant.mains.energy() - begun, planned.energy)
+
+
+@pytest.mark.parametrize("seed", range(24, 60))
+def test_a_policy_costs_what_was_planned_whenever_the_pause_ends(seed: int) -> None:
+    """A PLC asks for each mode at its switch time, while the pause is on, and wakes the robot at its end."""
+    case = Case(seed)
+    samples = np.round(10.0 ** case.rng.uniform(-0.5, 2.6, 12), 2)
+    planned = advice(lengths_of(0.0, samples), case.q, case.scene, case.times)
+    rests = rests_at(case.q, case.scene, case.times)
+    steps = tuple(
+        Step(rests.named(mode), at)
+        for mode, at in zip(planned.modes, planned.switch_times, strict=True)
+        if mode in BITS
+    )
+    pause = float(samples[case.rng.integers(len(samples))])
+    energy, late = rests.cost(steps, pause)
+    measured, delay = followed(case, steps, pause)
+    assert abs(delay - late) < 0.2
+    close(measured, energy)
+
+
+def followed(case: Case, steps: tuple[Step, ...], pause: float) -> tuple[float, float]:
+    """Energy [J] and delay [s] of the plant when a PLC sets its bits at the switch times and at the end."""
+    plant = case.plant
+    begun, bits = plant.mains.energy(), [BITS[step.rest.name] for step in steps if step.at < pause]
+    for k, bit in enumerate(bits):
+        plant.run(steps[k].at - plant.time)
+        plant.plc.set_bit(bit, True)
+        if k and bits[k - 1] != "drives_off":  # one power bit at a time
+            plant.plc.set_bit(bits[k - 1], False)
+    plant.run(pause - plant.time)
+    for bit in bits:
+        plant.plc.set_bit(bit, False)
+    if bits or not plant.modes.motors_on:
+        plant.plc.set_bit("drives_on", True)  # its edge asks for motors
+        plant.run(DEBOUNCE)
+    while not plant.modes.motors_on:
+        plant.wake()
+        plant.step()
+    delay = plant.time - pause
+    return plant.mains.energy() - begun, delay if delay > 2.0 * DEBOUNCE else 0.0
