@@ -47,7 +47,7 @@ def movements(request_: ProgramRequest) -> Movements:
 @pytest.fixture(scope="module")
 def common(request_: ProgramRequest, movements: Movements) -> CommonProgram:
     """It needs the layers alone: the chain of the request doesn't matter."""
-    nowhere = Chain([], 0.0, 0.0)
+    nowhere = Chain([], 0.0, 0.0, 0.0)
     return common_program(Choice(request_, Ladder(movements, 0), nowhere))
 
 

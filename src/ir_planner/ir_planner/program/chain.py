@@ -19,6 +19,7 @@ from ir_planner.service import ExitSearch, ServiceLine
 
 TOLERANCE = 2e-3  # of the cost: a cheaper chain than that isn't looked for
 _PLANNED_PER_STOP = 8  # movements that may be planned for each stop once there is a chain
+_PLANNED_PER_STOP_BY_W = 32  # the same by W, whose bound says little where segments are not free
 
 
 def layers_of(
@@ -54,20 +55,23 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
     """
     context, count = movements.context, len(movements.route)
     if not count:
-        return Chain([0], 0.0, 0.0)
+        return Chain([0], 0.0, 0.0, 0.0)
     travel = context.options.objective == "movement_cost"
     edges = (TravelEdges if travel else CostEdges)(movements, improvement)
 
+    most = count * (3 + (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP))
+
     def may_go_on() -> bool:
-        return movements.planned < count * (3 + _PLANNED_PER_STOP) and not context.work.exhausted
+        return movements.planned < most and not context.work.exhausted
 
     with context.journal.stage("station graph") as notes:
         graph = StationGraph(edges.hops(), edges.settle, TOLERANCE, may_go_on)
         chain = graph.solve(lambda best: progress("station graph", 0, count, best))
         unit = "W" if travel else "cost"
         notes.append(
-            f"{unit} {chain.cost:.0f}, at most {100 * chain.gap:.2f} % above the best chain; "
-            f"{movements.planned} movements planned"
+            f"{unit} {chain.cost:.0f}, at most {100 * chain.gap:.2f} % above the best chain"
+            + ("" if travel else f" (measured bounds; {100 * chain.proved_gap:.1f} % by proved ones)")
+            + f"; {movements.planned} movements planned"
         )
     if not np.isfinite(chain.cost):
         raise StageError(movements.unreachable)

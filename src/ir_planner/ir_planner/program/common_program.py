@@ -69,7 +69,7 @@ def nearest_chain(movements: Movements) -> Chain:
         costs = movement_cost(weights, here, there)
         chosen.append(int(np.argmin(costs)))
         total += float(costs.min())
-    return Chain(chosen, total, total)
+    return Chain(chosen, total, total, total)
 
 
 def _plain(part: Part, movements: Movements) -> Movement | None:

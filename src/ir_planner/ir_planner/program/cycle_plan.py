@@ -9,7 +9,9 @@ from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.cycle_time import Task, Timed, shared_out
-from ir_planner.program.ladder import FASTEST
+from ir_planner.program.gap import cycle_bound
+from ir_planner.program.ladder import FASTEST, LADDER
+from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.time_values import TimeValues
 from ir_planner.request import DURATION_MAX
@@ -21,11 +23,14 @@ _SAME_CHAIN = 1  # rungs from the request's own value, over which its chain is t
 
 @dataclass(frozen=True, eq=False)
 class TimedChoice:
-    """A chain with movements that fill a cycle."""
+    """A chain with movements that fill a cycle; bound: the least that movements and wait can take from the
+    mains [J].
+    """
 
     choice: Choice
     timed: Timed
     cycle_time: float
+    bound: float = 0.0
 
     @property
     def steps(self) -> Steps:
@@ -46,8 +51,14 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
         rung = values.bracket(seconds)
         best = choice, shared_out(values, task_of(choice, seconds))
         notes.append("too short for the chain" if best[1] is None else f"{best[1].energy:.0f} J")
+    rates = rates_of(choice.movements.context)
+    bound = 0.0
+    if rates.joule and choice.movements.context.options.objective != "movement_cost":
+        bound = cycle_bound(choice, choice.chain, rates.second, seconds)
     if abs(rung - choice.ladder.first) > _SAME_CHAIN:
         other = _cheapest_at(rung, choice, progress)
+        if other is not None and rung != FASTEST:
+            bound = max(bound, cycle_bound(choice, other.chain, LADDER[rung], seconds))
         if other is not None and other.chain.chosen != choice.chain.chosen:
             values = TimeValues(other.ladder, other.parts)
             with journal.stage("cycle time") as notes:
@@ -63,7 +74,7 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
             f"cycle_time is {cycle_time:g} s: the shortest is {shortest + standing:.3f} s, "
             f"of which {standing:.3f} s are pauses",
         )
-    return TimedChoice(best[0], best[1], cycle_time)
+    return TimedChoice(best[0], best[1], cycle_time, bound)
 
 
 def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None:

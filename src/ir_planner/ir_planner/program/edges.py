@@ -14,7 +14,7 @@ from ir_planner.program.coarse_cost import MARGIN, CoarseCost
 from ir_planner.program.movements import Failure, Movements, cost_of, rates_of
 from ir_planner.program.node import Node
 from ir_planner.program.route import Route
-from ir_planner.program.station_graph import ACROSS, Hop, Part, Settled
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Hop, Part, Settled
 from ir_planner.scene import STILL, movement_cost, path_cost
 
 Turned = Part | tuple[int, str, bytes]  # what parts that cost the same have in common
@@ -66,7 +66,7 @@ class CostEdges:
     def _coarse(self, part: Part) -> Settled:
         first, second = self.movements.ends(part)
         value = self._coarse_costs[part.hop].between(first, second)
-        return Settled(value * (1.0 - MARGIN), exact=False)
+        return Settled(value * (1.0 - MARGIN), exact=False, proved=False)
 
     def _planned(self, parts: list[Part]) -> list[Settled]:
         """Costs of the movements; a service line that is another one turned costs what that one does."""
@@ -87,7 +87,7 @@ class CostEdges:
 
 
 class TravelEdges:
-    """Parts by W of eq. (9)."""
+    """Parts by W of eq. (9): straight segments where these are free, else the movements found."""
 
     def __init__(self, movements: Movements, improvement: int) -> None:
         self.movements, self.improvement = movements, improvement
@@ -99,7 +99,7 @@ class TravelEdges:
         self._blocked: set[Part] = set()
 
     def hops(self) -> list[Hop]:
-        """All hops with W of the straight segments; W of the service lines is exact."""
+        """All hops with W of the straight segments and of the service lines' points."""
         layers, route = self.movements.layers, self.movements.route
         return [self._hop(route, hop, layers[hop], layers[hop + 1]) for hop in range(len(route))]
 
@@ -109,14 +109,17 @@ class TravelEdges:
             np.array([path_cost(weights, node.line.points) for node in nodes]) for nodes in (first, second)
         )
         across = movement_cost(weights, _outsides(first)[:, None], _outsides(second)[None])
-        hop = Hop(leave, across, enter)
-        for kind in hop.exact:
-            hop.exact[kind][:] = kind != ACROSS
-        return _with_standing_parts(hop, first, second)
+        return _with_standing_parts(Hop(leave, across, enter), first, second)
 
     def settle(self, parts: list[Part]) -> list[Settled]:
-        """W of straight segments where they are free; else, asked again, W of the path found."""
-        return [self._planned(part) if part in self._blocked else self._straight(part) for part in parts]
+        """W of straight segments where they are free, which is exact; else, asked again, and of service
+        lines W of the movement.
+        """
+        fresh = [part for part in parts if part.kind == ACROSS and part not in self._blocked]
+        straight = {part: self._straight(part) for part in fresh}
+        others = [part for part in parts if part not in straight]
+        found = dict(zip(others, self._planned(others), strict=True)) if not straight else {}
+        return [straight.get(part) or found.get(part) or Settled(0.0, exact=False) for part in parts]
 
     def _straight(self, part: Part) -> Settled:
         first, second = self.movements.nodes(part)
@@ -126,13 +129,11 @@ class TravelEdges:
         weights = self.movements.route.arriving(part.hop).weights
         return Settled(float(movement_cost(weights, first.outside, second.outside)), exact=bool(free))
 
-    def _planned(self, part: Part) -> Settled:
-        movement = self.movements.plan([part], self.improvement)[0]
-        if isinstance(movement, Failure):
-            return Settled(np.inf, exact=True)
-        weights = self.movements.route.arriving(part.hop).weights
-        straight = float(movement_cost(weights, movement.path[0], movement.path[-1]))
-        return Settled(max(path_cost(weights, movement.path), straight), exact=True)
+    def _planned(self, parts: list[Part]) -> list[Settled]:
+        """W of the movements as they are sent: a path that was found is shortened by its descent."""
+        planned = self.movements.plan(parts, self.improvement)
+        costs = [np.inf if isinstance(found, Failure) else found.report.movement_cost for found in planned]
+        return [Settled(cost, exact=True) for cost in costs]
 
 
 def _outsides(nodes: list[Node]) -> FloatArray:
@@ -141,12 +142,7 @@ def _outsides(nodes: list[Node]) -> FloatArray:
 
 def _with_standing_parts(hop: Hop, first: list[Node], second: list[Node]) -> Hop:
     """The hop, its parts in which nothing moves known to cost nothing."""
-    here = np.abs(_outsides(first)[:, None] - _outsides(second)[None]).max(axis=2) <= STILL
-    hop.cost[ACROSS][here] = 0.0
-    hop.exact[ACROSS][here] = True
-    for kind, nodes in (("leave", first), ("enter", second)):
-        still = np.array([len(node.line.points) == 1 for node in nodes])
-        still = still[:, None] if kind == "leave" else still[None, :]
-        hop.cost[kind][still] = 0.0
-        hop.exact[kind][still] = True
+    hop.nothing(ACROSS, np.abs(_outsides(first)[:, None] - _outsides(second)[None]).max(axis=2) <= STILL)
+    hop.nothing(LEAVE, np.array([len(node.line.points) == 1 for node in first])[:, None])
+    hop.nothing(ENTER, np.array([len(node.line.points) == 1 for node in second])[None, :])
     return hop

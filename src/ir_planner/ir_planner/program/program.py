@@ -21,6 +21,7 @@ from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.comparison import held_against_common
 from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.front import front_of
+from ir_planner.program.gap import cycle_gap, free_gap
 from ir_planner.program.ladder import Ladder
 from ir_planner.program.movements import Movements
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
@@ -61,12 +62,16 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
     if cycle <= 0.0:
         _improve(choice)
     found = choice.found(progress)
-    standing, chain = choice.standing(found), choice.chain
-    steps = choice.steps(found)
-    if cycle > 0.0:
+    standing, steps = choice.standing(found), choice.steps(found)
+    if cycle <= 0.0:
+        gap = free_gap(choice, found, steps)
+    else:
         timed = timed_choice(choice, cycle, standing, progress)
-        steps, chain = timed.steps, timed.choice.chain
-    plan = replace(_planned(steps), gap=100.0 * chain.gap)
+        pauses = [step for step in timed.steps if step.is_pause][: sum(step.is_pause for step in steps)]
+        steps = timed.steps
+        spent = sum(step.report.energy for step in steps) - sum(pause.report.energy for pause in pauses)
+        gap = cycle_gap(timed.choice, len(timed.timed.movements), spent, timed.bound)
+    plan = replace(_planned(steps), gap=gap)
     if request.savings:
         comparison = held_against_common(choice, steps, cycle, standing, progress)
         if isinstance(comparison, str):

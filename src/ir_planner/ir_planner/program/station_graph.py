@@ -31,24 +31,37 @@ class Part:
 
 @dataclass(frozen=True)
 class Settled:
-    """A lower bound of a part's cost, or (exact) the cost itself; inf: the part is impossible."""
+    """A lower bound of a part's cost, or (exact) the cost itself; inf: the part is impossible. proved: the
+    bound isn't only measured.
+    """
 
     cost: float
     exact: bool
+    proved: bool = True
 
 
 class Hop:
-    """Lower bounds of leaving (A,), across (A, B) and entering (B,), and which are exact."""
+    """Lower bounds of leaving (A,), across (A, B) and entering (B,), and which are exact. `cost`: with bounds
+    that are measured, `proved`: without.
+    """
 
     def __init__(self, leave: FloatArray, across: FloatArray, enter: FloatArray) -> None:
         self.cost = {LEAVE: leave.copy()[:, None], ACROSS: across.copy(), ENTER: enter.copy()[None, :]}
+        self.proved = {kind: cost.copy() for kind, cost in self.cost.items()}
         self.exact: dict[str, BoolArray] = {
             kind: np.zeros(cost.shape, dtype=bool) for kind, cost in self.cost.items()
         }
 
-    def bounds(self) -> FloatArray:
+    def bounds(self, *, proved: bool = False) -> FloatArray:
         """What is known of every pair (A, B): nothing costs less."""
-        return np.asarray(self.cost[LEAVE] + self.cost[ACROSS] + self.cost[ENTER])
+        cost = self.proved if proved else self.cost
+        return np.asarray(cost[LEAVE] + cost[ACROSS] + cost[ENTER])
+
+    def nothing(self, kind: str, still: BoolArray) -> None:
+        """Parts of a kind in which nothing moves cost nothing."""
+        for cost in (self.cost, self.proved):
+            cost[kind][still] = 0.0
+        self.exact[kind][still] = True
 
     def settled(self) -> FloatArray:
         """Costs (A, B) of the pairs whose parts are all exact; inf: of the others."""
@@ -58,8 +71,9 @@ class Hop:
     def take(self, part: Part, found: Settled) -> None:
         """Enter what was found of a part; a bound never falls."""
         at = max(part.first, 0), max(part.second, 0)
-        cost = self.cost[part.kind]
-        cost[at] = found.cost if found.exact else max(found.cost, float(cost[at]))
+        for known in (self.cost, self.proved) if found.exact or found.proved else (self.cost,):
+            cost = known[part.kind]
+            cost[at] = found.cost if found.exact else max(found.cost, float(cost[at]))
         self.exact[part.kind][at] |= found.exact
 
     def open_parts(self, hop: int, first: int, second: int) -> list[Part]:
@@ -71,19 +85,28 @@ class Hop:
 @dataclass(frozen=True)
 class Chain:
     """Index of the configuration at every stop, its cost (inf: there is none), and the least that any chain
-    can cost.
+    can cost; proved: by bounds that are proved alone.
     """
 
     chosen: list[int]
     cost: float
     bound: float
+    proved: float
 
     @property
     def gap(self) -> float:
         """How far the chain can be from the best, as a share of its cost."""
+        return self._above(self.bound)
+
+    @property
+    def proved_gap(self) -> float:
+        """The same by bounds that are proved alone."""
+        return self._above(self.proved)
+
+    def _above(self, bound: float) -> float:
         if not np.isfinite(self.cost) or self.cost <= 0.0:
             return 0.0
-        return max(self.cost - self.bound, 0.0) / self.cost
+        return max(self.cost - bound, 0.0) / self.cost
 
 
 def shortest(costs: list[FloatArray]) -> tuple[list[int], float]:
@@ -120,12 +143,13 @@ class StationGraph:
         while True:
             chosen, bound = shortest([hop.bounds() for hop in self.hops])
             if not np.isfinite(bound):
-                return Chain(chosen, np.inf, np.inf)
+                return Chain(chosen, np.inf, np.inf, np.inf)
             known, cost = shortest([hop.settled() for hop in self.hops])
             on_cost(cost if np.isfinite(cost) else bound)
             near = bound >= cost * (1.0 - self.tolerance)
             if np.isfinite(cost) and (near or not self.may_go_on()):
-                return Chain(known, cost, min(bound, cost))
+                proved = shortest([hop.bounds(proved=True) for hop in self.hops])[1]
+                return Chain(known, cost, min(bound, cost), min(proved, cost))
             parts = [
                 part
                 for k, hop in enumerate(self.hops)
