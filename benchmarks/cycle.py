@@ -5,8 +5,9 @@
 The stations of a cell in turn and back to the posture park, without pauses. Cycle times from the shortest to
 twice the free one; E is the mains energy over the whole cycle, the wait to its end included. The law: a cycle
 that is d longer costs at most d of standing on motors more, and the drive energy of the movements alone never
-rises. Then the planner has the time of the common program: synchronous S-curves at full speed through the
-same stations, each in the configuration nearest to the last one.
+rises while the wait at the end stays in its mode. Then the planner has the time of the common program:
+synchronous S-curves at full speed through the same stations, each in the configuration nearest to the last
+one.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ TOLERANCE = 1e-3  # of E: what two plans may differ by although the law holds
 
 @dataclass(frozen=True)
 class Row:
-    """One program: cycle time [s], mains energy over the cycle [J], drive energy of its movements [J]."""
+    """One program: cycle time [s], mains energy over the cycle [J], drive energy of its movements [J], mode
+    of the wait at its end ("": on motors, or none), stated gap [%], processor seconds of planning.
+    """
 
     cell: str
     seed: int
@@ -39,6 +42,8 @@ class Row:
     energy: float
     drive_energy: float
     certified: bool
+    wait: str
+    gap: float
     planning_s: float
 
 
@@ -58,17 +63,20 @@ class Programs:
 
     def planned(self, what: str, cycle: float, objective: str = "energy") -> Row:
         """The program in a cycle time [s], 0: free. A refused one costs nan."""
-        begin = time.perf_counter()
+        begin = time.process_time()
         try:
             plan = self.planner.plan_program(self.stops, cycle, self.options(objective), self.start)
         except RequestError:
-            return Row(self.cell, self.seed, what, cycle, float("nan"), float("nan"), False, float("nan"))
-        took = time.perf_counter() - begin
+            return Row(self.cell, self.seed, what, cycle, float("nan"), float("nan"), False, "", 0.0, 0.0)
+        took = time.process_time() - begin
         reports = [movement.report for movement in plan.movements if not movement.is_pause]
         drives = sum(report.energy - report.base_energy for report in reports)
         certified = bool(reports) and all(report.certified for report in reports)
         lasting = sum(movement.duration for movement in plan.movements)
-        return Row(self.cell, self.seed, what, lasting, plan.report.energy, drives, certified, took)
+        wait = plan.movements[-1].power_mode.replace("STAND_ON_MOTORS", "")
+        return Row(
+            self.cell, self.seed, what, lasting, plan.report.energy, drives, certified, wait, plan.gap, took
+        )
 
     def over_cycle_times(self, points: int) -> list[Row]:
         """From the shortest cycle to twice the free one."""
@@ -83,7 +91,7 @@ class Programs:
         common = common_program(chains, self.planner, self.options())
         base = self.planner.scene().base_watts * common.duration
         E = common.drive_energy
-        plain = Row(self.cell, self.seed, "common", common.duration, E + base, E, True, 0.0)
+        plain = Row(self.cell, self.seed, "common", common.duration, E + base, E, True, "", 0.0, 0.0)
         return [plain, self.planned("at the common time", common.duration)], common.not_free
 
     @property
@@ -93,12 +101,15 @@ class Programs:
 
 
 def excess(rows: list[Row], waiting: float) -> tuple[float, float]:
-    """By how much [%] the law and the fall of the drive energy are missed at worst, from point to point."""
+    """By how much [%] the law and the fall of the drive energy (in one mode of waiting) are missed at worst,
+    from point to point.
+    """
     law, rise = [-100.0], [-100.0]
     for before, after in itertools.pairwise([row for row in rows if np.isfinite(row.energy)]):
         allowed = before.energy + waiting * (after.cycle - before.cycle)
         law.append(100.0 * (after.energy / allowed - 1.0))
-        rise.append(100.0 * (after.drive_energy / before.drive_energy - 1.0))
+        if before.wait == after.wait:
+            rise.append(100.0 * (after.drive_energy / before.drive_energy - 1.0))
     return max(law), max(rise)
 
 
@@ -110,11 +121,13 @@ def claims_of(cell: str, rows: list[Row], pair: list[Row], waiting: float, not_f
     drives = 100.0 * (1.0 - pair[1].drive_energy / pair[0].drive_energy)
     mains = 100.0 * (1.0 - pair[1].energy / pair[0].energy)
     bound = 100.0 * TOLERANCE
+    seconds = float(np.median([row.planning_s for row in rows]))
     return [
         at_most(f"{cell}: cycle times that are refused, of {len(rows)}", refused, "", 0),
         at_most(f"{cell}: programs with a movement that is not certified", uncertified, "", 0),
         at_most(f"{cell}: E(T + d) above E(T) + P_wait d, worst", law, "%", bound),
-        at_most(f"{cell}: rise of the movements' drive energy, worst", rise, "%", bound),
+        at_most(f"{cell}: rise of the movements' drive energy while the wait keeps its mode", rise, "%", 0.5),
+        at_most(f"{cell}: processor seconds of a request with a cycle time, median", seconds, "s", 6.0),
         at_least(f"{cell}: drive energy saved against the common program", drives, "%", 20.0),
         at_least(f"{cell}: mains energy saved against the common program", mains, "%", 0.0),
         at_most(f"{cell}: segments of the common program that are not free", 100 * not_free, "%", 100.0),

@@ -9,8 +9,8 @@ from _program_chains import Chains
 from cycle import Programs, Row, excess
 
 
-def row(cycle: float, energy: float, drives: float) -> Row:
-    return Row("demo", 0, "cycle", cycle, energy, drives, True, 0.0)
+def row(cycle: float, energy: float, drives: float, wait: str = "") -> Row:
+    return Row("demo", 0, "cycle", cycle, energy, drives, True, wait, 0.0, 0.0)
 
 
 def test_a_longer_cycle_may_cost_the_wait_and_no_more() -> None:
@@ -21,6 +21,8 @@ def test_a_longer_cycle_may_cost_the_wait_and_no_more() -> None:
     law, rise = excess([*rows, row(14.0, 1470.0, 539.0)], 100.0)
     assert law == pytest.approx(5.0)
     assert rise == pytest.approx(10.0)
+    _, rise = excess([*rows, row(14.0, 1400.0, 539.0, "STAND_ON_BRAKES")], 100.0)
+    assert rise == pytest.approx(0.0)
 
 
 def test_a_refused_cycle_time_is_passed_over() -> None:

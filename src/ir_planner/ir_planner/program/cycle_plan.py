@@ -49,7 +49,7 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
     values = TimeValues(choice.ladder, choice.parts)
     with journal.stage("cycle time") as notes:
         rung = values.bracket(seconds)
-        best = choice, shared_out(values, task_of(choice, seconds))
+        best = choice, shared_out(values, task_of(choice, seconds, standing))
         notes.append("too short for the chain" if best[1] is None else f"{best[1].energy:.0f} J")
     rates = rates_of(choice.movements.context)
     bound = 0.0
@@ -63,7 +63,7 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
             values = TimeValues(other.ladder, other.parts)
             with journal.stage("cycle time") as notes:
                 values.bracket(seconds)
-                timed = shared_out(values, task_of(other, seconds))
+                timed = shared_out(values, task_of(other, seconds, standing))
                 if timed is not None and (best[1] is None or timed.energy < best[1].energy):
                     best = other, timed
                 notes.append("too short for the chain" if timed is None else f"{timed.energy:.0f} J")
@@ -86,9 +86,13 @@ def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None
     return choice.along(chain)
 
 
-def task_of(choice: Choice, seconds: float) -> Task:
-    """What is to be shared out over a chain's movements and the wait."""
-    return Task(seconds, choice.waiting, _slower)
+def task_of(choice: Choice, seconds: float, standing: float) -> Task:
+    """What is to be shared out over a chain's movements and the wait; standing [s]: of pauses besides."""
+
+    def spent(timed: Timed) -> float:
+        return sum(step.report.energy for step in TimedChoice(choice, timed, seconds + standing).steps)
+
+    return Task(seconds, choice.waiting, _slower, spent)
 
 
 def _slower(movement: Movement, duration: float) -> Movement | None:

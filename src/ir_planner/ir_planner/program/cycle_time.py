@@ -7,20 +7,19 @@ is left of the time is given to the next part in turn where that is cheaper than
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ir_planner.program.station_graph import Part
 from ir_planner.program.time_values import Point, SlowDown, TimeValues, slow_downs
 from ir_planner.timing import Movement
 
+_NEAREST = 8  # programs that are cheapest without carried charge: with it one of them is
 SHORTEST_WAIT = 0.05  # s: less is given to a movement, so that a program doesn't end with a twitch of a pause
 
 
 @dataclass(frozen=True, eq=False)
 class Timed:
-    """A movement for every part, how long to wait at the end [s], and all joules at the mains but those of
-    the pauses in the program.
-    """
+    """A movement for every part, how long to wait at the end [s], and the joules at the mains."""
 
     movements: dict[Part, Movement]
     wait: float
@@ -30,12 +29,14 @@ class Timed:
 @dataclass(frozen=True, eq=False)
 class Task:
     """seconds: for movements and the wait. waiting(seconds): joules of the wait. slower(movement, seconds):
-    the same in more seconds, None where that isn't certified.
+    the same in more seconds, None where that isn't certified. spent: joules of a whole program, with carried
+    charge.
     """
 
     seconds: float
     waiting: Callable[[float], float]
     slower: Callable[[Movement, float], Movement | None]
+    spent: Callable[[Timed], float] = lambda timed: timed.energy
 
 
 def shared_out(values: TimeValues, task: Task) -> Timed | None:
@@ -43,18 +44,18 @@ def shared_out(values: TimeValues, task: Task) -> Timed | None:
     fronts = values.fronts()
     chosen = {part: front[0] for part, front in fronts.items()}
     steps = slow_downs(fronts)
-    best: Timed | None = None
+    found: list[Timed] = []
     for count in range(len(steps) + 1):
         left = task.seconds - sum(point.seconds for point in chosen.values())
         if left < 0.0:
             break
-        for timed in _filled(chosen, left, steps[count:], task):
-            if best is None or timed.energy < best.energy:
-                best = timed
+        found += _filled(chosen, left, steps[count:], task)
         if count < len(steps):
             step = steps[count]
             chosen = {**chosen, step.part: fronts[step.part][step.to]}
-    return best
+    found.sort(key=lambda timed: timed.energy)
+    whole = [replace(timed, energy=task.spent(timed)) for timed in found[:_NEAREST]]
+    return min(whole, key=lambda timed: timed.energy, default=None)
 
 
 def _filled(chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task) -> list[Timed]:

@@ -31,7 +31,7 @@ def front_of(choice: Choice, count: int, standing: float, progress: Progress) ->
         values.bracket(seconds)
     front = []
     for seconds in times.tolist():  # every point from all movements that are known by now
-        timed = shared_out(values, task_of(choice, seconds))
+        timed = shared_out(values, task_of(choice, seconds, standing))
         if timed is not None:
             front.append(TimedChoice(choice, timed, seconds + standing))
     return front
