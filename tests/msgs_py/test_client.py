@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, Station, Status
@@ -164,6 +164,15 @@ def test_a_kept_message_is_heard_later(client):
     assert client.next_message("/meter", PowerState).power == 420.0
     with pytest.raises(CallTimedOutError, match=r"no message on /silence within 0.05 s"):
         client.next_message("/silence", PowerState, timeout=0.05)
+
+
+def test_of_several_kept_messages_the_newest_is_given(client, cell, wait_for):
+    kept = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    publisher = cell.create_publisher(PowerState, "/events", kept)
+    for power in range(50):
+        publisher.publish(PowerState(power=float(power)))
+    assert client.next_message("/events", PowerState).power == 49.0
+    wait_for(lambda: publisher.get_subscription_count() == 0)
 
 
 def test_the_graph_names_services_actions_and_topics(client, wait_for):

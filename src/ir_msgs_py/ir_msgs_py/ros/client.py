@@ -17,6 +17,7 @@ from typing import Any
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
 from rclpy.task import Future
 
 from ir_msgs.action import ExecuteTrajectory, Plan, RunProgram
@@ -46,6 +47,7 @@ from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.types import owner_of
 from ir_msgs_py.trajectory import JointTrajectory
 
+_KEPT_WITHIN = 0.1  # s between two messages that a publisher has kept; they are sent without a pause
 _CANCEL_GRACE = 5.0  # s that a canceled goal may take to stop along the path
 
 
@@ -137,14 +139,25 @@ class Client:
         self._executor.run(lambda: self.node.create_subscription(message_type, topic, callback, qos))
 
     def next_message(self, topic: str, message_type: Any, timeout: float | None = None) -> Any:
-        """Return the next message of a topic, or the last one where its publisher keeps it."""
+        """Return the next message of a topic, or the newest one where its publishers keep some."""
         limit = self.timeout if timeout is None else timeout
         received: list[Any] = []
         self._executor.wait_until(lambda: bool(self.graph.publishers(topic)), limit)
-        self.subscribe(topic, message_type, received.append)
-        if not self._executor.wait_until(lambda: bool(received), limit):
-            raise CallTimedOutError(f"no message on {topic} within {limit:g} s")
-        return received[0]
+        qos = self.graph.qos_of_publishers(topic)
+        subscription = self._executor.run(
+            lambda: self.node.create_subscription(message_type, topic, received.append, qos)
+        )
+        try:
+            if not self._executor.wait_until(lambda: bool(received), limit):
+                raise CallTimedOutError(f"no message on {topic} within {limit:g} s")
+            if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:  # the kept ones come one after another
+                deadline = time.monotonic() + limit
+                while time.monotonic() < deadline:
+                    if not self._executor.wait_until(_grown(received), _KEPT_WITHIN):
+                        break
+        finally:
+            self._executor.run(lambda: self.node.destroy_subscription(subscription))
+        return received[-1]
 
     def set_cell(self, cell: str) -> tuple[str, ...]:
         """Load a cell: the name of a bundled one, a path, or the text of a cell file; its stations' names."""
@@ -241,6 +254,11 @@ class Client:
         if key not in self._clients:
             self._clients[key] = self.node.create_client(service_type, service, qos_profile=SERVICE)
         return self._clients[key]
+
+
+def _grown(received: list[Any]) -> Callable[[], bool]:
+    before = len(received)
+    return lambda: len(received) > before
 
 
 def _check(name: str, answer: Any) -> None:
