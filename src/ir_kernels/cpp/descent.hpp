@@ -88,7 +88,8 @@ Descent descend(std::vector<double>& x, Function&& function, Precondition&& prec
         kept = next, kept_g = next_g, kept_value = there;
         if (-inner(next_g, direction) >= 0.9 * slope) break;
       }
-      step = std::isinf(high) ? 2.0 * low : 0.5 * (low + high);
+      const bool blind = pairs.empty() && !found;  // nothing is known of the scale yet
+      step = std::isinf(high) ? 2.0 * low : blind ? 0.1 * high : 0.5 * (low + high);
     }
     if (!found) {
       if (pairs.empty()) break;

@@ -30,6 +30,7 @@ ir::SplineTerms terms_of(const py::object& data) {
   t.energy_value = data.attr("energy_value").cast<double>();
   t.time_value = data.attr("time_value").cast<double>();
   t.capacity = data.attr("capacity_energy").cast<double>();
+  t.smoothing = data.attr("smoothing").cast<double>();
   const auto name = data.attr("regeneration").cast<std::string>();
   t.regeneration = name == "shared" ? dynamics::Regeneration::kShared
                  : name == "none"   ? dynamics::Regeneration::kNone

@@ -12,7 +12,7 @@ namespace ir {
 
 struct SplineTerms {
   std::vector<double> velocity, acceleration, jerk, low, high, travel;  // (n) each; travel: cost per rad
-  double torque_share, energy_value, time_value, capacity;
+  double torque_share, energy_value, time_value, capacity, smoothing;
   dynamics::Regeneration regeneration;
   std::vector<double> threshold;  // (rows, pairs) [m]
   double clearance_margin, clearance_scale, penalty, clearance_penalty;
@@ -47,6 +47,8 @@ class SplineCost {
   void sample(const double* control, double interval);
   double drives(double step);
   double bus(double step);
+  void exact_bus(double step);
+  double smooth_bus(double step);
   double clearance(const std::int32_t* row, double step);
   double slower();
   double knots(const double* control, int intervals, double interval, double* gradient, double& of_interval) const;
@@ -60,7 +62,7 @@ class SplineCost {
   std::vector<double> standing_;   // (n) torque limit at rest
   std::vector<double> bend_at_, bend_;  // (n, bends): speeds at which the smoothed limit changes its slope, by how much
   std::vector<Group> groups_;
-  std::vector<double> power_, of_power_, q_;  // (N), (N), (N, n)
+  std::vector<double> power_, of_power_, left_, q_;  // (N), (N), (N), (N, n)
   // clearance
   std::vector<double> widest_;  // (pairs) the largest threshold of all rows, with the margin
   Shifts<float> shift_float_;

@@ -16,6 +16,16 @@ double sum(const Double8& v) {
   return s;
 }
 
+// max(x, 0), a hyperbola that is `smoothing` above it at 0; its derivatives.
+struct Above {
+  double value, slope, of_smoothing;
+};
+inline Above above(double x, double smoothing) {
+  if (!(smoothing > 0.0)) return {std::max(x, 0.0), x > 0.0 ? 1.0 : 0.0, 0.0};
+  const double root = std::sqrt(x * x + 4.0 * smoothing * smoothing);
+  return {0.5 * (x + root), 0.5 + 0.5 * x / root, 2.0 * smoothing / root};
+}
+
 }  // namespace
 
 // Torques, their penalties and those of speed; the powers.
@@ -43,7 +53,9 @@ double SplineCost::drives(double step) {  // long: value and derivative side by 
         limit += over > 0.0 ? by * over : Lane{};
         falls += over > 0.0 ? splat<Lane>(by) : Lane{};
       }
-      const Lane torque = abs(g.tau[j]), inverse = 1.0 / (limit * terms_.torque_share);
+      // near standstill friction may be as much more than it is with its smoothed sign
+      const Lane unsure = d.coulomb * (still * still) / (root * root);
+      const Lane torque = abs(g.tau[j]) + unsure, inverse = 1.0 / (limit * terms_.torque_share);
       const Lane use = max(torque * inverse - 1.0, Lane{}) * g.counts;
       const double fastest = 1.0 / terms_.velocity[j];
       const Lane over = max(speed * fastest - 1.0, Lane{}) * g.counts;
@@ -53,7 +65,8 @@ double SplineCost::drives(double step) {  // long: value and derivative side by 
       const Lane weight = 2.0 * step * terms_.penalty * use;
       const Lane sign_v = v > 0.0 ? splat<Lane>(1.0) : splat<Lane>(-1.0);
       g.of_tau[j] = weight * inverse * (g.tau[j] > 0.0 ? splat<Lane>(1.0) : splat<Lane>(-1.0));
-      g.of_qd[j] = sign_v * (2.0 * step * terms_.penalty * fastest * over - weight * torque * inverse / limit * falls);
+      g.of_qd[j] = sign_v * (2.0 * step * terms_.penalty * fastest * over - weight * torque * inverse / limit * falls) -
+                   2.0 * weight * inverse * unsure * v / (root * root);
       if (terms_.travel[j] > 0.0) {
         const Lane travelled = terms_.travel[j] * (root - still) * g.counts;
         cost += travelled * step;
@@ -67,53 +80,77 @@ double SplineCost::drives(double step) {  // long: value and derivative side by 
 }
 
 // Energy at the mains over the common bus, sample after sample; and the derivative by each sample's power.
-double SplineCost::bus(double step) {  // long: value and derivative side by side
-  using dynamics::Regeneration;
+double SplineCost::bus(double step) {
+  const bool alone = terms_.regeneration == dynamics::Regeneration::kNone;
   power_.assign(count_, 0.0);
-  of_power_.assign(count_, 0.0);
+  of_power_.assign(count_, 1.0);
   for (int k = 0; k < count_; ++k)
     for (int j = 0; j < n_; ++j) {
       const double p = groups_[k / 8].power[j][k % 8];
-      power_[k] += terms_.regeneration == Regeneration::kNone ? std::max(p, 0.0) : p;
+      power_[k] += alone ? above(p, terms_.smoothing).value : p;
     }
-  energy = 0.0;
-  if (terms_.regeneration == Regeneration::kNone) {
-    for (int k = 0; k < count_; ++k) energy += power_[k] * step;
-    std::fill(of_power_.begin(), of_power_.end(), 1.0);
-  } else {
-    // of_power_ first says where a joule of this sample comes from: 1 the mains (or goes back there), 2 the capacitor, 0
-    // nowhere, as less is dissipated
-    double stored = 0.0;
-    for (int k = 0; k < count_; ++k) {
-      const double wanted = power_[k] * step, full = stored - terms_.capacity;
-      if (wanted > stored) {
-        energy += wanted - stored;
-        stored = 0.0;
-        of_power_[k] = 1.0;
-      } else if (wanted < full) {
-        const bool returns = terms_.regeneration == Regeneration::kFedBack;
-        if (returns) energy += wanted - full;
-        stored = terms_.capacity;
-        of_power_[k] = returns ? 1.0 : 0.0;
-      } else {
-        stored -= wanted;
-        of_power_[k] = 2.0;
-      }
-    }
-    double of_stored = 0.0;  // what a joule more in the capacitor costs from here on
-    for (int k = count_ - 1; k >= 0; --k) {
-      if (of_power_[k] == 2.0) of_power_[k] = -of_stored;
-      else of_stored = -of_power_[k];
-    }
-  }
   const double worth = terms_.energy_value;
   double of_step = 0.0;
+  energy = 0.0;
+  if (alone) for (int k = 0; k < count_; ++k) energy += power_[k] * step;
+  else if (terms_.smoothing > 0.0) of_step = smooth_bus(step);
+  else exact_bus(step);
   for (int k = 0; k < count_; ++k) {
     of_step += of_power_[k] * power_[k];
     of_power_[k] *= worth * step;
   }
   of_step_ += worth * of_step;
   return worth * energy;
+}
+
+// The bus as it is: energy, and of_power_ what a joule more in each sample costs.
+void SplineCost::exact_bus(double step) {
+  const bool returns = terms_.regeneration == dynamics::Regeneration::kFedBack;
+  // of_power_ first says where a joule of this sample comes from: 1 the mains (or goes back there), 2 the capacitor, 0
+  // nowhere, as less is dissipated
+  double stored = 0.0;
+  for (int k = 0; k < count_; ++k) {
+    const double wanted = power_[k] * step, full = stored - terms_.capacity;
+    if (wanted > stored) {
+      energy += wanted - stored;
+      stored = 0.0;
+      of_power_[k] = 1.0;
+    } else if (wanted < full) {
+      if (returns) energy += wanted - full;
+      stored = terms_.capacity;
+      of_power_[k] = returns ? 1.0 : 0.0;
+    } else {
+      stored -= wanted;
+      of_power_[k] = 2.0;
+    }
+  }
+  double of_stored = 0.0;  // what a joule more in the capacitor costs from here on
+  for (int k = count_ - 1; k >= 0; --k) {
+    if (of_power_[k] == 2.0) of_power_[k] = -of_stored;
+    else of_stored = -of_power_[k];
+  }
+}
+
+// The same with smooth switches; returns what the smoothing itself adds per change of the time between samples.
+double SplineCost::smooth_bus(double step) {
+  const double most = terms_.smoothing * step;  // [J]
+  const double back = terms_.regeneration == dynamics::Regeneration::kFedBack ? 1.0 : 0.0;
+  double stored = 0.0;
+  left_.resize(count_);
+  for (int k = 0; k < count_; ++k) {
+    left_[k] = stored - power_[k] * step;  // in the capacitor, if it had no ends
+    const double mains = above(-left_[k], most).value, surplus = above(left_[k] - terms_.capacity, most).value;
+    energy += mains - back * surplus;
+    stored = left_[k] + mains - surplus;
+  }
+  double of_stored = 0.0, of_most = 0.0;
+  for (int k = count_ - 1; k >= 0; --k) {
+    const Above mains = above(-left_[k], most), surplus = above(left_[k] - terms_.capacity, most);
+    of_most += mains.of_smoothing * (1.0 + of_stored) - surplus.of_smoothing * (back + of_stored);
+    of_stored = of_stored * (1.0 - mains.slope - surplus.slope) - mains.slope - back * surplus.slope;
+    of_power_[k] = -of_stored;
+  }
+  return of_most * terms_.smoothing;
 }
 
 // From powers and torques back to positions, speeds and accelerations. Returns what the cost gains from a motion that is
@@ -128,7 +165,8 @@ double SplineCost::slower() {
     for (int j = 0; j < n_; ++j) {
       const auto& d = arm.drive[j];
       Lane w = of_power;
-      if (terms_.regeneration == dynamics::Regeneration::kNone) w = g.power[j] > 0.0 ? w : Lane{};
+      if (terms_.regeneration == dynamics::Regeneration::kNone)
+        for (int l = 0; l < 8; ++l) w[l] *= above(g.power[j][l], terms_.smoothing).slope;
       g.of_tau[j] += w * (g.qd[j] + 2.0 * d.copper_at_joint * g.tau[j]);
       g.of_qd[j] += w * g.tau[j];
       const Lane root = g.qd[j] * g.qd[j] + still * still;

@@ -18,7 +18,8 @@ class SplineTerms:
     velocity, acceleration, jerk, low, high (n,): bounds, rad and s. travel (n,): cost per rad. threshold
     (R, Z) m: rows of safety distances, each interval of a spline says which row holds; -inf leaves a pair
     out. torque_share: of the envelope. energy_value: cost per joule; time_value: per second. capacity_energy
-    [J] and regeneration: see DcBusParameters. clearance_margin, clearance_scale [m]. penalty,
+    [J] and regeneration: see DcBusParameters; smoothing [W]: by how much the bus' switch between mains,
+    capacitor and resistor is rounded, 0: not at all. clearance_margin, clearance_scale [m]. penalty,
     clearance_penalty: cost per second of a relative excess of 1.
     """
 
@@ -34,6 +35,7 @@ class SplineTerms:
     time_value: float = 500.0
     capacity_energy: float = 0.0
     regeneration: Regeneration = "shared"
+    smoothing: float = 0.0
     clearance_margin: float = 0.001
     clearance_scale: float = 0.01
     penalty: float = 1e4
@@ -72,6 +74,7 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
         "energy_value",
         "time_value",
         "capacity_energy",
+        "smoothing",
         "clearance_margin",
         "penalty",
         "clearance_penalty",
@@ -89,6 +92,7 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
         energy_value=numbers["energy_value"],
         time_value=numbers["time_value"],
         capacity_energy=numbers["capacity_energy"],
+        smoothing=numbers["smoothing"],
         clearance_margin=numbers["clearance_margin"],
         penalty=numbers["penalty"],
         clearance_penalty=numbers["clearance_penalty"],

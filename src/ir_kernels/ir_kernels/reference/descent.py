@@ -14,6 +14,7 @@ MEMORY = 16  # pairs of steps and changes of the gradient
 PATIENCE = 10  # iterations that have to gain something together
 TRIES = 12  # of one line search
 SUFFICIENT, FLATTER = 1e-4, 0.9  # Wolfe's constants
+BLIND = 0.1  # factor of a step that is too long, while nothing is known of the scale
 FIRST_STEP = 0.3  # at most, in every coordinate, while nothing is known of the curvature
 
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
@@ -46,11 +47,15 @@ def direction(gradient: FloatArray, pairs: Pairs, solve: Solve) -> FloatArray:
 
 
 def line_search(
-    function: Function, at: tuple[FloatArray, float, FloatArray, float], step: float, tries: int
+    function: Function,
+    at: tuple[FloatArray, float, FloatArray, float],
+    step: float,
+    tries: int,
+    shorten: float = 0.5,
 ) -> tuple[Point | None, int]:
     """The best step found from x (N,) along -d that gains enough, or None; and the evaluations it took.
 
-    at: x, the value there, d (N,), the slope along -d.
+    at: x, the value there, d (N,), the slope along -d. shorten: factor of the step until one gains enough.
     """
     x, value, d, slope = at
     low, high, kept, used = 0.0, np.inf, None, 0
@@ -66,7 +71,10 @@ def line_search(
             low, kept = step, (there, at_step, by_step)
             if -float(by_step @ d) >= FLATTER * slope:
                 break
-        step = 2.0 * low if np.isinf(high) else 0.5 * (low + high)
+        if np.isinf(high):
+            step = 2.0 * low
+        else:
+            step = shorten * high if kept is None else 0.5 * (low + high)
     return kept, used
 
 
@@ -91,7 +99,8 @@ def descend(
             pairs = []
             continue
         step = 1.0 if pairs else min(1.0, FIRST_STEP / max(float(np.abs(d).max()), 1e-12))
-        kept, tried = line_search(function, (x, value, d, slope), step, min(TRIES, evaluations - used))
+        tries, shorten = min(TRIES, evaluations - used), 0.5 if pairs else BLIND
+        kept, tried = line_search(function, (x, value, d, slope), step, tries, shorten)
         used += tried
         if kept is None:
             if not pairs:

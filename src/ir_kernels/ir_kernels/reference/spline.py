@@ -86,29 +86,36 @@ def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
     s.of_qdd += np.einsum("ki,kij->kj", of_torque, of_qdd)
 
 
-def bus(power: FloatArray, step: float, capacity: float, regeneration: str) -> tuple[float, FloatArray]:
-    """Joules at the mains for axis powers (N, n) held for `step` each, and what a joule more adds (N, n)."""
-    if regeneration == "none":
-        return float(np.maximum(power, 0.0).sum() * step), (power > 0.0).astype(float)
-    stored, mains, source = 0.0, 0.0, []
-    for wanted in power.sum(axis=1) * step:
-        rest = 0.0
-        if wanted > stored:
-            rest, stored = wanted - stored, 0.0
-            source.append("mains")
-        elif wanted < stored - capacity:
-            rest, stored = wanted - (stored - capacity), capacity
-            source.append("mains" if regeneration == "fed_back" else "dissipated")
-        else:
-            stored -= wanted
-            source.append("capacitor")
-        mains += rest if source[-1] == "mains" else 0.0
-    adds, worth = np.empty(len(power)), 0.0  # worth: what a joule more in the capacitor saves from here on
+def bus(power: FloatArray, step: float, terms: SplineTerms) -> tuple[float, FloatArray, float]:
+    """Joules at the mains for axis powers (N, n) held for `step` each, what a joule more adds (N, n), and what
+    the smoothing adds per second of `step`.
+    """
+    if terms.regeneration == "none":
+        value, slope, _ = above(power, terms.smoothing)
+        return float(value.sum() * step), slope, 0.0
+    wanted, back = power.sum(axis=1) * step, float(terms.regeneration == "fed_back")
+    most, stored, mains = terms.smoothing * step, 0.0, 0.0
+    left = np.empty(len(power))  # in the capacitor, if it had no ends
+    for k, joules in enumerate(wanted):
+        left[k] = stored - joules
+        drawn, surplus = above(-left[k], most)[0], above(left[k] - terms.capacity_energy, most)[0]
+        mains += float(drawn - back * surplus)
+        stored = float(left[k] + drawn - surplus)
+    adds, worth, of_most = np.empty(len(power)), 0.0, 0.0  # worth: of a joule more in the capacitor
+    draws, surpluses = above(-left, most), above(left - terms.capacity_energy, most)
     for k in reversed(range(len(power))):
-        if source[k] != "capacitor":
-            worth = 1.0 if source[k] == "mains" else 0.0
+        of_most += float(draws[2][k] * (1.0 - worth) - surpluses[2][k] * (back - worth))
+        worth = float(worth * (1.0 - draws[1][k] - surpluses[1][k]) + draws[1][k] + back * surpluses[1][k])
         adds[k] = worth
-    return float(mains), np.repeat(adds[:, None], power.shape[1], axis=1)
+    return mains, np.repeat(adds[:, None], power.shape[1], axis=1), of_most * terms.smoothing
+
+
+def above(x: FloatArray, smoothing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """max(x, 0), a hyperbola that is `smoothing` above it at 0; its slope, and derivative by the smoothing."""
+    if smoothing == 0.0:
+        return np.maximum(x, 0.0), (x > 0.0).astype(float), np.zeros_like(x)
+    root = np.sqrt(x * x + 4.0 * smoothing * smoothing)
+    return 0.5 * (x + root), 0.5 + 0.5 * x / root, 2.0 * smoothing / root
 
 
 class SplineCost:
@@ -182,7 +189,9 @@ class SplineCost:
         t, data = self.terms, self.data
         torque, speed = torques(data, s), np.abs(s.qd)
         limit, falls = torque_limit(data, speed)
-        use = np.abs(torque) / (limit * t.torque_share)
+        # near standstill friction may be as much more than it is with its smoothed sign
+        unsure = data.coulomb * (STILL / np.hypot(s.qd, STILL)) ** 2
+        use = (np.abs(torque) + unsure) / (limit * t.torque_share)
         too_much, too_fast = np.maximum(use - 1.0, 0.0), np.maximum(speed / t.velocity - 1.0, 0.0)
         travelled = t.travel * (np.hypot(s.qd, STILL) - STILL)
         rate = t.penalty * float(np.sum(too_much**2 + too_fast**2)) + float(np.sum(travelled))
@@ -191,14 +200,17 @@ class SplineCost:
         s.of_qd += np.sign(s.qd) * (
             2.0 * t.penalty * step * too_fast / t.velocity - weight * use / limit * falls
         )
+        s.of_qd -= 2.0 * weight / (limit * t.torque_share) * unsure * s.qd / np.hypot(s.qd, STILL) ** 2
         s.of_qd += step * t.travel * s.qd / np.hypot(s.qd, STILL)
         power = dynamics.axis_power(data, s.qd, torque)
-        energy, adds = bus(power, step, t.capacity_energy, t.regeneration)
+        energy, adds, of_step = bus(power, step, t)
         of_power = t.energy_value * step * adds
         of_torque += of_power * (s.qd + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)
         s.of_qd += of_power * torque
         torques_back(data, s, of_torque)
-        s.of_step += rate + t.energy_value * float(np.sum(adds * power))
+        # without a common bus a slope stands for the share of its axis that counts, not for its joules
+        drawn = energy / step if t.regeneration == "none" else float(np.sum(adds * power))
+        s.of_step += rate + t.energy_value * (drawn + of_step)
         return rate * step + t.energy_value * energy, energy
 
     def _clearance(self, s: Samples, row: IntArray, step: float) -> float:
