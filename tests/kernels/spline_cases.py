@@ -97,6 +97,6 @@ def along(control: FloatArray, interval: float, at: FloatArray, order: int = 0) 
 
 
 def sample_times(K: int, interval: float) -> FloatArray:
-    """(2 (K - 3),): the middles of the halves of all intervals."""
-    times: FloatArray = (np.arange(2 * (K - 3)) + 0.5) * interval / 2.0
+    """(2 (K - 3),): the beginnings of the halves of all intervals."""
+    times: FloatArray = np.arange(2 * (K - 3)) * interval / 2.0
     return times

@@ -57,7 +57,7 @@ def by_definition(
     bus = DcBusParameters(t.capacity_energy, t.regeneration)
     cost = t.energy_value * drive_energy(dynamics.axis_power(qd, torque), step, bus).mains
     cost += t.time_value * interval * (K - 3)
-    cost += step * float((t.travel * (np.sqrt(qd**2 + 0.02**2) - 0.02)).sum())
+    cost += step * float((t.travel * (np.sqrt(qd**2 + 0.01**2) - 0.01)).sum())
 
     def squares(use: FloatArray, weight: float) -> float:
         return weight * float((np.maximum(use - 1.0, 0.0) ** 2).sum())
@@ -112,7 +112,7 @@ def test_energy_is_that_of_the_drives(core: Any, regeneration: Regeneration, cap
     for robot, tolerance in (
         (plain(kr210()), 1e-11),
         (kr210(), 0.01),
-    ):  # smoothed below 0.02 rad/s: less than 1 %
+    ):  # smoothed below 0.01 rad/s: less than 1 %
         collision, dynamics = kr210_models((), few=True, robot=robot)
         t = terms(robot, 0, regeneration=regeneration, capacity_energy=capacity, energy_value=3.0, **FREE)
         found = SplineCost(collision, dynamics, t, core=core).value(control, interval)
@@ -123,6 +123,19 @@ def test_energy_is_that_of_the_drives(core: Any, regeneration: Regeneration, cap
         mains = drive_energy(power, interval / 2.0, DcBusParameters(capacity, regeneration)).mains
         assert found.energy == pytest.approx(mains, rel=tolerance)
         assert found.value == pytest.approx(3.0 * found.energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("regeneration", REGENERATIONS)
+def test_a_rounded_bus_costs_more_and_nears_the_exact_one(core: Any, regeneration: Regeneration) -> None:
+    control, interval = motion(4, 20, around=WORKING), 0.15
+    exact, *rounded = (
+        kr210_cost(core, (), few=True, regeneration=regeneration, smoothing=watts).value(control, interval)
+        for watts in (0.0, 1e-3, 30.0, 300.0)
+    )
+    energies = [value.energy for value in rounded]
+    assert rounded[0].energy == pytest.approx(exact.energy, rel=1e-5)
+    if regeneration != "fed_back":  # a surplus that is rounded up, returns
+        assert exact.energy < energies[0] < energies[1] < energies[2]
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 6, 9, 16])
@@ -172,15 +185,16 @@ def check_derivatives(
     assert found.of_interval == pytest.approx((ahead - behind) / (2.0 * h), rel=3e-6)
 
 
+@pytest.mark.parametrize("smoothing", [0.0, 300.0])
 @pytest.mark.parametrize("regeneration", REGENERATIONS)
 @pytest.mark.parametrize(("interval", "seed"), [(0.08, 0), (0.3, 1), (0.6, 2)])
 def test_derivatives_are_those_of_differences(
-    core: Any, interval: float, seed: int, regeneration: Regeneration
+    core: Any, interval: float, seed: int, regeneration: Regeneration, smoothing: float
 ) -> None:
     collision, _ = kr210_models(few=core is None)
     rng = np.random.default_rng(seed)
     rows = np.stack([np.full(len(collision.pairs), 0.02), rng.choice([-np.inf, 0.1], len(collision.pairs))])
-    cost = kr210_cost(core, few=core is None, regeneration=regeneration, threshold=rows)
+    cost = kr210_cost(core, few=core is None, regeneration=regeneration, smoothing=smoothing, threshold=rows)
     control = motion(seed, 12, around=MIDDLE, size=1.5)
     check_derivatives(cost, control, interval, rng.integers(0, 2, 9), seed)
 

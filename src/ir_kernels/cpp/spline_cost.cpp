@@ -24,7 +24,7 @@ Basis basis(double u) {
 const Basis* bases() {
   static const std::vector<Basis> all = [] {
     std::vector<Basis> b;
-    for (int p = 0; p < P; ++p) b.push_back(basis((p + 0.5) / P));
+    for (int p = 0; p < P; ++p) b.push_back(basis(static_cast<double>(p) / P));
     return b;
   }();
   return all.data();

@@ -8,7 +8,7 @@
 namespace ir {
 namespace {
 
-constexpr double still = 0.02;  // [rad/s] friction and |qd| are smoothed below
+constexpr double still = 0.01;  // [rad/s] friction and |qd| are smoothed below
 
 double sum(const Double8& v) {
   double s = 0.0;

@@ -18,7 +18,7 @@ from ir_kernels.spline_terms import SplineTerms
 from ir_msgs_py.arrays import FloatArray, IntArray
 
 SAMPLES = 2  # per interval
-STILL = 0.02  # [rad/s] friction and |qd| are smoothed below
+STILL = 0.01  # [rad/s] friction and |qd| are smoothed below
 RAMP = 0.05  # share of the speed over which the step of the torque limit is smoothed
 ABOUT = 100.0  # 1 / rad: a position limit overrun by 0.01 rad counts like a limit used twice
 INTERVAL_WEIGHT = 4.0  # of the logarithm of the interval in the metric, against (rad/s)^2
@@ -40,7 +40,7 @@ class Samples:
 
 def basis() -> FloatArray:
     """(3, SAMPLES, 4): weights of an interval's control points for position and two derivatives by u."""
-    u = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    u = np.arange(SAMPLES) / SAMPLES
     v = 1.0 - u
     position = [v**3 / 6, (3 * u**3 - 6 * u**2 + 4) / 6, (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6, u**3 / 6]
     first = [-(v**2) / 2, (3 * u**2 - 4 * u) / 2, (-3 * u**2 + 2 * u + 1) / 2, u**2 / 2]

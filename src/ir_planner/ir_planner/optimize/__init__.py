@@ -4,8 +4,9 @@ from ir_planner.optimize.descents import Descents, path_of
 from ir_planner.optimize.movement_over import movement_over
 from ir_planner.optimize.path_timing import QUICK_TIMING, PathTiming, TimingEffort, along_its_path
 from ir_planner.optimize.portfolio import Portfolio
-from ir_planner.optimize.refinement import FEWEST, MOST, QUICK, SPACING, THOROUGH, Refinement
+from ir_planner.optimize.refinement import FEWEST, MOST, SPACING, Refinement
 from ir_planner.optimize.rescaling import rescaled
+from ir_planner.optimize.stages import QUICK, THOROUGH
 
 __all__ = [
     "FEWEST",

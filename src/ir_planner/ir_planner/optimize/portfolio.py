@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
-from ir_planner.optimize.refinement import QUICK, THOROUGH, Effort, Refinement, Solution
+from ir_planner.optimize.refinement import Refinement, Solution
+from ir_planner.optimize.stages import QUICK, THOROUGH, Effort
 from ir_planner.search import COARSE, apart, at_nine_shares, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
 
@@ -82,6 +83,11 @@ class Portfolio:
                 break
             done += self._refine(candidate, effort)
         return done
+
+    def refine_anew(self, method: str, path: FloatArray) -> bool:
+        """Refine a path (M, n) thoroughly, though its coarse solution was like a cheaper one."""
+        solution = self.refinement.coarse(path, THOROUGH.coarse)
+        return self._refine(Candidate(method, path, solution), THOROUGH)
 
     def deepen(self) -> bool:
         """Optimise the path of the best movement thoroughly; False where that was done."""

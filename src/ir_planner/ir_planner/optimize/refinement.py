@@ -17,7 +17,8 @@ from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Violation
 from ir_planner.curves import UniformSpline, along_path, fewest_seconds
-from ir_planner.optimize.slowing import slowed_to_limits
+from ir_planner.optimize.slowing import beyond_limits, slowed_to_limits
+from ir_planner.optimize.stages import QUICK, THOROUGH, Effort, Stage, decisive
 from ir_planner.optimize.terms import spline_cost
 from ir_planner.request import Context
 from ir_planner.scene import PROOF_TOLERANCE, MotionLimits, tcp_inside
@@ -34,12 +35,19 @@ from ir_planner.timing import (
 SPACING = 0.1  # s between the knots of the coarsest spline
 FEWEST, MOST = 12, 64  # control points of the coarsest spline
 SLOWER = 1.3  # than the path at full speed: where the descent starts
-_STIFFNESS = 4.0  # of penalties, against the power that the objective is about
-_FINEST_STIFFNESS = 40.0  # the same on the finest spline
+_STIFFNESS = 4.0  # of penalties, against the power that the objective is about: at least
 _REPAIRS = 5
 _MARGIN_STEP = 1e-3  # m of clearance margin beyond what lacked
 _REPAIR_EVALUATIONS = 40
-SPEED_MARGINS = (0.98, 0.95, 0.9)  # shares of the speed tried where a duration is requested, until it is met
+_TIGHTENINGS = 4  # of the limits, where a motion of requested duration exceeds them
+_TIGHTENED = 100  # evaluations after each
+_TIGHTEST = 0.85  # share of the limits' speed, and of torque
+_TIGHTER = 0.999  # than what was exceeded
+SPEED_MARGINS = (
+    0.9995,
+    0.95,
+    0.9,
+)  # shares of the speed tried where a duration is requested, until it is met
 _ROUNDING = 1e-9  # relative
 _STIFFER = 10.0  # penalties where a duration is requested: a second may be worth much more than usual
 _ZONE_SAMPLES = 4  # per interval
@@ -48,30 +56,18 @@ _SHARE_OF_WORK = 0.4  # of what is left, that one descent may take: finer ones a
 EDGES_PER_INTERVAL = 0.25  # work of one evaluation, in certified edges: about what it takes beside one
 
 
-@dataclass(frozen=True)
-class Effort:
-    """Evaluations of the cost on the coarse spline, on the next finer one, and on the finest."""
-
-    coarse: int
-    middle: int
-    fine: int
-
-
-QUICK = Effort(50, 40, 30)
-THOROUGH = Effort(300, 300, 300)
-
-
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A spline under optimisation: its level (0: coarse), cost, the distances (R, Z) m that its pairs are to
-    keep, and the share of the limits' speed that it is optimised for.
+    """A spline under optimisation: the stage it went through, its cost, the distances (R, Z) m that its pairs
+    are to keep, and the shares of the limits' speed and of the torque that it is optimised for.
     """
 
     spline: UniformSpline
-    level: int
+    stage: Stage
     cost: float
     kept: FloatArray
     speed: float = 1.0
+    torque: float = TORQUE_SHARES[0]
 
 
 class Refinement:
@@ -99,7 +95,8 @@ class Refinement:
     def coarse_from(self, spline: UniformSpline, path: FloatArray, evaluations: int) -> Solution:
         """The coarse solution by descent from a spline of any origin; path (M, n): what it came from."""
         speed = SPEED_MARGINS[0] if self.context.options.duration > 0.0 else 1.0
-        return self._optimised(Solution(spline, 0, np.inf, self._kept, speed), path, evaluations)
+        stage = replace(QUICK.stages[0], evaluations=evaluations)
+        return self._optimised(Solution(spline, stage, np.inf, self._kept, speed), path)
 
     def refined(self, solution: Solution, path: FloatArray, effort: Effort = QUICK) -> Movement | None:
         """The movement that a coarse solution on a path (M, n) becomes, proved; None if none can be."""
@@ -107,7 +104,7 @@ class Refinement:
         if self.context.options.duration > 0.0:
             for speed in SPEED_MARGINS[1:]:
                 if found is None:
-                    slower = self._optimised(replace(solution, speed=speed), path, effort.coarse)
+                    slower = self._optimised(replace(solution, speed=speed), path)
                     found = self._refined(slower, path, effort)
             if found is None:
                 return self._fastest_stretched(path)
@@ -137,19 +134,57 @@ class Refinement:
             check_requested(self.shortest, self.context.options)
 
     def _refined(self, solution: Solution, path: FloatArray, effort: Effort) -> Movement | None:
-        for evaluations in (effort.middle, effort.fine)[solution.level :]:
-            finer = replace(solution, spline=solution.spline.subdivided(), level=solution.level + 1)
-            solution = self._optimised(finer, path, evaluations)
+        for stage in effort.after(solution.stage.level):
+            solution = self._staged(solution, decisive(stage, effort.last, self._rounding(solution)), path)
+            if stage.level == effort.last.level and solution.stage.stiffness == effort.last.stiffness:
+                break
+        solution = self._as_fast_as_requested(solution, path)
         for _ in range(_REPAIRS + 1):
             found = self._proved(solution, path)
             if not isinstance(found, Violation):
                 return found
             if found.pair is None:
                 return None
-            solution = self._optimised(self._with_larger_margin(solution, found), path, _REPAIR_EVALUATIONS)
+            solution = self._repaired(self._with_larger_margin(solution, found), path, _REPAIR_EVALUATIONS)
         return None
 
-    def _optimised(self, solution: Solution, path: FloatArray, evaluations: int) -> Solution:
+    def _staged(self, solution: Solution, stage: Stage, path: FloatArray) -> Solution:
+        """The descent of a stage, on a spline as fine as it asks for."""
+        spline = solution.spline
+        for _ in range(stage.level - solution.stage.level):
+            spline = spline.subdivided()
+        return self._optimised(replace(solution, spline=spline, stage=stage), path)
+
+    def _repaired(self, solution: Solution, path: FloatArray, evaluations: int) -> Solution:
+        """A short descent more, for bounds that have changed."""
+        stage = replace(solution.stage, evaluations=evaluations)
+        return self._optimised(replace(solution, stage=stage), path)
+
+    def _rounding(self, solution: Solution) -> float:
+        """What a watt of smoothing weighs in the cost of a movement, as a share of it."""
+        worth = objective_weights(self.context, solution.spline.control).energy
+        if self.context.options.duration > 0.0:  # the base load is not to be chosen
+            base = self.context.scene.base_watts * solution.spline.duration
+            return worth * solution.spline.duration / max(solution.cost - base, 1.0)
+        return worth * solution.spline.duration / max(solution.cost, 1e-9)
+
+    def _as_fast_as_requested(self, solution: Solution, path: FloatArray) -> Solution:
+        """The solution with bounds that are tightened by as much as its motion exceeds them (between samples,
+        by softness of the penalties) until it needs no more time than requested.
+        """
+        limits, scene = self.limits.with_torque_share(TORQUE_SHARES[0]), self.context.scene
+        for _ in range(_TIGHTENINGS if self.context.options.duration > 0.0 else 0):
+            torque, longer = beyond_limits(solution.spline, limits, scene)
+            if max(torque, longer) <= 1.0:
+                break
+            speed = solution.speed * (_TIGHTER / longer if longer > 1.0 else 1.0)
+            share = solution.torque * (_TIGHTER / torque if torque > 1.0 else 1.0)
+            if min(speed, share) < _TIGHTEST:
+                break
+            solution = self._repaired(replace(solution, speed=speed, torque=share), path, _TIGHTENED)
+        return solution
+
+    def _optimised(self, solution: Solution, path: FloatArray) -> Solution:
         work, robot, spline = self.context.work, self.context.scene.cell.robot, solution.spline
         work.check()
         affordable = int(_SHARE_OF_WORK * work.left / (EDGES_PER_INTERVAL * spline.intervals))
@@ -160,7 +195,8 @@ class Refinement:
             spline.interval,
             self._rows(spline),
             fixed_interval=self.context.options.duration > 0.0,
-            evaluations=min(evaluations, affordable),
+            evaluations=min(solution.stage.evaluations, affordable),
+            tolerance=solution.stage.tolerance,
         )
         work.spend(int(np.ceil(found.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
         # a spline stays within the range of its control points
@@ -169,14 +205,16 @@ class Refinement:
 
     def _cost(self, solution: Solution, path: FloatArray) -> SplineCost:
         weights = objective_weights(self.context, path)
-        penalty = weights.power * (_FINEST_STIFFNESS if solution.level == 2 else _STIFFNESS)
-        penalty *= _STIFFER if self.context.options.duration > 0.0 else 1.0
-        limits = self.limits.with_torque_share(TORQUE_SHARES[0]).for_speed(solution.speed)
+        stage, stiffer = solution.stage, _STIFFER if self.context.options.duration > 0.0 else 1.0
+        penalty = weights.power * max(stiffer * stage.stiffness, _STIFFNESS)
+        limits = self.limits.with_torque_share(solution.torque).for_speed(solution.speed)
         if solution.kept is not self._kept:
-            return spline_cost(self.context, limits, weights, penalty, solution.kept)
-        key = (penalty, solution.speed, weights.travel.tobytes())
+            return spline_cost(self.context, limits, weights, penalty, solution.kept, stage.smoothing)
+        key = (penalty, stage.smoothing, solution.speed, solution.torque, weights.travel.tobytes())
         if key not in self._costs:
-            self._costs[key] = spline_cost(self.context, limits, weights, penalty, solution.kept)
+            self._costs[key] = spline_cost(
+                self.context, limits, weights, penalty, solution.kept, stage.smoothing
+            )
         return self._costs[key]
 
     def _rows(self, spline: UniformSpline) -> RowArray:

@@ -19,10 +19,12 @@ def spline_cost(
     weights: ObjectiveWeights,
     penalty: float,
     threshold: FloatArray | None = None,
+    smoothing: float = 0.0,
 ) -> SplineCost:
     """Cost of splines by the objective; what exceeds the limits costs `penalty` W for a relative excess of 1.
 
     threshold (R, Z) m: what the pairs must keep; None: path and clearance are given and cost nothing.
+    smoothing [W]: of the bus' switch.
     """
     scene, robot = context.scene, context.scene.cell.robot
     given = threshold is None
@@ -39,6 +41,7 @@ def spline_cost(
         time_value=weights.time,
         capacity_energy=scene.dc_bus.capacity_energy,
         regeneration=scene.dc_bus.regeneration,
+        smoothing=smoothing,
         clearance_margin=_MARGIN,
         clearance_scale=_SCALE,
         penalty=penalty,

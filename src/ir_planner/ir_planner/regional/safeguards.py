@@ -44,6 +44,11 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
     best, shortest = own.best(), own.refinement.shortest
     if options.planner_id:
         return best, shortest
+    if options.duration > 0.0 and best is not None:
+        method, path = exploration.paths[0]
+        if not (context.work.exhausted or np.array_equal(best[1].path, path)):
+            own.refine_anew(method, path)
+        return own.best(), shortest
     if options.duration > 0.0:
         free, duration = _as_asked(_optimised_again(own, context.asking("time_and_energy")), context)
         best, shortest = _cheaper(best, free), min(shortest, duration)
