@@ -38,17 +38,17 @@ _LONGER = 1.03  # what passing points exactly may cost in time
 
 @dataclass(frozen=True)
 class TimingEffort:
-    """Evaluations of the cost per descent, and the stiffness of the penalties in each, against the
-    objective's power; each descent has twice the knots of the one before.
+    """Evaluations of the cost per descent; in each the stiffness of the penalties, against the objective's
+    power, and the W over which the bus' switch is rounded. Each has twice the knots of the one before.
     """
 
     evaluations: int
-    stiffness: tuple[float, ...]
+    descents: tuple[tuple[float, float], ...]
 
 
 # service lines of the bundled cells: 2 % more J than with the thorough effort, in half the time
-QUICK_TIMING = TimingEffort(150, (40.0, 400.0))
-THOROUGH_TIMING = TimingEffort(250, (40.0, 40.0, 400.0))
+QUICK_TIMING = TimingEffort(150, ((40.0, 100.0), (400.0, 5.0)))
+THOROUGH_TIMING = TimingEffort(250, ((40.0, 100.0), (40.0, 20.0), (400.0, 3.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +113,14 @@ def _profile(
     total = context.options.duration or path.duration
     count = int(np.clip(np.ceil(total / _STEP), _FEWEST, _MOST))
     s = path.places(count)
-    for k, stiffness in enumerate(effort.stiffness):
+    for k, (stiffness, smoothing) in enumerate(effort.descents):
         context.work.check()
         if k > 0 and context.work.exhausted:
             break
         if k > 0:
             s, count = path.finer(s), 2 * count
         s, total, evaluations = optimised_profile(
-            path, s, total, limits, (stiffness, effort.evaluations), context
+            path, s, total, limits, (stiffness, smoothing, effort.evaluations), context
         )
         context.work.spend(int(np.ceil(evaluations * count * EDGES_PER_INTERVAL)))
     return s, total

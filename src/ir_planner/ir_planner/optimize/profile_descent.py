@@ -32,17 +32,17 @@ def optimised_profile(
     s: FloatArray,
     duration: float,
     limits: MotionLimits,
-    effort: tuple[float, int],
+    effort: tuple[float, float, int],
     context: Context,
 ) -> tuple[FloatArray, float, int]:
     """s (count - 3,) at the inner knots, duration [s] and evaluations, from a profile s and its duration,
     which stays where the request has one. effort: stiffness of penalties, against the power that the
-    objective is about, and evaluations.
+    objective is about, smoothing of the bus [W], and evaluations.
     """
     descent = _Descent(path, s, duration, context.options.duration > 0.0)
     weights = objective_weights(context, path.q[::_SPARSE])
-    stiffness, most = effort
-    cost = spline_cost(context, limits, weights, stiffness * weights.power)
+    stiffness, smoothing, most = effort
+    cost = spline_cost(context, limits, weights, stiffness * weights.power, smoothing=smoothing)
     x, evaluations = _minimised(lambda x: descent.value(x, cost), np.zeros(len(s) + 1), most)
     return *descent.at(x), evaluations
 

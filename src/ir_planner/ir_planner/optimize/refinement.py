@@ -34,6 +34,7 @@ from ir_planner.timing import (
 
 SPACING = 0.1  # s between the knots of the coarsest spline
 FEWEST, MOST = 12, 64  # control points of the coarsest spline
+_FINE = 0.02  # s between knots: enough
 SLOWER = 1.3  # than the path at full speed: where the descent starts
 _STIFFNESS = 4.0  # of penalties, against the power that the objective is about: at least
 _REPAIRS = 5
@@ -152,7 +153,7 @@ class Refinement:
         """The descent of a stage, on a spline as fine as it asks for."""
         spline = solution.spline
         for _ in range(stage.level - solution.stage.level):
-            spline = spline.subdivided()
+            spline = spline.subdivided() if spline.interval > _FINE else spline
         return self._optimised(replace(solution, spline=spline, stage=stage), path)
 
     def _repaired(self, solution: Solution, path: FloatArray, evaluations: int) -> Solution:
