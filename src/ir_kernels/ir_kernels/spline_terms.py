@@ -11,6 +11,17 @@ from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_msgs_py.arrays import FloatArray
 
 
+NOT_NEGATIVE = (
+    "energy_value",
+    "time_value",
+    "capacity_energy",
+    "smoothing",
+    "clearance_margin",
+    "penalty",
+    "clearance_penalty",
+)
+
+
 @dataclass(frozen=True, eq=False)
 class SplineTerms:
     """What a motion is judged by; n joints, Z pairs.
@@ -70,17 +81,8 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
         raise InputError(
             f"terms.regeneration is {terms.regeneration!r}: known are {', '.join(REGENERATIONS)}"
         )
-    free = (
-        "energy_value",
-        "time_value",
-        "capacity_energy",
-        "smoothing",
-        "clearance_margin",
-        "penalty",
-        "clearance_penalty",
-    )
     numbers: dict[str, float] = {
-        name: arguments.number(f"terms.{name}", getattr(terms, name), 0.0) for name in free
+        name: arguments.number(f"terms.{name}", getattr(terms, name), 0.0) for name in NOT_NEGATIVE
     }
     return SplineTerms(
         velocity=arrays["velocity"],

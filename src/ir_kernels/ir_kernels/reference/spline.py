@@ -98,14 +98,14 @@ def bus(power: FloatArray, step: float, terms: SplineTerms) -> tuple[float, Floa
     left = np.empty(len(power))  # in the capacitor, if it had no ends
     for k, joules in enumerate(wanted):
         left[k] = stored - joules
-        drawn, surplus = above(-left[k], most)[0], above(left[k] - terms.capacity_energy, most)[0]
-        mains += float(drawn - back * surplus)
-        stored = float(left[k] + drawn - surplus)
+        lack, surplus = above(-left[k], most)[0], above(left[k] - terms.capacity_energy, most)[0]
+        mains += float(lack - back * surplus)
+        stored = float(left[k] + lack - surplus)
     adds, worth, of_most = np.empty(len(power)), 0.0, 0.0  # worth: of a joule more in the capacitor
-    draws, surpluses = above(-left, most), above(left - terms.capacity_energy, most)
+    lacks, surpluses = above(-left, most), above(left - terms.capacity_energy, most)
     for k in reversed(range(len(power))):
-        of_most += float(draws[2][k] * (1.0 - worth) - surpluses[2][k] * (back - worth))
-        worth = float(worth * (1.0 - draws[1][k] - surpluses[1][k]) + draws[1][k] + back * surpluses[1][k])
+        of_most += float(lacks[2][k] * (1.0 - worth) - surpluses[2][k] * (back - worth))
+        worth = float(worth * (1.0 - lacks[1][k] - surpluses[1][k]) + lacks[1][k] + back * surpluses[1][k])
         adds[k] = worth
     return mains, np.repeat(adds[:, None], power.shape[1], axis=1), of_most * terms.smoothing
 
@@ -209,8 +209,8 @@ class SplineCost:
         s.of_qd += of_power * torque
         torques_back(data, s, of_torque)
         # without a common bus a slope stands for the share of its axis that counts, not for its joules
-        drawn = energy / step if t.regeneration == "none" else float(np.sum(adds * power))
-        s.of_step += rate + t.energy_value * (drawn + of_step)
+        supplied = energy / step if t.regeneration == "none" else float(np.sum(adds * power))
+        s.of_step += rate + t.energy_value * (supplied + of_step)
         return rate * step + t.energy_value * energy, energy
 
     def _clearance(self, s: Samples, row: IntArray, step: float) -> float:
