@@ -6,13 +6,20 @@ until they keep CLEARANCE and their tools are APART; whether a path joins them i
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from _regional_tasks import Task, scene_of_cell
+from _results import Claim, at_least, at_most, line_of
 
-from ir_description import Body, Cell, Equipment, Zone, load_cell
+from ir_description import Body, Cell, Equipment, Zone, cell_to_yaml, load_cell
+from ir_kernels.search import BidirectionalTree
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.options import PlanOptions
+from ir_planner.planner import Planner
+from ir_planner.request.goals import Goal
 from ir_planner.scene.planning_scene import PlanningScene
 
 BOXES = 1000
@@ -21,6 +28,9 @@ EDGES = (0.05, 0.22)  # m
 MARGIN, CLEARANCE = 0.01, 0.015  # m: S_m of the movements, and what their ends keep at least
 APART = 0.8  # m between the tools at start and goal
 DRAWN = 4096  # configurations at a time
+TASKS = 5  # of each cell
+WITHIN = 5.0  # s
+EDGES_OF_A_REQUEST = 80_000  # certified edges: about so long on two cores that nobody else uses
 
 
 def boxes_cell(seed: int, count: int = BOXES) -> Cell:
@@ -57,6 +67,59 @@ def boxes_tasks(seed: int, count: int) -> list[Task]:
         if np.linalg.norm(tools[1] - tools[0]) > APART and len(found) < count:
             found.append(Task(scene.cell.name, str(len(found)), scene, start, goal, MARGIN))
     return found
+
+
+def boxes_rows(cells: int, first: int, more: int) -> list[dict[str, Any]]:
+    """A row per task of so many cells. more: times the work of a request, which decides what is solvable."""
+    rows = []
+    for seed in range(first, first + cells):
+        planner = Planner(time.process_time)
+        planner.set_cell(cell_to_yaml(boxes_cell(seed)), "")
+        planner.settings = replace(planner.settings, max_iterations=EDGES_OF_A_REQUEST)
+        for task in boxes_tasks(seed, TASKS):
+            rows.append(_row(planner, task, more))
+            print(line_of(rows[-1]), flush=True)
+    return rows
+
+
+def boxes_claims(rows: list[dict[str, Any]]) -> list[Claim]:
+    """What the tasks say."""
+    solvable = [row for row in rows if row["solvable"]]
+    if not solvable:
+        return []
+    solved = [row for row in solvable if row["solved"]]
+    name = f"solved of {len(solvable)} solvable tasks ({len(rows)} drawn), {EDGES_OF_A_REQUEST} edges"
+    return [
+        at_least(name, 100.0 * len(solved) / len(solvable), "%", 90.0),
+        at_most("longest of these, processor time", max(row["seconds"] for row in solved), "s", WITHIN),
+    ]
+
+
+def _row(planner: Planner, task: Task, more: int) -> dict[str, Any]:
+    options = PlanOptions(seed=1, safety_distance=task.margin, planning_time=600.0)
+    begin = time.process_time()
+    plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options)
+    seconds = time.process_time() - begin
+    enclosed = "is enclosed" in plan.status.message
+    return {
+        "cell": task.cell,
+        "task": task.name,
+        "solved": plan.status.ok and plan.report.certified,
+        "seconds": seconds,
+        "edges": plan.info.iterations,
+        "enclosed": enclosed,
+        "solvable": plan.status.ok or (not enclosed and _joined(task, more)),
+    }
+
+
+def _joined(task: Task, more: int) -> bool:
+    """Whether trees of another seed meet, with `more` times the work of a request."""
+    robot, model = task.scene.cell.robot, task.scene.collision
+    scale = np.maximum(np.sqrt(task.scene.weights / task.scene.weights[0]), 0.1)
+    threshold = task.scene.thresholds(task.margin)
+    low, high = robot.position_min, robot.position_max
+    search = BidirectionalTree(model, task.start, task.goal[None], threshold, low, high, scale, 1000)
+    return search.grow(more * EDGES_OF_A_REQUEST)
 
 
 def _free(scene: PlanningScene, rng: np.random.Generator) -> FloatArray:

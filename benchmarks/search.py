@@ -1,10 +1,13 @@
 """How soon do two trees find a certified path, for every task of the cells and in both directions?
 
-    python benchmarks/search.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
+    python benchmarks/search.py [--cell FILE]... [--seeds N] [--boxes N [--boxes-seed N]] [--quick]
+                                [--json FILE]
 
 One thread, the whole call from Python, the cell's tool attached; S_m is 20 mm, or 80 % of the clearance of
-the task's ends where that is less. Closes with one line per figure that was asked for: measured value, bound,
-holds or falls short.
+the task's ends where that is less. --boxes: instead of these cells, N drawn ones of a thousand boxes each,
+whole requests with the planner's default work, in processor time; solvable is what a request solves with
+the same work, or trees of another seed with ten times as much. Closes with one line per figure that was asked for: measured
+value, bound, holds or falls short.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import time
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from _boxes import boxes_claims, boxes_rows
 from _regional_tasks import Task, tasks_of
 from _results import Claim, at_most, command_line, finish
 
@@ -37,9 +41,12 @@ class Row:
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    given = command_line(__doc__, list(BOUNDS), 30, "3 seeds").parse_args()
+    parser = command_line(__doc__, list(BOUNDS), 30, "3 seeds; one cell of boxes, twice the work")
+    parser.add_argument("--boxes", type=int, default=0, help="cells of a thousand boxes, instead of others")
+    parser.add_argument("--boxes-seed", type=int, default=0, help="what they are drawn from")
+    given = parser.parse_args()
     if given.quick:
-        given.seeds = min(given.seeds, 3)
+        given.seeds, given.boxes = min(given.seeds, 3), min(given.boxes, 1)
     return given
 
 
@@ -67,6 +74,10 @@ def measured(task: Task, seeds: int) -> tuple[Row, list[float]]:
 def main() -> None:
     """Measure, print, write."""
     given = arguments()
+    if given.boxes:
+        boxes = boxes_rows(given.boxes, given.boxes_seed, more=2 if given.quick else 10)
+        finish(given.json, boxes, boxes_claims(boxes))
+        return
     rows: list[Row] = []
     claims: list[Claim] = []
     print(f"{'cell':16s}{'task':24s}{'median ms':>10s}{'worst ms':>10s}{'edges':>8s}{'failed':>8s}")

@@ -119,6 +119,7 @@ infos = st.builds(
     lengths,
     tuples(st.builds(report.PlanningStage, texts, lengths, texts)),
     tuples(st.builds(report.Rejection, texts, st.integers(0, 2**32 - 1))),
+    st.sampled_from(["", *options.TIMINGS]),
 )
 movements = st.builds(
     report.PlannedMovement,

@@ -125,5 +125,9 @@ def test_asynchronous_joints_never_take_longer_and_the_answer_names_its_timing(
     assert own.report.duration <= common.report.duration
     note = next(stage.note for stage in own.info.stages if stage.name == "asynchronous")
     assert own.trajectory is not None
+    assert common.info.timing == "synchronous"
     if own.trajectory == common.trajectory:
+        assert own.info.timing == "synchronous"
         assert "synchronous" in note
+    else:
+        assert own.info.timing == "asynchronous"

@@ -136,7 +136,8 @@ class PlanningInfo:
     """How an answer came about.
 
     start: joint values (n,) [rad] that were used, empty where there is no start; start_names: their joints.
-    iterations: work done, in the unit of max_iterations; truncated: cut by planning_time [s].
+    iterations: work done, in the unit of max_iterations; truncated: cut by planning_time [s]. timing: which
+    the answer is, "synchronous" or "asynchronous"; "" where nobody chose.
     """
 
     planner_id: str = ""
@@ -148,6 +149,7 @@ class PlanningInfo:
     planning_time: float = 0.0
     stages: tuple[PlanningStage, ...] = ()
     rejected: tuple[Rejection, ...] = ()
+    timing: str = ""
 
     def __post_init__(self) -> None:
         for name in ("seed", "iterations"):

@@ -101,6 +101,7 @@ def planning_info_to_msg(info: PlanningInfo) -> PlanningInfoMsg:
         iterations=info.iterations,
         truncated=info.truncated,
         planning_time=info.planning_time,
+        timing=info.timing,
         stages=[PlanningStageMsg(name=s.name, seconds=s.seconds, note=s.note) for s in info.stages],
         rejected=[RejectionMsg(reason=r.reason, count=r.count) for r in info.rejected],
     )
@@ -118,6 +119,7 @@ def planning_info_from_msg(msg: PlanningInfoMsg) -> PlanningInfo:
         planning_time=msg.planning_time,
         stages=tuple(PlanningStage(s.name, s.seconds, s.note) for s in msg.stages),
         rejected=tuple(Rejection(r.reason, r.count) for r in msg.rejected),
+        timing=msg.timing,
     )
 
 

@@ -85,6 +85,7 @@ def _search(
     if best is None:
         return refusal(start, ends.goals[0], space, context.journal), None
     context.journal.planner_id, movement = best
+    context.journal.timing = "synchronous"
     if context.options.objective == "movement_cost":  # W of its waypoints is asked for
         movement = over_free_steps(movement, space)
     return Status.success(), movement

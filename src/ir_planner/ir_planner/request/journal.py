@@ -20,6 +20,7 @@ class Journal:
     seed: int
     begin: float = 0.0
     planner_id: str = ""
+    timing: str = ""  # which the answer is
     stages: list[PlanningStage] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
 
@@ -58,6 +59,7 @@ class Journal:
             planning_time=self.work.clock() - self.begin,
             stages=tuple(self.stages),
             rejected=tuple(Rejection(reason, count) for reason, count in sorted(self.rejected.items())),
+            timing=self.timing,
         )
 
 

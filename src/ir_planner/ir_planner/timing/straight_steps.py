@@ -33,6 +33,7 @@ MakeLaw = Callable[[FloatArray, FloatArray, MotionLimits, Dynamics], Law]
 # how steps are timed, and the share of the acceleration they may use; the fastest first. The fastest is not
 # always the one that costs the least joules once it is stretched.
 _SHAPES: tuple[tuple[MakeLaw, float], ...] = ((fastest, 1.0), (fastest_law, 1.0), (fastest_law, 0.6))
+NO_OWN_LAW = "neither torque nor clearance leaves a joint its own law: synchronous"
 _CUTS = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.0)  # shares of the largest overlap, down to a stop
 
 
@@ -100,7 +101,7 @@ def _fastest(
     found = None if synchronous else _each_joint_alone(waypoints, common, limits, context)
     if found is not None:
         return found
-    note = "" if synchronous else "neither torque nor clearance leaves a joint its own law: synchronous"
+    note = "" if synchronous else NO_OWN_LAW
     return _cut_corners(waypoints, tuple(StepLaws((one,)) for one in common), limits, context), note
 
 
