@@ -150,7 +150,8 @@ def test_a_standby_names_its_mode_and_what_it_saves(capsys: pytest.CaptureFixtur
     [
         (("plan", "dmo"), "no cell dmo: did you mean demo?"),
         (("move", "demo", "home", "lathe_wrk"), "no station lathe_wrk: did you mean lathe_work?"),
-        (("plan", "demo", "--stations", "nowhere"), "station 'nowhere' is unknown"),
+        (("plan", "demo", "--stations", "nowhere"), "no station nowhere; there is: "),
+        (("plan", "demo", "--stations", "gauge_mesure"), "did you mean gauge_measure?"),
         (("plan", "demo", "--safety-distance", "7"), "safety_distance is 7 m"),
         (("plan", "open"), "has no program"),
         (("standby", "demo", "--pause", "-3"), "pause is -3 s"),

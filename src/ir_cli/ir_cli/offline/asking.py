@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 from ir_description import DescriptionError, UnknownNameError, load_cell
@@ -46,15 +46,25 @@ def planner_of(cell: str) -> Planner:
 
 def goal_of(text: str, planner: Planner) -> Goal:
     """What a person types as a goal; a mistyped station is answered with the one that was meant."""
-    cell = planner.cell
     try:
-        return parse_goal(text, cell)
-    except RequestError as error:
-        known = [*(station.name for station in cell.stations), "home", "park"]
-        if nearest(text, known):
-            listing = f"ir cell check {cell.name}"
-            raise InputError(unknown_name("station", text[:80], known, listing)) from error
+        return parse_goal(text, planner.cell)
+    except RequestError:
+        if nearest(text, _places(planner)):
+            check_stations([text], planner)
         raise
+
+
+def check_stations(names: Iterable[str], planner: Planner) -> None:
+    """Raise InputError for a name that is neither a station nor a posture, with the one that was meant."""
+    known = _places(planner)
+    for name in names:
+        if name not in known:
+            listing = f"ir cell check {planner.cell.name}"
+            raise InputError(unknown_name("station", name[:80], known, listing))
+
+
+def _places(planner: Planner) -> list[str]:
+    return [*(station.name for station in planner.cell.stations), "home", "park"]
 
 
 def configuration_of(text: str, planner: Planner, margin: float, load: str = "") -> FloatArray:

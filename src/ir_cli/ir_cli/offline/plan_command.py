@@ -10,7 +10,16 @@ from dataclasses import asdict
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import ProgramPlan
 
-from .asking import add_cell, add_options, configuration_of, failed, options_of, planner_of, sentences
+from .asking import (
+    add_cell,
+    add_options,
+    check_stations,
+    configuration_of,
+    failed,
+    options_of,
+    planner_of,
+    sentences,
+)
 from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
 
 J_PER_KWH = 3.6e6
@@ -47,6 +56,7 @@ def run_plan(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
     with sentences(), ProgressLine() as line:
         planner, stations = planner_of(arguments.cell), tuple(arguments.stations)
+        check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         options = options_of(arguments)
         plan = planner.plan_program(
