@@ -45,6 +45,7 @@ PLANNER = Rights(
     subscribe=(names.JOINT_STATES, names.CARRIED_LOAD, names.CONTROLLER_TIMERS),
     reply=(
         *(names.SET_CELL, names.GET_CELL, names.SET_EQUIPMENT, names.CHECK_STATE),
+        names.CHECK_STATES,
         *(names.COMPUTE_IK, names.PLAN_SERVICE_MOVEMENT, names.PLAN_REGIONAL_MOVEMENT),
         *(names.PLAN_TRAJECTORY, names.PLAN_PROGRAM, names.OPTIMIZE_TRAJECTORY),
         *(names.EVALUATE_TRAJECTORY, names.GET_TRAJECTORY, names.GET_PROGRAM, names.PLAN_STANDBY),

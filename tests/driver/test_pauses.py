@@ -132,3 +132,11 @@ def test_the_brake_timer_runs_again_after_a_pause_that_was_ended_on_motors(make)
     simulation.pauses.end()
     simulation.run(0.9)
     assert simulation.modes.mode is Mode.STAND_ON_BRAKES
+
+
+def test_a_pause_begins_where_the_controller_has_gone_by_itself(make):
+    simulation = make()
+    simulation.run(25.0)
+    assert simulation.modes.mode is Mode.STAND_ON_BRAKES
+    assert simulation.pauses.start(60.0, executing=False).mode is Mode.STAND_ON_BRAKES
+    assert simulation.pauses.rest is Mode.STAND_ON_BRAKES

@@ -12,7 +12,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.asked_states import asked_state
+from ir_planner.asked_states import StatesCheck, asked_state, asked_states
 from ir_planner.certificates import in_scene, movement_in, optimization_in, program_in, service_in
 from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory
 from ir_planner.configurations import (
@@ -126,6 +126,10 @@ class Planner:
     ) -> StateCheck:
         """Nearest pairs at q (n,), and whether all keep S_m (or what `station` allows)."""
         return asked_state(self.scene(load), q, margin, max_pairs, station)
+
+    def check_states(self, q: FloatArray, margin: float, load: str, station: str) -> StatesCheck:
+        """The same for many states q (N, n), with the nearest pair of each."""
+        return asked_states(self.scene(load), q, margin, station)
 
     def compute_ik(
         self,

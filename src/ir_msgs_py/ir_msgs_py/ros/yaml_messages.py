@@ -89,6 +89,8 @@ def _value(kind: Any, value: Any, path: str) -> Any:
     if not isinstance(value, str):
         raise MessageTextError(f"{path} is {_short(value)}: it must be a single value")
     if isinstance(kind, (AbstractString, AbstractWString)):
+        if "\0" in value:  # ROS would cut the text there without a word
+            raise MessageTextError(f"{path} is {value[:40]!a}: it must not contain the character NUL")
         return value
     return _scalar(kind, value, path)
 

@@ -24,6 +24,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.savings import ProgramPoint
 from ir_msgs_py.status import Status
+from ir_planner.asked_states import StatesCheck
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.program import ProgramPlan, Standby
@@ -63,6 +64,13 @@ def fill_state_check(response: Any, check: StateCheck) -> None:
     response.valid = check.valid
     response.min_distance = check.min_distance
     response.pairs = [distance_pair_to_msg(pair) for pair in check.pairs]
+
+
+def fill_states_check(response: Any, check: StatesCheck) -> None:
+    """check_states."""
+    response.valid = check.valid.tolist()
+    response.min_distances = float_array(check.distances)
+    response.closest = [distance_pair_to_msg(pair) for pair in check.closest]
 
 
 def fill_ik(response: Any, answer: IkAnswer) -> None:

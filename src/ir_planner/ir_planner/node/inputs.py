@@ -1,6 +1,6 @@
 """What requests say, as values: states, goals, poses, options, trajectories. Nothing here is planned."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
@@ -24,6 +24,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.asked_states import STATES_MAX
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.request import POSITION_MAX, Goal, one_goal
@@ -126,6 +127,23 @@ def state_of(msg: Any, cell: Cell, code: StatusCode, at_rest: str = "") -> Float
     if at_rest and velocity is not None:
         check_at_rest(velocity, names, at_rest, code)
     return q
+
+
+def states_of(messages: Sequence[Any], cell: Cell) -> FloatArray:
+    """Joint values (N, n) rad of at most STATES_MAX states; RequestError names the first bad one."""
+    code = StatusCode.INVALID_ROBOT_STATE
+    if len(messages) > STATES_MAX:
+        raise RequestError(code, f"states has {len(messages)} states: it must be 1 to {STATES_MAX}")
+    states = np.empty((len(messages), cell.robot.n))
+    for k, message in enumerate(messages):
+        try:
+            q = state_of(message, cell, code)
+        except RequestError as error:
+            raise RequestError(code, f"states[{k}]: {error}") from error
+        if q is None:
+            raise RequestError(code, f"states[{k}] is empty: give the joint values")
+        states[k] = q
+    return states
 
 
 def pose_of(msg: Any, cell: Cell) -> FloatArray | None:

@@ -27,6 +27,7 @@ from ir_msgs.action import Plan
 from ir_msgs.msg import ProgramSavings as ProgramSavingsMsg
 from ir_msgs.srv import (
     CheckState,
+    CheckStates,
     ComputeIk,
     EvaluateTrajectory,
     GetCell,
@@ -118,6 +119,7 @@ class PlannerNode(Node):
             (GetCell, names.GET_CELL, ask.get_cell, texts),
             (SetEquipment, names.SET_EQUIPMENT, ask.set_equipment, changes),
             (CheckState, names.CHECK_STATE, ask.check_state, quick),
+            (CheckStates, names.CHECK_STATES, ask.check_states, quick),
             (ComputeIk, names.COMPUTE_IK, ask.compute_ik, quick),
             (GetTrajectory, names.GET_TRAJECTORY, ask.get_trajectory, texts),
             (GetProgram, names.GET_PROGRAM, ask.get_program, texts),

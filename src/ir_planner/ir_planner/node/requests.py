@@ -28,6 +28,7 @@ from ir_planner.node.answers import (
     fill_service,
     fill_standby,
     fill_state_check,
+    fill_states_check,
     fill_stored_program,
     stations_to_msg,
 )
@@ -38,6 +39,7 @@ from ir_planner.node.inputs import (
     pose_of,
     reference_of,
     state_of,
+    states_of,
     trajectory_of,
 )
 from ir_planner.planner import Planner
@@ -132,6 +134,14 @@ class Requests:
         )
         fill_state_check(response, check)
         return check.status
+
+    def check_states(self, request: Any, response: Any) -> Status:
+        """Are these states free."""
+        q = states_of(request.states, self.planner.cell)
+        check = self.planner.check_states(q, request.safety_distance, request.load, request.station)
+        fill_states_check(response, check)
+        blocked = int((~check.valid).sum())
+        return Status.success(f"{blocked} of {len(q)} states are not free" if blocked else "")
 
     def compute_ik(self, request: Any, response: Any) -> Status:
         """Configurations that reach a pose."""

@@ -21,6 +21,7 @@ _POSE_KEYS = ("X", "Y", "Z", "A", "B", "C")
 _WORDS = re.compile(r"[A-Za-z]+\d*|\S+")
 _TEXT_MAX = 300
 _LENGTH_MAX = 100.0  # m
+_NO_ANGLE = 1e6  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +112,15 @@ def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> Flo
         if not low - 1e-9 <= value <= high + 1e-9:
             raise RequestError(
                 code,
-                f"{what}: {robot.joint_names[i]} is {math.degrees(value):g} deg: it must be in "
+                f"{what}: {robot.joint_names[i]} is {_angle(float(value))}: it must be in "
                 f"[{math.degrees(low):g}, {math.degrees(high):g}] deg",
             )
     return np.clip(q, robot.position_min, robot.position_max)
+
+
+def _angle(value: float) -> str:
+    """An angle [rad] in degrees, or as it came where that is no angle any more."""
+    return f"{math.degrees(value):g} deg" if abs(value) < _NO_ANGLE else f"{value:g} rad"
 
 
 def _numbers(keys: list[str], values: list[str], expected: list[str], unit: str) -> list[float]:

@@ -77,7 +77,8 @@ class Pauses:
         source = self._modes.target if self._route else self._modes.level
         table = self._entered_from(source)
         route = best_route(table, pause, source, self._power(source))
-        self._route = tuple(mode.mode for mode in route) or self._route
+        stays = () if source is Mode.STAND_ON_MOTORS else (source,)
+        self._route = tuple(mode.mode for mode in route) or self._route or stays
         deepest = self._route[-1] if self._route else Mode.STAND_ON_MOTORS
         return next(mode for mode in table if mode.mode is deepest)
 
