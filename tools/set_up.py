@@ -189,7 +189,7 @@ def stages(python_version: str) -> list[Stage]:  # long: a table of four rows
     constraints = ROOT / "requirements" / "constraints.txt"
     wheels = fingerprint([constraints, *REQUIREMENTS], python_version)
     slow = f"; on {python_version} PyBullet is built from source, 3 minutes more"
-    slowly = "" if python_version == "3.11" else slow
+    slowly = "" if python_version == "3.11" or "pybullet" not in wanted() else slow
     pip = (str(PYTHON), *PIP)
     local = (*pip, "install", "--no-deps", "--no-build-isolation", "--use-pep517")
     editable = tuple(word for package in packages() for word in ("--editable", str(package)))
@@ -207,7 +207,7 @@ def stages(python_version: str) -> list[Stage]:  # long: a table of four rows
         ),
         Stage(
             "interfaces",
-            "messages, services and actions (about 80 s on two cores)",
+            "messages, services and actions for Python (about 40 s on two cores)",
             fingerprint(interface_files(), python_version, *built_with),
             lambda: [] if (site / "ir_msgs").is_dir() else ["ir_msgs"],
             ((*local, "--force-reinstall", str(INTERFACES)),),
