@@ -30,9 +30,10 @@ test: setup       ## every test that takes seconds to a few minutes
 	@$(PYTEST) --ignore tests/system -m 'not long' $(ARGS) || [ $$? -eq 5 ]
 	@$(SYSTEM_TESTS) -m 'not long' $(ARGS) || [ $$? -eq 5 ]
 
-test-long: setup  ## every test, also those that run for minutes
+test-long: setup  ## every test, also those that run for minutes; then with the oldest versions
 	@$(PYTEST) --ignore tests/system $(ARGS) || [ $$? -eq 5 ]
 	@$(SYSTEM_TESTS) $(ARGS) || [ $$? -eq 5 ]
+	@[ -n '$(ARGS)' ] || $(BIN)/python tools/oldest_versions.py
 
 check: setup      ## ruff and mypy --strict
 	@$(BIN)/ruff check .

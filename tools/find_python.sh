@@ -30,7 +30,10 @@ fi
 
 seen=""
 for name in ${PYTHON:-$(printf 'python%s ' $supported) python3}; do
-  candidates=$(IFS=:; for folder in $PATH; do [ -x "$folder/$name" ] && echo "$folder/$name"; done)
+  # Where a version manager leaves shims, the interpreters themselves lie beside them.
+  candidates=$(IFS=:; for folder in $PATH; do
+    for path in "$folder/$name" "${folder%/shims}"/versions/*/bin/"$name"; do [ -x "$path" ] && echo "$path"; done
+  done)
   case $name in */*) candidates=$name ;; esac
   for candidate in $candidates; do
     if reason=$("$candidate" -c "$complete" $supported 2>&1); then

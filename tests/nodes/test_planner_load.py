@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import CheckState, SetCell
-from ir_msgs_py.ros.quality import SERVICE
+from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
 from ir_planner.node import node as planner_module
 from ir_planner.node.node import PlannerNode
 
@@ -28,7 +28,7 @@ def send(
     planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> Callable[[int], list[Any]]:
     """Send goals of the plan action; their accepted handles."""
-    client = ros_executor.run(lambda: ActionClient(ros_node, Plan, "/ir_planner/plan"))
+    client = ros_executor.run(lambda: ActionClient(ros_node, Plan, "/ir_planner/plan", **ACTION_SERVICES))
     wait_for(client.server_is_ready, what="plan is offered")
 
     def goals(count: int) -> list[Any]:

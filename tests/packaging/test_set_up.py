@@ -58,6 +58,12 @@ def test_a_shim_that_fails_is_passed_over(tmp_path: Path) -> None:
     assert found.stdout.strip() == str(good), found.stderr
 
 
+def test_the_interpreter_beside_a_shim_that_fails_is_found(tmp_path: Path) -> None:
+    executable(tmp_path / "shims" / "python3.12", SHIM)
+    good = complete_python(tmp_path / "versions" / "3.12.1" / "bin", "python3.12")
+    assert find_python(tmp_path, f"{tmp_path}/shims").stdout.strip() == str(good)
+
+
 def test_python_3_11_comes_first(tmp_path: Path) -> None:
     for name in ("python3.13", "python3.12", "python3.11"):
         complete_python(tmp_path / "bin", name)
