@@ -131,7 +131,7 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
         at_most("deviations judged wrongly", total("deviations", "wrong"), "", 0),
         at_most("requests and presses of the node lost", total("node", "lost"), "", 0),
         at_most("memory that driving takes", grown("driving", "rss_mb"), "MB", 5.0),
-        at_most("memory that the node gains, at most", grown("node", "rss_mb"), "MB", 30.0),
+        at_most("memory that the node gains, at most", grown("node", "rss_mb"), "MB", 60.0),
         at_most("descriptors that the node gains, at most", grown("node", "descriptors"), "", 2),
         at_most("threads that the node gains, at most", grown("node", "threads"), "", 1),
         at_most("log that the node writes, at most", grown("node", "log_kb"), "kB", 1_000.0),

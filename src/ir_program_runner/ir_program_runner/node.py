@@ -108,7 +108,6 @@ class ProgramRunnerNode(Node):
             response_timeout=links.response_timeout,
             silence_timeout=links.silence_timeout,
             cancel_timeout=links.cancel_timeout,
-            on_meter=self._waiting.look,
         )
 
     def destroy_node(self) -> None:

@@ -13,7 +13,6 @@ from typing import Any
 
 from rclpy.action import ActionClient
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 
 from ir_msgs.action import ExecuteTrajectory
@@ -32,6 +31,7 @@ from ir_msgs_py.ros.conversions import (
     status_from_msg,
     trajectory_to_msg,
 )
+from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
@@ -42,7 +42,8 @@ class Driver:
     """Clients of one driver; times in s.
 
     response_timeout: for services, and to take a goal. silence_timeout: without a reading of the meter the
-    driver counts as gone. cancel_timeout: to stop along the path. on_meter: called after each reading.
+    driver counts as gone. cancel_timeout: to stop along the path. The meter is read when something is asked
+    of it: a node that waits for nothing is not woken a hundred times a second.
     timers: those of the controller, None before they came.
     """
 
@@ -55,29 +56,39 @@ class Driver:
         response_timeout: float = 2.0,
         silence_timeout: float = 2.0,
         cancel_timeout: float = 5.0,
-        on_meter: Callable[[], None] = lambda: None,
     ) -> None:
         self.name = name
-        self.mode: Mode | None = None
+        self._mode: Mode | None = None
         self.timers: ControllerTimers | None = None
-        self.energy = 0.0
+        self._energy = 0.0
         self._waiting = waiting
         self._response_timeout = response_timeout
         self._silence_timeout = silence_timeout
         self._cancel_timeout = cancel_timeout
-        self._on_meter = on_meter
         self._heard = -float("inf")
         self._plc = node.create_client(SetPlcInputSrv, f"{name}/set_plc_input", qos_profile=SERVICE)
         self._load = node.create_client(SetLoadSrv, f"{name}/set_load", qos_profile=SERVICE)
         self._modes = node.create_client(QueryModes, f"{name}/query_modes", qos_profile=SERVICE)
         self._execute = ActionClient(node, ExecuteTrajectory, f"{name}/execute_trajectory", **ACTION_SERVICES)
-        heard_from_all = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-        node.create_subscription(PowerStateMsg, f"{name}/power_state", self._read_meter, heard_from_all)
+        self._meter = LatestMessage(node, PowerStateMsg, f"{name}/power_state")
         node.create_subscription(ControllerTimersMsg, f"{name}/controller_timers", self._read_timers, LATCHED)
+
+    @property
+    def mode(self) -> Mode | None:
+        """Power mode of the last reading; None before the first."""
+        self._read_meter()
+        return self._mode
+
+    @property
+    def energy(self) -> float:
+        """Energy [J] of the last reading."""
+        self._read_meter()
+        return self._energy
 
     @property
     def silent(self) -> bool:
         """Whether the meter has not been heard for too long."""
+        self._read_meter()
         return time.monotonic() - self._heard > self._silence_timeout
 
     @property
@@ -159,12 +170,15 @@ class Driver:
         with contextlib.suppress(InvalidValueError):  # of a driver of another kind: the settings' count
             self.timers = controller_timers_from_msg(message)
 
-    def _read_meter(self, reading: PowerStateMsg) -> None:
-        self._heard = time.monotonic()
-        self.energy = float(reading.energy)
-        if reading.mode != self.mode:
-            self.mode = Mode(reading.mode)
-        self._on_meter()
+    def _read_meter(self) -> None:
+        """Take what has come since the last look."""
+        reading = self._meter.take()
+        if reading is None:
+            return
+        self._heard = time.monotonic() - reading.age
+        self._energy = float(reading.message.energy)
+        if reading.message.mode != self._mode:
+            self._mode = Mode(reading.message.mode)
 
 
 def _cancel_late(sent: Future) -> None:
