@@ -10,7 +10,6 @@ from ir_kernels.errors import InputError
 from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_msgs_py.arrays import FloatArray
 
-
 NOT_NEGATIVE = (
     "energy_value",
     "time_value",

@@ -71,10 +71,8 @@ def line_search(
             low, kept = step, (there, at_step, by_step)
             if -float(by_step @ d) >= FLATTER * slope:
                 break
-        if np.isinf(high):
-            step = 2.0 * low
-        else:
-            step = shorten * high if kept is None else 0.5 * (low + high)
+        shorter = shorten * high if kept is None else 0.5 * (low + high)
+        step = 2.0 * low if np.isinf(high) else shorter
     return kept, used
 
 

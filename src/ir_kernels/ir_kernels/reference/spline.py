@@ -87,8 +87,8 @@ def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
 
 
 def bus(power: FloatArray, step: float, terms: SplineTerms) -> tuple[float, FloatArray, float]:
-    """Joules at the mains for axis powers (N, n) held for `step` each, what a joule more adds (N, n), and what
-    the smoothing adds per second of `step`.
+    """Joules at the mains for axis powers (N, n) held for `step` each, what a joule more adds (N, n), and
+    what the smoothing adds per second of `step`.
     """
     if terms.regeneration == "none":
         value, slope, _ = above(power, terms.smoothing)
@@ -111,7 +111,7 @@ def bus(power: FloatArray, step: float, terms: SplineTerms) -> tuple[float, Floa
 
 
 def above(x: FloatArray, smoothing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """max(x, 0), a hyperbola that is `smoothing` above it at 0; its slope, and derivative by the smoothing."""
+    """max(x, 0), a hyperbola that is `smoothing` above it at 0; its slope, derivative by the smoothing."""
     if smoothing == 0.0:
         return np.maximum(x, 0.0), (x > 0.0).astype(float), np.zeros_like(x)
     root = np.sqrt(x * x + 4.0 * smoothing * smoothing)
