@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, Writer
 
 from ir_recorder.errors import ReadError
 from ir_recorder.format.definition import MOST_DEPTH, definitions_of
-from ir_recorder.read.chunks import ChunkReader, ReadLimits
+from ir_recorder.read.chunks import MOST_RECORDS, ChunkReader, ReadLimits
 from ir_recorder.read.raw import read_raw
 from ir_recorder.read.reader import read_recording
 
@@ -98,3 +98,10 @@ def test_a_definition_without_an_end_is_a_sentence(schema: str, sentence: str, t
             writer.add_message(channel, 1, b"\0\1\0\0" + bytes(64), 1)
             writer.finish()
         assert any(topic in problem and sentence in problem for problem in read_recording(path).problems)
+
+
+def test_a_chunk_of_very_many_records_is_not_opened() -> None:
+    """Sixty megabytes of zeros compress to a few kilobytes, and are millions of empty records."""
+    data = bytes(9 * (MOST_RECORDS + 1))
+    with pytest.raises(ReadError, match="more than 500,000 records"):
+        ChunkReader(ReadLimits()).records(Chunk("", data, 0, 0, 0, len(data)))

@@ -13,6 +13,7 @@ import pytest
 from ir_recorder import PathError, RecorderError, analyse, findings, read_recording
 from ir_recorder.report import report_html, write_report
 from ir_recorder.report.picture import write_picture
+from ir_recorder.report.words import text
 
 
 class _Links(HTMLParser):
@@ -104,3 +105,8 @@ def test_the_page_fits_a_telephone_and_a_sheet_of_paper(page: str) -> None:
     assert 'name="viewport" content="width=device-width' in page
     stage = page.split('<div class="stage">', 1)[1].split("</div>", 1)[0]
     assert "button" not in stage  # controls stand below the picture, not over it
+
+
+def test_texts_of_a_recording_neither_mark_up_nor_steer() -> None:
+    assert text("<b>\x1b[31m\u202ered\x00") == "&lt;b&gt;\ufffd[31m\ufffdred\ufffd"
+    assert text("a\tb\nc \u00e9 \u00b0") == "a\tb\nc \u00e9 \u00b0"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from ir_recorder.listen.topics import TopicSelection, single_type
+import pytest
+
+from ir_recorder.errors import TopicsError
+from ir_recorder.listen.topics import TopicSelection, checked_topics, single_type
 
 
 def test_the_cells_topics_are_chosen_and_strangers_are_not() -> None:
@@ -25,3 +28,20 @@ def test_a_namespace_moves_the_selection() -> None:
 def test_topics_of_several_types_are_passed_over() -> None:
     assert single_type("/a", ["std_msgs/msg/String"]) == "std_msgs/msg/String"
     assert single_type("/a", ["std_msgs/msg/String", "std_msgs/msg/Bool"]) is None
+
+
+@pytest.mark.parametrize(
+    ("topics", "sentence"),
+    [
+        (["/t"] * 1001, "1001 names or patterns of topics: at most 1000"),
+        (["/" + "t" * 255], "at most 255 characters"),
+        (["/a\x1b[31m"], "without control characters"),
+    ],
+)
+def test_topics_that_cannot_be_ones_are_refused(topics: list[str], sentence: str) -> None:
+    with pytest.raises(TopicsError, match=sentence):
+        checked_topics(topics)
+
+
+def test_empty_names_of_topics_count_as_nothing() -> None:
+    assert checked_topics(["", "/a", ""]) == ("/a",)

@@ -132,6 +132,8 @@ def test_a_fifo_is_refused_at_once(tmp_path: Path) -> None:
         ("a\0b.mcap", "control characters"),
         ("x" * 10_000 + ".mcap", "10005 bytes, at most 200"),
         ("notes.txt", "must end in .mcap"),
+        ("d/" * 3000 + "x.mcap", "more than 4000 bytes"),
+        ("~nobody_of_this_name/x.mcap", "home directory"),
         ("/proc/recording.mcap", "can't be written"),
     ],
 )

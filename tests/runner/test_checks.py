@@ -9,7 +9,7 @@ from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_program_runner.checks import check_program, load_after
+from ir_program_runner.checks import check_program, check_request, load_after
 from ir_program_runner.errors import ProgramError
 
 
@@ -63,3 +63,22 @@ def test_the_load_after_a_step(load, attach, detach, after):
 def test_what_is_attached_cannot_be_attached_again():
     with pytest.raises(InvalidValueError, match="part is attached, but it is already"):
         load_after(move(load="gripper+part", attach="part"))
+
+
+@pytest.mark.parametrize(
+    ("program_id", "steps", "sentence"),
+    [
+        ("", 0, "either program_id or movements"),
+        ("a", 1, "either program_id or movements"),
+        ("x" * 257, 0, "257 characters: at most 256"),
+        ("", 1001, "1001 movements: at most 1000"),
+    ],
+)
+def test_a_request_beyond_its_bounds_is_refused_before_it_is_read(program_id, steps, sentence):
+    with pytest.raises(ProgramError, match=sentence):
+        check_request(program_id, steps)
+
+
+def test_a_pause_lasts_a_week_at_most():
+    with pytest.raises(ProgramError, match=r"takes 1e\+308 s: at most 604800 s"):
+        check_program([PlannedMovement(kind="pause", duration=1e308, power_mode="HIBERNATION")])

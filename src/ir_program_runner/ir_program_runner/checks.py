@@ -10,9 +10,26 @@ from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.status import StatusCode
 from ir_program_runner.errors import ProgramError
 
+MOST_STEPS = 1000  # of a request; a program of a cell has tens
+LONGEST_ID = 256  # characters
+LONGEST_PAUSE = 604_800.0  # s: a week, as for the driver's pauses
 JOINT_TOLERANCE = 0.01  # rad, as the driver's for the first point of a trajectory
+
+
+def check_request(program_id: str, steps: int) -> None:
+    """Raise ProgramError: not exactly one of both is given, or more than a program can have."""
+    sentence = ""
+    if bool(program_id) == bool(steps):
+        sentence = "give either program_id or movements"
+    elif len(program_id) > LONGEST_ID:
+        sentence = f"program_id has {len(program_id)} characters: at most {LONGEST_ID} are taken"
+    elif steps > MOST_STEPS:
+        sentence = f"the program has {steps} movements: at most {MOST_STEPS} are taken"
+    if sentence:
+        raise ProgramError(sentence, StatusCode.INVALID_GOAL_CONSTRAINTS)
 
 
 def check_program(movements: Sequence[PlannedMovement]) -> None:
@@ -28,6 +45,10 @@ def check_program(movements: Sequence[PlannedMovement]) -> None:
         except InvalidValueError as error:
             raise ProgramError(f"{where}: {error}") from error
         del signals
+        if movement.duration > LONGEST_PAUSE:
+            raise ProgramError(
+                f"{where} takes {movement.duration:g} s: at most {LONGEST_PAUSE:g} s are allowed"
+            )
         if movement.is_pause:
             continue
         if movement.trajectory is None:

@@ -37,7 +37,7 @@ from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
-from ir_program_runner.checks import check_program
+from ir_program_runner.checks import check_program, check_request
 from ir_program_runner.diagnose.node import RunnerDiagnostics
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
@@ -152,10 +152,8 @@ class ProgramRunnerNode(Node):
 
     async def _fetch(self, request: RunProgram.Goal) -> tuple[Status, tuple[PlannedMovement, ...]]:
         """Get the steps with all points, and check them as a whole."""
-        if bool(request.program_id) == bool(request.movements):
-            sentence = "give either program_id or movements"
-            return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence), ()
         try:
+            check_request(request.program_id, len(request.movements))
             given = [planned_movement_from_msg(movement) for movement in request.movements]
             fetch = (
                 self._planner.program(request.program_id)

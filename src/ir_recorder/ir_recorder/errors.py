@@ -6,6 +6,7 @@
     ├── PathError        the file asked for can't be written there, or is taken
     ├── WriteError       the disk refused while recording: full, read-only, gone
     ├── SchemaError      no definition of a message type is installed
+    ├── TopicsError      names of topics that are none, or too many
     ├── NothingRecordedError   a recording was asked to end, and none is in progress
     └── ReadError        not a recording at all, or nothing in it that could be read
 """
@@ -25,6 +26,10 @@ class WriteError(RecorderError):
 
 class SchemaError(RecorderError):
     """A message type whose definition isn't installed."""
+
+
+class TopicsError(RecorderError):
+    """A request names topics that can't be ones."""
 
 
 class NothingRecordedError(RecorderError):

@@ -14,6 +14,7 @@ from typing import Any
 from rclpy.node import Node
 
 from ir_msgs_py import names
+from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.command_line import CommandLineError, own_words
@@ -25,7 +26,7 @@ from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.gather.node import CellRequest, ParameterRequests
 from ir_recorder.listen.node import Listener, is_own
-from ir_recorder.listen.topics import TopicSelection, single_type
+from ir_recorder.listen.topics import TopicSelection, checked_topics, single_type
 from ir_recorder.parameters import declared_settings
 from ir_recorder.serve.node import Services, without_publisher
 from ir_recorder.settings import RecorderSettings
@@ -109,13 +110,12 @@ class RecorderNode(Node):
         """
         if self._session is not None:
             raise PathError(f"already recording into {self._session.path}; stop first")
+        wanted = checked_topics(topics) or self._settings.wanted_topics
         name = cell or self._settings.cell
         files = files_of_cell(name) if name else None
         writer = self._open_writer(path, overwrite, roots or self._settings.file_roots)
         self._session = RecordingSession(writer, self._settings.named_facts, self._now())
-        self._selection = TopicSelection(
-            tuple(t for t in topics if t) or self._settings.wanted_topics, self.get_namespace()
-        )
+        self._selection = TopicSelection(wanted, self.get_namespace())
         self._passed_over.clear()
         self._listener.lost, self._failure = 0, ""
         if files is not None:
@@ -125,7 +125,8 @@ class RecorderNode(Node):
         self._discover()
         if self._failure:
             raise WriteError(self._failure)
-        self.get_logger().info(f"recording into {writer.path}{without_publisher(self.unmet, 'is seen yet')}")
+        missing = without_publisher(self.unmet, "is seen yet")
+        self.get_logger().info(one_line(f"recording into {writer.path}{missing}"))
         return str(writer.path)
 
     def finish(self) -> RecordingSummary | None:
@@ -226,7 +227,7 @@ class RecorderNode(Node):
 
     def _pass_over(self, topic: str, reason: str) -> None:
         self._passed_over.add(topic)
-        self.get_logger().warning(f"{topic} isn't recorded: {reason}")
+        self.get_logger().warning(one_line(f"{topic} isn't recorded: {reason}"))
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)

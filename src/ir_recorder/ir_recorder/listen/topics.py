@@ -13,11 +13,27 @@ from fnmatch import fnmatchcase
 
 from ir_msgs_py import names
 from ir_msgs_py.namespaces import NODES
+from ir_recorder.errors import TopicsError
 
 SHARED = (names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC)  # in the cell's namespace
 GLOBAL = (names.DIAGNOSTICS, names.ROSOUT, names.PARAMETER_EVENTS)
+MOST_TOPICS = 1000
+LONGEST_TOPIC = 255  # characters, as DDS has it
 ACTION_STATUS = "/_action/status"
 _FEEDBACK = "_FeedbackMessage"
+
+
+def checked_topics(topics: Iterable[str]) -> tuple[str, ...]:
+    """Names and patterns of a request without the empty ones; TopicsError where they are no names."""
+    wanted = tuple(topic for topic in topics if topic)
+    if len(wanted) > MOST_TOPICS:
+        raise TopicsError(f"{len(wanted)} names or patterns of topics: at most {MOST_TOPICS} are taken")
+    for topic in wanted:
+        if len(topic) > LONGEST_TOPIC or not topic.isprintable():
+            raise TopicsError(
+                f"topic {topic[:60]!a}: at most {LONGEST_TOPIC} characters, without control characters"
+            )
+    return wanted
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from mcap.stream_reader import breakup_chunk
 from ir_recorder.errors import ReadError
 
 _STEP = 1 << 20  # bytes that are decompressed at a time
+_HEAD = 9  # bytes of a record's kind and length
+MOST_RECORDS = 500_000  # in one chunk; one of 4 MB of the smallest messages has 100,000
 _OVERHEAD = 120  # bytes of memory that a message takes beside its own
 
 
@@ -43,6 +45,7 @@ class ChunkReader:
             raise ReadError(f"it claims {claimed} uncompressed, at most {most} are read")
         data = _decompressed(chunk)
         self.count(len(data))
+        _check_number(data)
         records = breakup_chunk(replace(chunk, compression="", data=data), validate_crc=True)
         self.count(_OVERHEAD * len(records))
         return records
@@ -56,6 +59,16 @@ class ChunkReader:
 
 class TooLargeError(ReadError):
     """The recording as a whole exceeds its bound; what was read so far stays."""
+
+
+def _check_number(data: bytes) -> None:
+    """ReadError for a chunk of so many records that making them takes minutes and gigabytes."""
+    at = 0
+    for _ in range(MOST_RECORDS):
+        if at + _HEAD > len(data):
+            return
+        at += _HEAD + int.from_bytes(data[at + 1 : at + _HEAD], "little")
+    raise ReadError(f"it has more than {MOST_RECORDS:,} records")
 
 
 def _decompressed(chunk: Chunk) -> bytes:

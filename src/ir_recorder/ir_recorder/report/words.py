@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from html import escape
+from unicodedata import category
 
 DASH = "–"
+_UNSEEN = ("Cc", "Cf", "Cs")  # categories of Unicode: control, format, surrogate
 
 
 def joules(value: float) -> str:
@@ -75,5 +77,6 @@ def mode_words(name: str) -> str:
 
 
 def text(value: object) -> str:
-    """Anything as HTML text."""
-    return escape(str(value), quote=True)
+    """Anything as HTML text; characters that steer a terminal or the direction of writing are replaced."""
+    seen = "".join("\ufffd" if category(c) in _UNSEEN and c not in "\n\t" else c for c in str(value))
+    return escape(seen, quote=True)

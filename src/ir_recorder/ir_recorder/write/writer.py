@@ -24,6 +24,7 @@ from ir_recorder.format.schemas import SchemaLibrary
 
 CHUNK_SIZE = 256 * 1024  # bytes: about 1.5 s of a cell; what a power cut may cost
 REORDERED = 1_000_000_000  # ns: topics are polled every 20 ms; more is a clock that was set back
+_PATH_MAX = 4000  # bytes; systems end at 4096
 _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 
 
@@ -169,14 +170,19 @@ class _Storage:
 def checked_path(path: str | Path) -> Path:
     """An absolute path that may become a recording; PathError names what is wrong with it."""
     text = str(path)
-    if not text or any(ord(character) < 32 for character in text):
+    if not text.isprintable() or not text:
         raise PathError(f"path {text[:80]!r}: empty, or with control characters")
     name = Path(text).name
     if len(name.encode()) > _NAME_MAX:
         raise PathError(f"the file's name has {len(name.encode())} bytes, at most {_NAME_MAX} are taken")
     if Path(text).suffix != ".mcap":
         raise PathError(f"path {text[:200]!r} must end in .mcap")
-    return Path(text).expanduser().absolute()
+    if len(text.encode(errors="replace")) > _PATH_MAX:
+        raise PathError(f"the path has more than {_PATH_MAX} bytes")
+    try:
+        return Path(text).expanduser().absolute()
+    except RuntimeError as error:  # a user without a home
+        raise PathError(f"path {text[:80]!r}: {error}") from error
 
 
 def _open(path: Path, overwrite: bool, roots: FileRoots) -> BinaryIO:
