@@ -144,7 +144,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=4, help="default: 4")
-    add_ending(parser, "1 seed, 300 goals, 84 presses, 60 loads, 300 requests, 10 minutes of driving")
+    add_ending(parser, "1 seed, 300 goals, 84 presses, 60 loads, 300 requests, 5 minutes of driving")
     given = parser.parse_args()
     counts = (300, 84, 60, 300, 70) if given.quick else (4_000, 1_000, 500, 5_000, 500)
     makers = (goal_row, stop_row, load_row, fuzz_row, deviation_row)
@@ -154,7 +154,7 @@ def main() -> None:
         rows.append(row)
         print(line_of(row), flush=True)
 
-    show(driving_row(HOUR / 6.0 if given.quick else HOUR))
+    show(driving_row(HOUR / 12.0 if given.quick else HOUR))
     for seed in range(FIRST_SEED, FIRST_SEED + (1 if given.quick else given.seeds)):
         for make, count in zip(makers, counts, strict=True):
             show(make(count, seed))

@@ -20,6 +20,7 @@ from ir_msgs_py.ros.running import FAILURES_MAX, Spinning, spin
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver import Driver, make_simulation
 from ir_sim_driver.node.services import Services
+from ir_sim_driver.notices import Level, Notice, Notices, shortened
 
 NO_DESCRIPTORS = OSError(errno.EMFILE, "Too many open files")
 FULL = OSError(errno.ENOSPC, "No space left on device")
@@ -161,3 +162,16 @@ def test_a_node_that_does_nothing_but_fail_ends(ros_context: Any) -> None:
     assert len(calls) == FAILURES_MAX + 1
     executor.shutdown()
     other.destroy_node()
+
+
+def test_what_is_logged_is_bounded_and_errors_stay() -> None:
+    notices = Notices()
+    for k in range(100):
+        notices.add(Level.OK, f"line {k}\x1b[2J" + "x" * 10_000)
+    notices.add(Level.ERROR, "the plant has stopped")
+    lines = shortened(notices.take(), 20)
+    assert len(lines) == 20
+    assert lines[-2] == Notice(Level.ERROR, "the plant has stopped")
+    assert lines[-1].sentence == "and 82 more messages"
+    assert all(line.sentence.isprintable() and len(line.sentence) < 5_000 for line in lines)
+    assert shortened(lines, 20) == lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -44,3 +45,12 @@ class Notices:
         pending = list(self._pending)
         self._pending.clear()
         return pending
+
+
+def shortened(notices: Sequence[Notice], most: int) -> list[Notice]:
+    """At most so many of them in their order, errors first to stay, and how many were left out."""
+    if len(notices) <= most:
+        return list(notices)
+    by_weight = sorted(range(len(notices)), key=lambda k: (notices[k].level is not Level.ERROR, k))
+    kept = [notices[k] for k in sorted(by_weight[: most - 1])]
+    return [*kept, Notice(Level.WARN, f"and {len(notices) - len(kept)} more messages")]

@@ -39,7 +39,7 @@ from ir_sim_driver.node.services import Services
 from ir_sim_driver.node.streams import Streams
 from ir_sim_driver.node.trajectory_topic import TrajectoryTopic
 from ir_sim_driver.node.transforms import open_transforms
-from ir_sim_driver.notices import Level, Notice
+from ir_sim_driver.notices import Level, Notice, shortened
 
 try:  # where a ROS installation has it
     from control_msgs.action import FollowJointTrajectory
@@ -48,6 +48,7 @@ except ImportError:
 
 _NS = 1_000_000_000
 _MARKERS_PERIOD, _DIAGNOSTICS_PERIOD, _TRANSFORMS_PERIOD = 0.05, 1.0, 0.02  # s
+_LINES_MAX = 20  # of the log per second: who toggles a bit all day must not fill a disk
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
 REFUSALS = (DriverError, DescriptionError, MsgsError)
@@ -217,7 +218,7 @@ class SimDriver(Node):
 
     def _publish_diagnostics(self) -> None:
         snapshot = self._driver.snapshot(self._plant.worst_lag, self._plant.lag)
-        for notice in snapshot.notices:
+        for notice in shortened(snapshot.notices, _LINES_MAX):
             self._log(notice)
         self._diagnostics.publish(condition_of(entry) for entry in snapshot.entries)
 
