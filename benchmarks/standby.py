@@ -1,0 +1,147 @@
+"""Is a pause planned as cheaply as it can be, and does the controller draw what was predicted?
+
+    python benchmarks/standby.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
+
+Pauses of 1 s to 2 h at random postures, with and without part, the controller's times as in the data and
+drawn. Known lengths and timeout policies over eight equally likely lengths are held against exhaustive search
+over sequences of modes with timers on a grid, in code of its own, and against the simulated controller, which
+is stepped without real time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from _results import at_most, command_line, finish, line_of
+from _standby_search import Controller
+
+from ir_description import load_cell, load_power_data
+from ir_msgs_py.modes import Mode
+from ir_msgs_py.names import NO_LOAD
+from ir_msgs_py.transitions import TransitionTimes
+from ir_planner.program import lengths_of
+from ir_planner.program.rests import Rests, rests_at
+from ir_planner.program.standby import advice
+from ir_planner.scene import load_text, scene_with
+from ir_sim_driver.controller import SimulationSettings, make_simulation
+from ir_sim_driver.power import IdleTimes
+
+CELL, SEEDS, QUICK_SEEDS = "demo", 60, 12
+LENGTHS = 8
+JOULES = 20.0  # that a prediction may be off whatever the pause
+STEP = 0.01  # s: nothing moves, and no time of the controller is shorter
+
+
+@dataclass(frozen=True)
+class Row:
+    """One controller: pause [s], planned, least on the grid and measured energy [J]; the same of a policy."""
+
+    cell: str
+    seed: int
+    pause: float
+    planned: float
+    searched: float
+    measured: float
+    policy: float
+    policy_searched: float
+    clairvoyant: float
+    worst: float
+
+
+def times_of(rng: np.random.Generator, drawn: bool) -> tuple[TransitionTimes, float]:
+    """Transition times and the controller's own timer [s]: of the data, or drawn."""
+    times = TransitionTimes()
+    if not drawn:
+        return times, load_power_data().motors_to_brakes_in_program
+    values = {name: float(round(rng.uniform(0.05, 40.0), 2)) for name in vars(times)}
+    return TransitionTimes(**values), float(round(rng.uniform(1.0, 40.0), 2))
+
+
+def controller_of(rests: Rests) -> Controller:
+    """The figures alone."""
+    modes = rests.modes
+    return Controller(
+        (rests.motors, *(mode.watts for mode in modes)),
+        tuple(mode.enter for mode in modes),
+        tuple(mode.stay for mode in modes),
+        tuple(mode.leave for mode in modes),
+        rests.timer,
+    )
+
+
+def measured(rests_cell: str, load: str, q: np.ndarray, times: TransitionTimes, timer: float, pause: float,
+             wake_at: float) -> float:  # fmt: skip
+    """Energy [J] that the simulated controller draws over a pause [s] that it is woken from in time."""
+    idle = IdleTimes(motors_to_brakes_in_program=timer)
+    settings = SimulationSettings(dt=STEP, transitions=times, idle=idle)
+    plant = make_simulation(load_cell(rests_cell), load, "ideal", settings)
+    plant.backend.reset(q)
+    plant.executor.hold(q)
+    begun = plant.mains.energy()
+    plant.pauses.start(pause, executing=False)
+    plant.run(wake_at)
+    plant.wake() if plant.modes.mode is Mode.HIBERNATION else plant.pauses.end()
+    while not plant.modes.motors_on or plant.time < pause:
+        plant.step()
+    return plant.mains.energy() - begun
+
+
+def row_of(name: str, seed: int) -> Row:
+    """Plan, search and drive the pauses of a seed."""
+    rng, cell = np.random.default_rng([seed, *name.encode()]), load_cell(name)
+    robot = cell.robot
+    q = robot.position_min + rng.uniform(0.2, 0.8, robot.n) * (robot.position_max - robot.position_min)
+    times, timer = times_of(rng, drawn=seed % 2 == 1)
+    tool = load_text(cell)
+    load = (NO_LOAD, tool, f"{tool}+{cell.parts[0].name}" if cell.parts else tool)[seed % 3]
+    scene = scene_with(cell, load, replace(load_power_data(), motors_to_brakes_in_program=timer))
+    searched = controller_of(rests_at(q, scene, times))
+    pause = float(round(10.0 ** rng.uniform(0.0, 3.857), 2))
+    known = advice(lengths_of(pause), q, scene, times)
+    lengths = np.round(10.0 ** rng.uniform(0.0, 3.857, LENGTHS), 2)
+    policy = advice(lengths_of(0.0, lengths), q, scene, times)
+    grid = np.linspace(0.0, min(pause, 300.0), 6).tolist()
+    return Row(
+        name,
+        seed,
+        pause,
+        known.energy,
+        min(searched.least_known(pause, grid), searched.run((), pause, pause)[0]),
+        measured(name, load, q, times, timer, pause, known.wake_at),
+        policy.expected,
+        searched.least_expected(lengths.tolist(), sorted({0.0, *lengths.tolist()})),
+        policy.clairvoyant,
+        policy.worst,
+    )
+
+
+def off(row: Row) -> float:
+    """How far the measured energy is from the planned one, as a share of what is allowed: 3 % or 20 J."""
+    return abs(row.measured - row.planned) / max(JOULES, 0.03 * row.planned)
+
+
+def main() -> None:
+    """Print one line per controller, then the claims."""
+    parser = command_line(__doc__, (CELL,), SEEDS, f"{QUICK_SEEDS} seeds")
+    options = parser.parse_args()
+    seeds = QUICK_SEEDS if options.quick else options.seeds
+    rows = []
+    for cell in options.cell or (CELL,):
+        for seed in range(seeds):
+            rows.append(row_of(cell, seed))
+            print(line_of(asdict(rows[-1])), flush=True)
+    above = max(row.planned / row.searched - 1.0 for row in rows)
+    policy = max(row.policy / row.policy_searched - 1.0 for row in rows)
+    order = max(max(row.clairvoyant - row.policy, row.policy - row.worst) for row in rows)
+    claims = [
+        at_most("known pause above exhaustive search", 100.0 * above, "%", 1e-6),
+        at_most("timeout policy above exhaustive search", 100.0 * policy, "%", 1e-6),
+        at_most("clairvoyant above expected, or expected above worst", order, "J", 1e-6),
+        at_most("driven off predicted, share of 3 % or 20 J", max(map(off, rows)), "", 1.0),
+    ]
+    finish(options.json, [asdict(row) for row in rows], claims)
+
+
+if __name__ == "__main__":
+    main()
