@@ -46,7 +46,9 @@ def run_standby(arguments: argparse.Namespace) -> int:
     ]
     if arguments.json:
         chosen = {"chosen": found.chosen.name, "wake_at": found.wake_at, "joules": found.energy}
-        print_json({**chosen, "saving": found.saving, "alternatives": rows})
+        asked = zip(found.modes, found.switch_times, strict=True)
+        modes = [{"mode": mode, "seconds": seconds} for mode, seconds in asked]
+        print_json({**chosen, "modes": modes, "saving": found.saving, "alternatives": rows})
     elif arguments.csv:
         print_csv(rows)
     else:
