@@ -50,7 +50,9 @@ def common_program(choice: Choice) -> CommonProgram:
     nearest = choice.along(nearest_chain(fastest))
     chosen: dict[Part, Movement] = {}
     around = 0
-    for part in nearest.parts:
+    parts = nearest.parts
+    fastest.plan([part for part in parts if part.kind != ACROSS], choice.ladder.improvement)  # side by side
+    for part in parts:
         plain = _plain(part, fastest)
         if plain is None:
             plain, by_path = _planned(part, fastest), part.kind == ACROSS
