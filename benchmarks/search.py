@@ -6,8 +6,8 @@
 One thread, the whole call from Python, the cell's tool attached; S_m is 20 mm, or 80 % of the clearance of
 the task's ends where that is less. --boxes: instead of these cells, N drawn ones of a thousand boxes each,
 whole requests with the planner's default work, in processor time; solvable is what a request solves with
-the same work, or trees of another seed with ten times as much. Closes with one line per figure that was asked for: measured
-value, bound, holds or falls short.
+the same work, or trees of another seed with ten times as much. Closes with one line per figure that was
+asked for: measured value, bound, holds or falls short.
 """
 
 from __future__ import annotations
