@@ -29,6 +29,7 @@ COMMAND_MODULES = {
     "evaluate": "ir_cli.offline.evaluate_command",
     "cell": "ir_cli.offline.cell_commands",
     "robot": "ir_cli.offline.robot_commands",
+    "completion": "ir_cli.completion_command",
 }
 """Only the module that is needed is imported: `ir cell check` does not wait for rclpy."""
 
@@ -50,10 +51,11 @@ HELP = {
     "evaluate": "joules, limits and clearance of a trajectory in a CSV file; needs no ROS",
     "cell": "check cell files, list the bundled cells",
     "robot": "list the bundled robots",
+    "completion": "completion for bash: source <(ir completion)",
 }
 """What `ir --help` prints without importing any of the modules."""
 
-WITHOUT_ROS = ("report", "plan", "move", "ik", "check", "standby", "evaluate", "cell", "robot")
+WITHOUT_ROS = ("report", "plan", "move", "ik", "check", "standby", "evaluate", "cell", "robot", "completion")
 """Commands that need no middleware, whatever its environment is."""
 
 MISUSED = 2
