@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -17,10 +18,12 @@ from ir_description import (
     cell_to_yaml,
     check_cell,
     load_cell,
+    load_power_data,
 )
 from ir_description.poses import composed, pose_of
 from ir_kernels import Chain, CollisionModel, SphericalWristIk
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.plc import PLC_INPUT_NAMES, PlcOutputs
 
 PARK_CLEARANCE = 0.0982
 CLEARANCE = {  # m, at the configurations of the tasks; published with the cells to 0.1 mm
@@ -187,3 +190,13 @@ def test_the_demo_s_tool_is_out_of_the_zone_after_the_retraction() -> None:
         collisions = CollisionModel(chain, moving, [forbidden], ())
         q = ik.solve(withdrawn(station)[None]).q
         assert collisions.min_distance(q).distance.max() > SAFETY_DISTANCE, station.name
+
+
+def test_the_plc_bits_of_the_data_are_those_that_driver_and_clients_use() -> None:
+    """Names and mutual exclusion: the data stands beside its source, the code beside its use."""
+    power = load_power_data()
+    for bit in power.plc_inputs:
+        assert bit.name.lower() in PLC_INPUT_NAMES
+        assert set(bit.excludes) == {other.name for other in power.plc_inputs if other is not bit}
+    outputs = {field.name for field in fields(PlcOutputs)}
+    assert {bit.name.lower() for bit in power.plc_outputs} <= outputs
