@@ -62,7 +62,7 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
         if other is not None and other.chain.chosen != choice.chain.chosen:
             values = TimeValues(other.ladder, other.parts)
             with journal.stage("cycle time") as notes:
-                values.bracket(seconds)
+                values.bracket(seconds, rung)
                 timed = shared_out(values, task_of(other, seconds, standing))
                 if timed is not None and (best[1] is None or timed.energy < best[1].energy):
                     best = other, timed

@@ -75,11 +75,13 @@ class TimeValues:
                 raise StageError(found.status)
         return seconds
 
-    def bracket(self, seconds: float) -> int:
-        """Plan at neighbouring rungs between which the movements take `seconds`; the faster of both."""
+    def bracket(self, seconds: float, first: int | None = None) -> int:
+        """Plan at neighbouring rungs between which the movements take `seconds`; the faster of both. first:
+        the rung to begin at, None: at the request's own value.
+        """
         slow, fast = -1, FASTEST
-        rung, step = self.ladder.first, 1
-        while True:  # in growing steps from the request's own value
+        rung, step = self.ladder.first if first is None else first, 1
+        while True:  # in growing steps
             late = self.seconds(rung) > seconds
             slow, fast = (max(slow, rung), fast) if late else (slow, min(fast, rung))
             beyond = rung + step if late else rung - step
