@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_msgs_py.report import PlannedMovement, PlanningStage, TrajectoryReport
 from ir_planner.program import ProgramPlan
 from ir_planner.regional import MovementPlan
 from ir_planner.scene import PlanningScene
@@ -39,17 +39,21 @@ def optimization_in(plan: OptimizationPlan, stamp: Stamp) -> OptimizationPlan:
     return replace(plan, before=stamp(plan.before), after=stamp(plan.after))
 
 
-def program_in(plan: ProgramPlan, cell_hash: str) -> ProgramPlan:
-    """The plan with each movement's report stamped with its own load; that of all has the cell alone."""
+def program_in(plan: ProgramPlan, cell_hash: str, timers: str) -> ProgramPlan:
+    """The plan with each movement's report stamped with its own load, that of all with the cell alone;
+    a stage says whose timers the pauses were planned with.
+    """
 
     def step(movement: PlannedMovement) -> PlannedMovement:
         return replace(movement, report=stamped(movement.report, cell_hash, movement.load))
 
-    compared = plan.compared if plan.compared is None else program_in(plan.compared, cell_hash)
+    compared = plan.compared if plan.compared is None else program_in(plan.compared, cell_hash, timers)
+    whose = PlanningStage("pauses", 0.0, f"timers and transition times of the {timers}")
     return replace(
         plan,
+        info=replace(plan.info, stages=(*plan.info.stages, whose)),
         movements=tuple(step(movement) for movement in plan.movements),
         report=stamped(plan.report, cell_hash, ""),
         compared=compared,
-        front=tuple(program_in(point, cell_hash) for point in plan.front),
+        front=tuple(program_in(point, cell_hash, timers) for point in plan.front),
     )

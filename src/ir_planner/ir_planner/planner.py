@@ -271,7 +271,7 @@ class Planner:
         request = ProgramRequest(cell, data, stations, start, options, cycle, settings, savings, front_points)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._work(options, cancelled, stops), progress)
-        plan = program_in(plan, self._current.hash_of(cell))
+        plan = program_in(plan, self._current.hash_of(cell), self.heard.source)
         for program in (*plan.front, plan.compared, plan):
             if program is not None and program.status.ok:
                 self._remember(program)
