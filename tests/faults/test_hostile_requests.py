@@ -223,6 +223,13 @@ def found_before() -> list[tuple[str, Any, str]]:
         ("evaluate_trajectory", evaluate(trajectory=fast), "1e+308 rad/s: it must be within 10000 rad/s"),
         ("check_state", srv.CheckState.Request(state=huge), "it must be within 100 rad"),
         ("compute_ik", srv.ComputeIk.Request(goal="home", near=huge), "it must be within 100 rad"),
+        (
+            "plan_regional",
+            srv.PlanRegionalMovement.Request(
+                start=state(), goal="home", options=PlanOptions(duration=5e-324)
+            ),
+            "it must be in [0.001, 3600] s",
+        ),
         ("plan_program", standing(cycle_time=1.0, **program), "cycle_time (is 1 s)"),
         ("plan_program", standing(front_points=3, **program), "front_points (is 3) must be 0"),
     ]

@@ -8,6 +8,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 
 SAFETY_DISTANCE_MAX = 1.0  # m
+DURATION_MIN = 1e-3  # s: shorter than any movement, and long enough for its square to be a number
 DURATION_MAX = 3600.0  # s
 SCALING_MIN = 1e-6
 TIME_VALUE_MAX = 1e6  # W
@@ -49,7 +50,8 @@ def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:
     """The options within the planner's bounds, and a note where planning_time was capped ("" else)."""
     safety_distance(options.safety_distance)
     bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
-    bounded(options.duration, 0.0, DURATION_MAX, "duration", "s")
+    if options.duration != 0.0:  # 0: free
+        bounded(options.duration, DURATION_MIN, DURATION_MAX, "duration", "s")
     bounded(options.velocity_scaling, SCALING_MIN, 1.0, "velocity_scaling")
     bounded(options.acceleration_scaling, SCALING_MIN, 1.0, "acceleration_scaling")
     if options.planning_time > PLANNING_TIME_MAX:
