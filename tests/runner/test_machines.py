@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import pytest
+
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
-from ir_program_runner.machines import Machines
+from ir_program_runner.machines import MOST_SIGNALS, Machines
 
 
 @dataclass(frozen=True)
@@ -37,3 +40,13 @@ def test_a_later_order_replaces_the_answer_that_is_due():
 def test_a_signal_that_was_never_set_is_zero():
     assert Machines().holds([Signal("nothing", False)])
     assert not Machines().holds([Signal("nothing", True)])
+
+
+def test_signals_of_invented_names_are_bounded() -> None:
+    machines = Machines()
+    for k in range(MOST_SIGNALS):
+        machines.hear(Signal(f"s{k}", True), 0.0)
+    with pytest.raises(InvalidValueError, match="10000 signals already: another is one too many"):
+        machines.hear(Signal("another", True), 0.0)
+    machines.hear(Signal("s0", False), 0.0)
+    assert machines.holds([Signal("s0", False), Signal("s1", True)])

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol
 
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
+
+MOST_SIGNALS = 10_000  # a cell has tens; who invents names must not fill the memory
 
 
 class CellSignal(Protocol):
@@ -43,6 +46,14 @@ class Machines:
             if each.follows == signal.name:
                 self._due = [(when, answer) for when, answer in self._due if answer.name != each.name]
                 self._due.append((now + each.delay, Signal(each.name, signal.value)))
+
+    def hear(self, signal: Signal, now: float) -> None:
+        """Take a level from outside. Raises InvalidValueError for a new name when there are MOST_SIGNALS."""
+        if signal.name not in self._levels and len(self._levels) >= MOST_SIGNALS:
+            raise InvalidValueError(
+                f"there are {MOST_SIGNALS} signals already: {signal.name} is one too many"
+            )
+        self.set(signal, now)
 
     def holds(self, signals: Iterable[Signal]) -> bool:
         """Whether all signals have these levels."""

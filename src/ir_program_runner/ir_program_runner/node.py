@@ -208,9 +208,9 @@ class ProgramRunnerNode(Node):
 
     def _hear_signal(self, msg: SignalMsg) -> None:
         try:
-            self._machines.set(signal_from_msg(msg), self._now())
+            self._machines.hear(signal_from_msg(msg), self._now())
         except InvalidValueError as error:
-            self.get_logger().warning(f"a signal is ignored: {error}")
+            self.get_logger().warning(f"a signal is ignored: {error}", throttle_duration_sec=1.0)
         self._waiting.look()
 
     def _let_machines_answer(self) -> None:
