@@ -14,6 +14,7 @@ from ir_description import Cell, PowerData
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import Saving
+from ir_planner import Planner
 from ir_planner.program.chain import layers_of
 from ir_planner.program.choice import Choice
 from ir_planner.program.common_program import CommonProgram, common_program, nearest_chain
@@ -164,3 +165,16 @@ def test_the_three_figures_are_kept_apart() -> None:
     longer = savings_of((*common, step(pause, 10.0, 5000.0)), planned, 1, program)  # both wait
     assert longer.movements == Saving(9000.0, 3000.0, 13.0)
     assert longer.pauses == savings.pauses
+
+
+def test_programs_and_savings_are_the_same_on_one_core_and_on_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = []
+    for cores in ({0}, {0, 1}):
+        monkeypatch.setattr("ir_planner.program.parallel.os.sched_getaffinity", lambda _, c=cores: c)
+        planner = Planner(lambda: 0.0)  # no ceiling cuts the plan
+        planner.set_cell("", "open")
+        park = np.array(planner.cell.park)
+        plan = planner.plan_program(("p1", "cab", "park"), 0.0, PlanOptions(), park, savings=True)
+        answers.append((plan.program_id, plan.savings, plan.info.iterations))
+    assert answers[0] == answers[1]
+    assert answers[0][1].available
