@@ -58,7 +58,7 @@ class Controller:
             yield from self._timed(chosen, grid, (*before, (chosen[len(before)], at)))
 
     def least_known(self, pause: float, grid: Sequence[float]) -> float:
-        """Least energy [J] of a pause of known length [s], ready at its end."""
+        """Least energy [J] of a pause of known length [s], ready at its end; inf: nothing is ready then."""
         found = []
         for plan in self.plans(grid):
             for wake in (pause, *(pause - leave for leave in self.leave)):
@@ -66,7 +66,7 @@ class Controller:
                     energy, ready = self.run(plan, wake, pause)
                     if ready <= pause + 1e-9:
                         found.append(energy)
-        return min(found)
+        return min(found, default=float("inf"))
 
     def least_expected(self, lengths: Sequence[float], grid: Sequence[float]) -> float:
         """Least mean energy [J] of pauses whose end wakes the robot."""
