@@ -63,7 +63,7 @@ def _search(
     if blocked is not None:
         return blocked, None
     paths = first_paths(ends, space, context, searches, briefly=True)
-    if not paths and context.options.planner_id == "":
+    if not paths and context.options.planner_id == "" and not context.work.exhausted:
         with context.journal.stage("enclosure") as notes:
             enclosed = enclosure(ends, space)
             notes.append(f"the {enclosed.end} is enclosed" if enclosed else "none is proved")
