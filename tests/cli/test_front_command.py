@@ -63,6 +63,7 @@ def planner(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.Monkey
     yield planner
     executor.shutdown()
     spinning.join()
+    planner.server.destroy()  # else the next client takes it for the planner that comes
     planner.node.destroy_node()
 
 

@@ -26,7 +26,7 @@ NAN = float("nan")
         (lambda: report.PlannedMovement(kind="jump"), 'kind of movement is "jump": known are service_exit'),
         (
             lambda: report.PlannedMovement(kind="pause", power_mode="NAP"),
-            'power mode of the pause is "NAP": known',
+            "power mode 'NAP' of the pause is unknown: known",
         ),
         (lambda: report.PlannedMovement(kind="regional", power_mode="HIBERNATION"), "only a pause has one"),
         (lambda: report.PlannedMovement(kind="pause", trajectory_id="ab"), "a pause has no trajectory"),

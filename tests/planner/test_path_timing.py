@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
@@ -16,7 +17,7 @@ from ir_planner.checks.energy import movement_energy
 from ir_planner.checks.verification import verify
 from ir_planner.curves.uniform_spline import along_path
 from ir_planner.errors import CancelledError, RequestError
-from ir_planner.optimize.fixed_path import FixedPath
+from ir_planner.optimize.fixed_path import FixedPath, never_back
 from ir_planner.optimize.passing import Passing
 from ir_planner.optimize.path_timing import PathTiming, along_its_path
 from ir_planner.optimize.profile_descent import _Descent
@@ -264,3 +265,24 @@ def test_a_correction_passes_the_points_and_keeps_the_ends(scene: PlanningScene)
         assert a.q == pytest.approx(b.q, abs=1e-12)
         assert a.qdd == pytest.approx(b.qdd, abs=1e-6)
         assert a.qddd == pytest.approx(b.qddd, rel=1e-3, abs=1e-2)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_profile_that_is_mended_never_goes_back(seed: int) -> None:
+    """The cubic spline over s, at rest at both ends, of profiles that fall and stand too."""
+    rng = np.random.default_rng(seed)
+    s = np.sort(rng.random(int(rng.integers(6, 60)))) ** float(rng.uniform(0.5, 3.0))
+    s[: int(rng.integers(0, 4))] = 0.0
+    s = np.clip(s + rng.normal(0.0, 0.02, len(s)), 0.0, 1.0)
+    mended = never_back(s)
+    assert ((mended >= 0.0) & (mended <= 1.0)).all()
+    control = np.linalg.solve(_values_at_knots(len(s)), 6.0 * mended - np.eye(len(s))[-1])
+    ends = np.concatenate([np.zeros(3), control, np.ones(3)])
+    motion = BSpline(np.arange(len(ends) + 4.0), ends, 3)
+    places = np.linspace(3.0, float(len(ends)), 5000)
+    assert np.diff(motion(places)).min() > -1e-12
+    assert np.abs(never_back(mended) - mended).max() < 1e-9
+
+
+def _values_at_knots(count: int) -> FloatArray:
+    return 4.0 * np.eye(count) + np.eye(count, k=1) + np.eye(count, k=-1)

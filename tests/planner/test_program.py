@@ -173,7 +173,7 @@ def test_automatic_pauses_take_the_cheapest_mode(power: PowerData) -> None:
     assert "power_mode: BUS_POWER_OFF" in text
     plan = planned(cell_from_yaml(text.replace("power_mode: BUS_POWER_OFF", "power_mode: AUTO")), power)
     chosen = [movement.power_mode for movement in plan.movements if movement.duration == 180.0]
-    assert chosen == ["BUS_POWER_OFF"]
+    assert chosen == ["STAND_ON_BRAKES>BUS_POWER_OFF"]
 
 
 @pytest.mark.parametrize("cut", [1, 2])

@@ -100,7 +100,7 @@ def two_cells(path: Path) -> Path:
     for cell in ("left", "right"):
         topic = f"/{cell}/ir_sim_driver/power_state"
         session.open_topic(topic, "ir_msgs/msg/PowerState", [QosOffer()])
-        session.message(topic, serialize_message(PowerState(power=len(cell))), 10**18)
+        session.message(topic, serialize_message(PowerState(power=float(len(cell)))), 10**18)
         status = DiagnosticStatus(
             name=f"{cell}/ir_sim_driver: plant",
             hardware_id=cell,

@@ -16,6 +16,7 @@ _PLACES = 2000  # of the path, between which it is interpolated
 _STANDING = 0.001  # share of the mean speed by which places part where the given motion stands
 _APART = 0.3  # of the distance between places: what is nearer to a point of the trajectory is left out
 _SAME = 1e-9  # rad
+_FIRST = 0.125  # of the second control point's rise: the least of the first; 0.25 with an even jerk
 _NEAREST = 8  # samples per interval for the deviation
 
 
@@ -105,6 +106,21 @@ def from_knots(right: FloatArray) -> FloatArray:
     symmetric.
     """
     return np.asarray(dpbtrs(_knot_factor(len(right)), right)[0])
+
+
+def never_back(s: FloatArray) -> FloatArray:
+    """s (C,) at the inner knots of a spline over s from 0 to 1 that nowhere falls: as given where that is so,
+    else with control points that rise, from the first interval on.
+    """
+    right = 6.0 * s
+    right[-1] -= 1.0
+    control = from_knots(right[:, None])[:, 0]
+    rising = np.concatenate([[0.0], np.maximum.accumulate(np.clip(control, 0.0, 1.0)), [1.0]])
+    if np.array_equal(rising[1:-1], control):
+        return s
+    rising[1] = max(rising[1], _FIRST * rising[2])
+    rising[-2] = min(rising[-2], 1.0 - _FIRST * (1.0 - rising[-3]))
+    return np.asarray((rising[:-2] + 4.0 * rising[1:-1] + rising[2:]) / 6.0)
 
 
 @lru_cache(maxsize=64)

@@ -17,7 +17,7 @@ from scipy.ndimage import convolve1d, maximum_filter1d
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
-from ir_planner.optimize.fixed_path import FixedPath
+from ir_planner.optimize.fixed_path import FixedPath, never_back
 from ir_planner.optimize.passing import Passing
 from ir_planner.optimize.profile_descent import optimised_profile
 from ir_planner.optimize.refinement import EDGES_PER_INTERVAL, SPEED_MARGINS
@@ -123,7 +123,7 @@ def _profile(
             path, s, total, limits, (stiffness, smoothing, effort.evaluations), context
         )
         context.work.spend(int(np.ceil(evaluations * count * EDGES_PER_INTERVAL)))
-    return s, total
+    return never_back(s), total
 
 
 def _slowed_where_needed(
@@ -149,7 +149,7 @@ def _slowed_where_needed(
         profile = make_interp_spline(times[knots], np.concatenate([[0.0], s, [1.0]]), k=3)
         slower = times[-1] / len(longer)
         duration *= slower
-        s = np.clip(profile(np.arange(2, len(longer) - 1) * slower), 0.0, 1.0)
+        s = never_back(np.clip(profile(np.arange(2, len(longer) - 1) * slower), 0.0, 1.0))
     assert best is not None  # of the first round
     return best[1:]
 

@@ -35,8 +35,6 @@ def first_paths(
     """
     journal = context.journal
     for name, search in _attempts(context.options.planner_id, searches, briefly):
-        if journal.work.exhausted:
-            break
         with journal.stage(name) as notes:
             found = search.find(ends, space, context.options.seed, space.work)
             if found.paths:
@@ -45,6 +43,8 @@ def first_paths(
                 notes.append("nothing free" + (f", {found.note}" if found.note else ""))
         if found.paths:
             return [(name, path) for path in found.paths]
+        if journal.work.exhausted:  # not before the first: what is free at once is found in any time
+            break
     return []
 
 
