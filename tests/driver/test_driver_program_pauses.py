@@ -116,7 +116,11 @@ def with_pauses(cell: Cell, pauses: tuple[tuple[float, str], ...]) -> Cell:
     [
         (((45.0, "AUTO"), (120.0, "AUTO")), ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF")),
         (((30.0, "BUS_POWER_OFF"), (10.0, "STAND_ON_MOTORS")), ("BUS_POWER_OFF", "STAND_ON_MOTORS")),
-        (((2.5, "AUTO"), (900.0, "AUTO")), ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF>HIBERNATION")),
+        pytest.param(
+            ((2.5, "AUTO"), (900.0, "AUTO")),
+            ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF>HIBERNATION"),
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_every_pause_of_a_program_costs_what_was_planned(
