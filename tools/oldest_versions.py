@@ -37,10 +37,6 @@ OTHERWISE = {
     "tests/planner/test_path_timing.py::test_the_objective_counts_at_a_free_duration": (
         "descents of SciPy 1.11 end up to 2 % above the least cost"
     ),
-    "tests/planner/test_program.py"
-    "::test_stations_are_entered_and_left_in_a_straight_line_with_their_contacts_named": (
-        "with SciPy 1.11 a line of the demonstration begins 0.3 mm beyond its end"
-    ),
 }
 """Tests that ask for more than the oldest versions achieve, and what these achieve."""
 NEEDS = re.compile(

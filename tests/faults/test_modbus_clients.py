@@ -14,6 +14,7 @@ from pymodbus.client import ModbusTcpClient
 from ir_msgs_py.plc import OperatingMode
 from ir_sim_driver import Driver, make_simulation
 from ir_sim_driver.plc import OpenLink
+from ir_sim_driver.plc.modbus import ModbusServer
 from ir_sim_driver.plc.modbus_link import ModbusTcp
 from ir_sim_driver.plc.modbus_map import COILS, OPERATING_MODE
 from ir_sim_driver.plc.modbus_pdu import answered
@@ -218,3 +219,17 @@ def test_coils_are_written_as_the_specification_packs_them() -> None:
     wall = Wall()
     answered(bytes.fromhex("0f 0013 000a 02 cd01"), wall)  # the example of its section 6.11
     assert wall.written == (0x13, [True, False, True, True, False, False, True, True, True, False])
+
+
+def test_an_error_of_the_drivers_own_is_answered_and_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+    server = ModbusServer("127.0.0.1", 0, Wall())
+    try:
+        with connected(server.port) as link:
+            for _ in range(3):
+                link.sendall(frame(READ_ALL_COILS))
+                assert received(link, 9)[7:] == bytes((0x81, 4))
+            link.sendall(frame(struct.pack(">BHH", 3, 0, 2)))
+            assert received(link, 13)[7:] == bytes.fromhex("03 04 0007 0008")
+    finally:
+        server.close()
+    assert [record.exc_info[0] for record in caplog.records if record.exc_info] == [ZeroDivisionError]

@@ -10,6 +10,7 @@ import copyreg
 import io
 import pickle
 import resource
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -28,6 +29,7 @@ CHARACTERS_HERE = 50_000
 PROCESSOR_SECONDS = 60
 MEMORY_BYTES = 4_000_000_000
 """Address space of the process; reading the largest cell takes about half of it."""
+_SHOWN = 200  # characters of what the process said last
 
 
 def read_cell_apart(text: str, name_or_path: str) -> Cell:
@@ -42,22 +44,25 @@ def read_cell_apart(text: str, name_or_path: str) -> Cell:
     process = subprocess.run(
         [sys.executable, "-c", f"from {__name__} import main; main()"],
         input=pickle.dumps((text, name_or_path)),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        capture_output=True,
     )
     if process.returncode != 0:
-        source = shown(name_or_path)[1:-1] or "<text>"
-        raise CellFileError(
-            source,
-            0,
-            f"reading it takes more than {PROCESSOR_SECONDS} s of processor time or "
-            f"{MEMORY_BYTES / 1e9:g} GB of memory",
-        )
+        raise CellFileError(shown(name_or_path)[1:-1] or "<text>", 0, _failure(process))
     answer = pickle.loads(process.stdout)  # written by this module's main
     if isinstance(answer, DescriptionError):
         raise answer
     cell: Cell = answer
     return cell
+
+
+def _failure(process: subprocess.CompletedProcess[bytes]) -> str:
+    """Why the process has no answer."""
+    last = process.stderr.decode(errors="replace").strip().splitlines()[-1:]
+    if process.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return f"reading it takes more than {PROCESSOR_SECONDS} s of processor time"
+    if "MemoryError" in "".join(last):
+        return f"reading it takes more than {MEMORY_BYTES / 1e9:g} GB of memory"
+    return f"the process that reads it ended with {process.returncode}: {''.join(last)[:_SHOWN]}"
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ that it is off the network. What clients do is not logged: a million of them lea
 from __future__ import annotations
 
 import asyncio
+import logging
 import struct
 import threading
 from collections.abc import Awaitable
@@ -16,6 +17,7 @@ from typing import TypeVar
 from ir_sim_driver.plc.modbus_pdu import ExceptionCode, Tables, answered
 
 T = TypeVar("T")
+_LOG = logging.getLogger(__name__)
 _HEADER = struct.Struct(">HHHB")  # transaction, protocol, bytes that follow, unit
 _LONGEST = 254  # bytes that follow, of the largest request that there can be
 _HELD = 1.0  # s; a client that has said something since then keeps its place
@@ -41,6 +43,7 @@ class ModbusServer:
     def __init__(self, host: str, port: int, tables: Tables, limits: Limits | None = None) -> None:
         self._tables, self._limits = tables, limits or Limits()
         self._heard: dict[asyncio.StreamWriter, float] = {}  # last request, or begin, of each client [s]
+        self._reported: set[type[Exception]] = set()
         self._loop = asyncio.new_event_loop()
         # without descriptors no client can be accepted: asyncio tries again every second, and need not say so
         self._loop.set_exception_handler(lambda loop, context: None)
@@ -104,9 +107,16 @@ class ModbusServer:
     def _answer(self, transaction: int, unit: int, request: bytes) -> bytes:
         try:
             answer = answered(request, self._tables)
-        except Exception:  # a bug in one answer must end neither the connection nor the server
+        except Exception as error:  # a bug in one answer must end neither the connection nor the server
+            self._report(error)
             answer = bytes((request[0] | 0x80, ExceptionCode.DEVICE_FAILURE))
         return _HEADER.pack(transaction, 0, len(answer) + 1, unit) + answer
+
+    def _report(self, error: Exception) -> None:
+        """Log an error of the driver's own, each kind once: clients must not be able to fill a disk."""
+        if type(error) not in self._reported:
+            self._reported.add(type(error))
+            _LOG.error("a Modbus request could not be answered", exc_info=error)
 
 
 async def _end(tasks: set[asyncio.Task[None]]) -> None:
