@@ -129,5 +129,6 @@ def test_a_driver_hears_the_planner_of_its_own_namespace_alone(
     wait_for(lambda: bool(heard), what="the other driver's load")
     tool = load_cell("open").tool
     assert heard[-1].load == ("none" if tool is None else tool.name)
-    assert planner_node.planner.heard.load.text == mine._driver.carried.text
-    np.testing.assert_allclose(mine._driver.carried.mass, DEMO.tool.mass if tool is not None else 0.0)
+    carried = mine._driver.carried
+    wait_for(lambda: planner_node.planner.heard.load.text == carried.text, what="the load in the planner's cell")
+    np.testing.assert_allclose(carried.mass, DEMO.tool.mass if tool is not None else 0.0)
