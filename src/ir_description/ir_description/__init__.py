@@ -32,6 +32,8 @@ from ir_description.library import (
     load_cell,
     load_power_data,
     load_robot,
+    power_marks,
+    robot_marks,
 )
 from ir_description.robot import (
     Counterbalance,
@@ -86,6 +88,8 @@ __all__ = [
     "load_power_data",
     "load_robot",
     "moving_frames",
+    "power_marks",
     "read_cell_apart",
+    "robot_marks",
     "robot_urdf",
 ]

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from ir_description.cell import Cell
 from ir_description.errors import CellFileError, UnknownNameError, shown
-from ir_description.files import cell_errors, power_from_yaml, read_cell, read_regular_file, robot_from_yaml
+from ir_description.files import (
+    cell_errors,
+    confidence_marks,
+    power_from_yaml,
+    read_cell,
+    read_regular_file,
+    robot_from_yaml,
+)
 from ir_description.robot import PowerData, RobotModel
 from ir_msgs_py.errors import InvalidValueError
 
@@ -45,6 +53,20 @@ def load_power_data(name: str = "kr_c4") -> PowerData:
         raise UnknownNameError("controller", name, _bundled("power"))
     path = _DATA / "power" / f"{name}.yaml"
     return power_from_yaml(path.read_text(encoding="utf-8"), path.name)
+
+
+@cache
+def robot_marks(name: str = "kr210_r2700_extra") -> Mapping[str, str]:
+    """Return how sure each figure of a bundled robot is, H, M or L; see `confidence_marks`."""
+    load_robot(name)
+    return confidence_marks((_DATA / "robots" / f"{name}.yaml").read_text(encoding="utf-8"), name)
+
+
+@cache
+def power_marks(name: str = "kr_c4") -> Mapping[str, str]:
+    """Return how sure each figure of a bundled controller is, H, M or L; see `confidence_marks`."""
+    load_power_data(name)
+    return confidence_marks((_DATA / "power" / f"{name}.yaml").read_text(encoding="utf-8"), name)
 
 
 def bundled_cells() -> tuple[str, ...]:
