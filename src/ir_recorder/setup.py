@@ -23,7 +23,7 @@ setup(
         "zstandard",
         "lz4",
     ],
-    extras_require={"picture": ["matplotlib"]},
+    extras_require={"picture": ["matplotlib"], "parquet": ["pyarrow"]},
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",

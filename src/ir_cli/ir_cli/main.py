@@ -48,7 +48,7 @@ HELP = {
     "ik": "all configurations that reach a pose or a station; needs no ROS",
     "check": "whether a configuration is free, and its nearest pairs; needs no ROS",
     "standby": "the power mode of least energy for a pause; needs no ROS",
-    "evaluate": "joules, limits and clearance of a trajectory in a CSV file; needs no ROS",
+    "evaluate": "joules, limits and clearance of a trajectory in a file; needs no ROS",
     "cell": "check cell files, list the bundled cells",
     "robot": "list the bundled robots",
     "completion": "completion for bash: source <(ir completion)",

@@ -8,7 +8,9 @@
     ├── SchemaError      no definition of a message type is installed
     ├── TopicsError      names of topics that are none, or too many
     ├── NothingRecordedError   a recording was asked to end, and none is in progress
-    └── ReadError        not a recording at all, or nothing in it that could be read
+    ├── ReadError        not a recording at all, or nothing in it that could be read
+    ├── TraceError       measured data that make no sense, with the line and the column
+    └── FitError         data that a fit can't use
 """
 
 
@@ -38,3 +40,11 @@ class NothingRecordedError(RecorderError):
 
 class ReadError(RecorderError):
     """A file that isn't a recording, or holds nothing readable."""
+
+
+class TraceError(RecorderError):
+    """Measured data that make no sense; the sentence names the file, the line and the column."""
+
+
+class FitError(RecorderError):
+    """Data that no parameter can be fitted to."""

@@ -1,4 +1,4 @@
-"""`ir evaluate`: what a trajectory in a CSV file costs, and the first limit or clearance that it violates."""
+"""`ir evaluate`: what a measured or planned trace costs, and the first limit that it violates."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .trace_file import read_trace
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add evaluate."""
     evaluate = commands.add_parser(
-        "evaluate", help="joules, limits and clearance of a trajectory in a CSV file; needs no ROS"
+        "evaluate", help="joules, limits and clearance of a trajectory in a file; needs no ROS"
     )
     add_cell(evaluate)
     evaluate.add_argument(
-        "trace", type=Path, metavar="TRACE.csv", help="columns: time, then the joints in rad"
+        "trace", type=Path, metavar="TRACE", help="CSV with time and joints, Parquet, or a recording"
     )
     evaluate.add_argument("--station", default="", help="whose allowed contacts hold in its zone")
     add_margin(evaluate)
