@@ -227,3 +227,19 @@ def test_an_unknown_backend_is_refused_with_the_known_ones(cell: Cell) -> None:
     with pytest.raises(SettingsError) as refused:
         make_backend("clay", cell, DT, SETTINGS.control)
     assert all(name in str(refused.value) for name in BACKENDS)
+
+
+def test_motors_that_halt_stop_every_joint(backend: Backend, cell: Cell) -> None:
+    """From the middle of a movement: the speed of every joint falls to nothing."""
+    commands = motion(home(cell))
+    for command in commands[: len(commands) // 2]:
+        backend.track(command)
+    before = np.abs(backend.qd)
+    assert before.max() > 0.1
+    steps = 0
+    while np.abs(backend.qd).max() > 1e-6:
+        backend.halt()
+        steps += 1
+        assert steps < 2000
+        assert (np.abs(backend.qd) <= before + 1e-3).all()
+    assert steps > 1

@@ -143,7 +143,10 @@ def test_a_cell_built_in_code_is_checked_like_a_file(cell: Cell) -> None:
     with pytest.raises(InvalidValueError, match="equipment lathe is there twice"):
         replace(
             cell,
-            equipment=(cell.machine("lathe"), replace(cell.machine("lathe"), bodies=(), states=(), state="")),
+            equipment=(
+                cell.machine("lathe"),
+                replace(cell.machine("lathe"), bodies=(), states=(), state="", switch=None),
+            ),
         )
 
 

@@ -25,6 +25,7 @@ from ir_description import (
     Part,
     ProgramStep,
     Signal,
+    StateSwitch,
     Station,
     Task,
     Zone,
@@ -96,6 +97,9 @@ def bodies(draw: st.DrawFn, name: str) -> Body:
     return Body(name, kind, draw(poses()), np.array(size), vertices)
 
 
+ENDS = (st.just("door_open"), st.just("door_closed"))
+
+
 @st.composite
 def machines(draw: st.DrawFn, name: str) -> tuple[Equipment, tuple[Station, ...]]:
     own = tuple(draw(bodies(f"{name}_{i}")) for i in range(draw(st.integers(1, 3))))
@@ -114,6 +118,9 @@ def machines(draw: st.DrawFn, name: str) -> tuple[Equipment, tuple[Station, ...]
         states=states,
         state=draw(st.sampled_from(["door_open", "door_closed"])) if states else "",
         enabled=draw(st.booleans()),
+        switch=draw(st.none() | st.builds(StateSwitch, st.just("ask"), *ENDS, st.floats(0.0, 3600.0)))
+        if states
+        else None,
     )
     contacts = (AllowedContact("gear_held", own[0].name, draw(st.floats(0.0, 1.0))),)
     approach = draw(st.floats(0.0, 5.0))

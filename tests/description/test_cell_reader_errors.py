@@ -43,6 +43,7 @@ equipment:
       door_open: [mill_door]
       door_closed: []
     state: door_open
+    switch: {signal: ask, on: door_open, off: door_closed, time: 1.5}
     bodies:
       - {name: mill_bed, kind: box, size: [1, 1, 0.5], xyz: [0, 0, 0.25]}
       - {name: mill_door, kind: cylinder, radius: 0.1, length: 1}
@@ -190,6 +191,14 @@ BROKEN = {
         "has states and must say its state, one of door_open, door_closed",
     ),
     "state of no body": ("[mill_door]\n", "[door]\n", "body in state door_open of mill 'door' is unknown"),
+    "switch by nobody": ("signal: ask, on", "signal: aks, on", "signal that switches mill 'aks' is unknown"),
+    "switch to no state": (
+        "off: door_closed",
+        "off: shut",
+        "is 'shut', must be one of door_open, door_closed",
+    ),
+    "switch to itself": ("off: door_closed", "off: door_open", "on and off are both door_open"),
+    "slow switch": ("time: 1.5}", "time: -1}", "switch.time is -1 s, must be in [0, 3600] s"),
     # stations
     "station twice": ("- {name: place,", "- {name: pick,", "station pick is there twice"),
     "contact with nobody": (

@@ -115,6 +115,12 @@ def check_follows(signals: Iterable[CellSignal]) -> None:
             raise UnknownNameError(f"signal that {signal.name} follows", signal.follows, names)
 
 
+def check_switch(machine: Equipment, signals: Collection[str]) -> None:
+    """Refuse a machine whose switch names a signal that nobody has."""
+    if machine.switch is not None and machine.switch.signal not in signals:
+        raise UnknownNameError(f"signal that switches {machine.name}", machine.switch.signal, signals)
+
+
 def check_names(cell: _Cell) -> None:
     """Refuse names that are given twice or that nobody has."""
     shapes = shape_register(cell.robot)
@@ -141,6 +147,9 @@ def check_names(cell: _Cell) -> None:
         if station.equipment not in machines:
             raise UnknownNameError(f"equipment of station {station.name}", station.equipment, machines)
     check_follows(cell.signals)
+    signals = dict.fromkeys(signal.name for signal in cell.signals)
+    for machine in cell.equipment:
+        check_switch(machine, signals)
     if sum(len(machine.bodies) for machine in cell.equipment) > BODIES_MAX:
         raise InvalidValueError(f"the cell has more than {BODIES_MAX} bodies")
 

@@ -22,6 +22,8 @@ APPROACH_MAX = 5.0
 """Longest approach [m]."""
 ZONE_MAX = 10.0 * SIZE_MAX
 """Largest edge [m] of a zone: it holds bodies far apart."""
+SWITCH_MAX = 3600.0
+"""Longest change of a machine's state [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +66,30 @@ class EquipmentState:
     bodies: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class StateSwitch:
+    """The signal that moves a machine between two of its states, and the time [s] that this takes.
+
+    on, off: the state that it changes to when the signal is set and cleared.
+    """
+
+    signal: str
+    on: str
+    off: str
+    time: float = 0.0
+
+    def __post_init__(self) -> None:
+        in_range(self.time, 0.0, SWITCH_MAX, "s", "time")
+        if self.on == self.off:
+            raise InvalidValueError(f"a switch needs two states, on and off are both {self.on}")
+
+
 @dataclass(frozen=True, eq=False)
 class Equipment:
     """A machine. pose (4, 4) in the world; bodies and zone_in_equipment in the machine's frame.
 
-    A body that no state names is always there; one that states name is there in these states only.
+    A body that no state names is always there; one that states name is there in these states only. Where
+    there is a switch, `state` is the one that plans assume and that counts until its signal is heard.
     """
 
     name: str
@@ -78,6 +99,7 @@ class Equipment:
     states: tuple[EquipmentState, ...] = ()
     state: str = ""
     enabled: bool = True
+    switch: StateSwitch | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
@@ -93,6 +115,9 @@ class Equipment:
                     raise UnknownNameError(f"body in state {state.name} of {self.name}", body, names)
         if self.state not in (known or [""]):
             raise UnknownNameError(f"state of {self.name}", self.state, known)
+        for end in () if self.switch is None else (self.switch.on, self.switch.off):
+            if end not in known:
+                raise UnknownNameError(f"state that the switch of {self.name} names", end, known)
 
     @cached_property
     def zone(self) -> Zone:
@@ -102,10 +127,17 @@ class Equipment:
 
     def present_bodies(self) -> tuple[Body, ...]:
         """Return the bodies that are there in the current state, in the machine's frame."""
+        return self._bodies_of((self.state,))
+
+    def bodies_in(self, *states: str) -> tuple[Body, ...]:
+        """Return the bodies that are there in any of these states, in the world."""
+        return tuple(body.placed(self.pose) for body in self._bodies_of(states))
+
+    def _bodies_of(self, states: tuple[str, ...]) -> tuple[Body, ...]:
         if not self.enabled:
             return ()
         bound = {body for state in self.states for body in state.bodies}
-        here = {body for state in self.states if state.name == self.state for body in state.bodies}
+        here = {body for state in self.states if state.name in states for body in state.bodies}
         return tuple(body for body in self.bodies if body.name not in bound or body.name in here)
 
     def world_bodies(self) -> tuple[Body, ...]:

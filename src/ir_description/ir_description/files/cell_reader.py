@@ -29,6 +29,7 @@ from ir_description.cell import (
     check_part_mass,
     check_posture,
     check_step,
+    check_switch,
     shape_register,
 )
 from ir_description.errors import CellFileError, UnknownNameError
@@ -106,6 +107,7 @@ class _CellReader:
         self._check_part_stations(parts, stations)
         self._check_contacts(placed, equipment, parts)
         signals = self._signals()
+        self._check_switches(equipment, signals)
         home = self._posture("home", robot.machine_home)
         with self._root.blamed():
             return Cell(
@@ -208,6 +210,12 @@ class _CellReader:
             with self._table["signals"].blamed():
                 check_follows(signals)
         return tuple(signals)
+
+    def _check_switches(self, equipment: tuple[Equipment, ...], signals: tuple[CellSignal, ...]) -> None:
+        known = dict.fromkeys(signal.name for signal in signals)
+        for item, machine in zip(self._list("equipment", 10_000), equipment, strict=True):
+            with dict(item.pairs()).get("switch", item).blamed():
+                check_switch(machine, known)
 
     def _posture(self, name: str, default: FloatArray) -> FloatArray:
         given = [key for key in (name, f"{name}_deg") if key in self._table]

@@ -11,7 +11,16 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ir_description.cell import Cell, CellSignal, Equipment, Part, ProgramStep, Station, zone_around
+from ir_description.cell import (
+    Cell,
+    CellSignal,
+    Equipment,
+    Part,
+    ProgramStep,
+    StateSwitch,
+    Station,
+    zone_around,
+)
 from ir_description.files.cell_reader import FORMAT
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_description.robot import Load
@@ -100,9 +109,16 @@ def _machine(machine: Equipment, stations: Iterable[Station]) -> Iterator[str]:
         for state in machine.states:
             yield f"  {state.name}: [{', '.join(state.bodies)}]"
         yield f"state: {machine.state}"
+    if machine.switch is not None:
+        yield f"switch: {_switch(machine.switch)}"
     yield "bodies:" if machine.bodies else "bodies: []"
     yield from _entries([_body(body)] for body in machine.bodies)
     yield from _block("stations", (_station(station) for station in stations))
+
+
+def _switch(switch: StateSwitch) -> str:
+    ends = f"on: {switch.on}, off: {switch.off}"
+    return f"{{signal: {switch.signal}, {ends}, time: {_number(switch.time)}}}"
 
 
 def _zone(machine: Equipment) -> str:

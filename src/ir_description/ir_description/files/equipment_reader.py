@@ -7,11 +7,13 @@ import numpy as np
 from ir_description.cell import (
     APPROACH_MAX,
     BODIES_MAX,
+    SWITCH_MAX,
     ZONE_KINDS,
     ZONE_MAX,
     AllowedContact,
     Equipment,
     EquipmentState,
+    StateSwitch,
     Station,
     Zone,
     station_at,
@@ -25,7 +27,9 @@ from ir_msgs_py.arrays import FloatArray
 
 def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tuple[Item, Station]]]:
     """Return a machine and its stations, each with the item it came from."""
-    table = item.table(("name", "bodies"), ("pose", "zone", "states", "state", "enabled", "stations"))
+    table = item.table(
+        ("name", "bodies"), ("pose", "zone", "states", "state", "switch", "enabled", "stations")
+    )
     read = tuple(bodies.read(body) for body in table["bodies"].list(0, BODIES_MAX))
     states = _states(table)
     machine = Equipment(
@@ -36,6 +40,7 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
         states=states,
         state=_state(table, states),
         enabled=table["enabled"].boolean() if "enabled" in table else True,
+        switch=_switch(table["switch"], states) if "switch" in table else None,
     )
     stations = table["stations"].list(0, 10_000) if "stations" in table else []
     return machine, [(station, _station(station, machine)) for station in stations]
@@ -81,6 +86,17 @@ def _state(table: Table, states: tuple[EquipmentState, ...]) -> str:
             f"has states and must say its state, one of {', '.join(state.name for state in states)}"
         )
     return ""
+
+
+def _switch(item: Item, states: tuple[EquipmentState, ...]) -> StateSwitch:
+    table = item.table(("signal", "on", "off"), ("time",))
+    known = tuple(state.name for state in states)
+    if not known:
+        item.fail("belongs to a machine with states")
+    on, off = table["on"].choice(known), table["off"].choice(known)
+    time = table["time"].number(0.0, SWITCH_MAX, "s") if "time" in table else 0.0
+    with item.blamed():
+        return StateSwitch(table["signal"].name(), on, off, time)
 
 
 def _station(item: Item, machine: Equipment) -> Station:

@@ -1,7 +1,8 @@
 """The port between the controller and a robot, and what a robot did with its motors.
 
-Four kinds of steps of length dt: the motors follow a command (`track`), nothing but gravity and friction acts
-(`coast`), the mechanical brakes act (`brake`), or the brakes are closed and nothing moves (`rest`).
+Five kinds of steps of length dt: the motors follow a command (`track`) or stop the robot (`halt`), nothing
+but gravity and friction acts (`coast`), the mechanical brakes act (`brake`), or the brakes are closed and
+nothing moves (`rest`).
 """
 
 from __future__ import annotations
@@ -62,6 +63,9 @@ class Backend(Protocol):
 
     def coast(self) -> None:
         """Make a step of dt without motor torque, the mechanical brakes still open."""
+
+    def halt(self) -> None:
+        """Make a step of dt: the motors stop each joint as hard as they can, off any path."""
 
     def brake(self) -> None:
         """Make a step of dt without motor torque, the mechanical brakes closing."""

@@ -75,6 +75,10 @@ class IdealBackend:
         free = self._dynamics.forward_dynamics(self.q[None], speed[None], np.zeros((1, len(speed))))[0]
         self._go(self.q + self._dt * (speed + self._dt * free), False)
 
+    def halt(self) -> None:
+        """Slow every joint down, as the brakes do."""
+        self.brake()
+
     def brake(self) -> None:
         """Slow every joint down by what its brake can do in one step."""
         speed = (self.q - self._before) / self._dt

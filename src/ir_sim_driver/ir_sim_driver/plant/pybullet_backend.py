@@ -24,16 +24,15 @@ from ir_sim_driver.plant.drivetrain import Drivetrain
 GRAVITY = 9.80665
 BRAKE_FACTOR = 1.5
 """Torque of a mechanical brake over the joint's largest motor torque (an estimate; no public figure)."""
-SPEED_GUARD = 50.0
-"""Speed [rad/s] that no joint reaches: beyond it the physics has diverged."""
+SPEED_GUARD = 50.0  # rad/s that no joint reaches: beyond it the physics has diverged
 _CHUNK = 4096  # steps whose work is kept when nobody asks for it
 
 
 class PyBulletBackend:
     """Implements Backend for `robot` standing at `base_pose` (4, 4).
 
-    urdf: makes the URDF text of the robot with a tuple of loads.
-    Raises BackendError when PyBullet is missing or has diverged.
+    urdf: makes the URDF text of the robot with a tuple of loads. Raises BackendError when PyBullet is missing
+    or has diverged.
     """
 
     def __init__(
@@ -52,7 +51,8 @@ class PyBulletBackend:
         self._n = len(robot.joint_names)
         self._drives = Drivetrain(robot)
         self._follower = CommandFollower(dt, control)
-        self._brake_torque: FloatArray = BRAKE_FACTOR * np.array(robot.envelope_torque)[:, 0]
+        self._motor_torque: FloatArray = np.array(robot.envelope_torque)[:, 0]
+        self._brake_torque: FloatArray = BRAKE_FACTOR * self._motor_torque
         self._zeros = [0.0] * self._n
         self._still: FloatArray = np.zeros(self._n)
         self.disturbance: FloatArray | None = None
@@ -85,11 +85,10 @@ class PyBulletBackend:
         self._write_state()
 
     def set_load(self, loads: Sequence[Load]) -> None:
-        """Rebuild the robot with these loads, in the same motion. Raises BackendError where Bullet takes none
-        of their inertia.
+        """Rebuild the robot with these loads, in the same motion. Raises BackendError.
 
-        Bullet turns an inertia into the frame of a link, and refuses to compute with it where rounding has
-        left it unsymmetrical by one bit: then it is tried with one that differs by parts in a billion.
+        Bullet refuses an inertia that rounding has left unsymmetrical by one bit: then one is tried that
+        differs by parts in a billion.
         """
         bodies = [solid(load) for load in loads]
         for attempt in range(ATTEMPTS):
@@ -104,9 +103,7 @@ class PyBulletBackend:
         raise BackendError(f"PyBullet cannot compute with the inertia of {names or 'the robot'}")
 
     def _build(self) -> None:
-        """Make a new server: the inverse dynamics of a removed body live on in the old one. Where that is not
-        possible the old one stays.
-        """
+        """Make a new server (a removed body's dynamics live on in the old one), or keep the old one."""
         text, old = self._urdf(self._robot, self._loads), self._client
         self._client = _connect(self._bullet, self._dt, self._gravity)
         try:
@@ -167,18 +164,27 @@ class PyBulletBackend:
         self._advance(links)
         self._follower.reset(self.q)
 
+    def halt(self) -> None:
+        """Brake with the largest motor torque: a motor that brakes has it at any speed."""
+        self.torque = self._stop(self._motor_torque)
+
     def brake(self) -> None:
-        """Take the torque that stops each joint within this step, as far as its brake can."""
+        """Brake with the mechanical brakes."""
+        self._stop(self._brake_torque)
+
+    def _stop(self, most: FloatArray) -> FloatArray:
+        """Take at most this torque (n,) to stop each joint within this step; returns it."""
         resistance = self._drives.resistance(self.q, self._still)
         stopping = self._speed * (-1.0 / self._dt)
         links = self._inverse_dynamics(stopping)
         wanted = links + self._drives.rotor_inertia * stopping + resistance
-        torque = np.clip(wanted, -self._brake_torque, self._brake_torque)
+        torque: FloatArray = np.clip(wanted, -most, most)
         if (torque != wanted).any() or self.disturbance is not None:
             links, _ = self._driven(torque, resistance)
         self.torque, self.saturated = self._still, False
         self._advance(links)
         self._follower.reset(self.q)
+        return torque
 
     def rest(self) -> None:
         """Stay where the closed brakes hold the robot."""
@@ -208,10 +214,7 @@ class PyBulletBackend:
         return self._inverse_dynamics(self._still)
 
     def link_com_position(self, link: int) -> FloatArray:
-        """Centre of mass (3,) of link 1..n in the world [m].
-
-        Bullet keeps this frame in double precision, the link frame itself only in single.
-        """
+        """Centre of mass (3,) of link 1..n in the world [m]: Bullet has it in double precision."""
         state = self._bullet.getLinkState(
             self._body, self._joints[link - 1], computeForwardKinematics=True, physicsClientId=self._client
         )
