@@ -23,33 +23,45 @@ from ir_description.errors import (
     RobotFileError,
     UnknownNameError,
 )
-from ir_description.files import cell_hash, cell_to_yaml, robot_urdf
+from ir_description.files import cell_hash, cell_to_yaml, power_parameters_to_yaml, robot_urdf
 from ir_description.library import (
     bundled_cells,
     bundled_robots,
     cell_file_errors,
     cell_from_yaml,
+    data_sheet,
     is_path,
     load_cell,
     load_power_data,
+    load_power_parameters,
     load_robot,
     power_marks,
     robot_marks,
 )
 from ir_description.robot import (
+    AXIS_UNITS,
+    DATA_SHEET,
+    RELATIVE_DEVIATION,
     Counterbalance,
     FramePose,
     Load,
     PowerData,
+    PowerParameters,
     RobotModel,
     fixed_frames,
     moving_frames,
+    parameter_unit,
+    physical_bounds,
+    prior,
 )
 from ir_description.shapes import Body, Capsule
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
 
 __all__ = [
+    "AXIS_UNITS",
+    "DATA_SHEET",
+    "RELATIVE_DEVIATION",
     "AllowedContact",
     "Body",
     "Capsule",
@@ -68,6 +80,7 @@ __all__ = [
     "Part",
     "PartPlaces",
     "PowerData",
+    "PowerParameters",
     "ProgramStep",
     "RobotFileError",
     "RobotModel",
@@ -84,13 +97,19 @@ __all__ = [
     "cell_hash",
     "cell_to_yaml",
     "check_cell",
+    "data_sheet",
     "fixed_frames",
     "is_path",
     "load_cell",
     "load_power_data",
+    "load_power_parameters",
     "load_robot",
     "moving_frames",
+    "parameter_unit",
+    "physical_bounds",
     "power_marks",
+    "power_parameters_to_yaml",
+    "prior",
     "read_cell_apart",
     "robot_marks",
     "robot_urdf",

@@ -9,22 +9,26 @@ from importlib.resources import files
 from pathlib import Path
 
 from ir_description.cell import Cell
-from ir_description.errors import CellFileError, UnknownNameError, shown
+from ir_description.errors import CellFileError, RobotFileError, UnknownNameError, shown
 from ir_description.files import (
     cell_errors,
     confidence_marks,
     power_from_yaml,
+    power_parameters_from_yaml,
     read_cell,
     read_regular_file,
     robot_from_yaml,
 )
-from ir_description.robot import PowerData, RobotModel
+from ir_description.robot import DATA_SHEET, PowerData, PowerParameters, RobotModel, prior
 from ir_msgs_py.errors import InvalidValueError
 
 _DATA = files("ir_description") / "data"
 
 CELL_BYTES_MAX = 8_000_000
 """Largest cell file [bytes]."""
+
+PARAMETER_BYTES_MAX = 1_000_000
+"""Largest file of power parameters [bytes]."""
 
 
 def _bundled(folder: str) -> tuple[str, ...]:
@@ -67,6 +71,28 @@ def power_marks(name: str = "kr_c4") -> Mapping[str, str]:
     """Return how sure each figure of a bundled controller is, H, M or L; see `confidence_marks`."""
     load_power_data(name)
     return confidence_marks((_DATA / "power" / f"{name}.yaml").read_text(encoding="utf-8"), name)
+
+
+def load_power_parameters(name_or_path: str = DATA_SHEET) -> PowerParameters:
+    """Return the parameters of a file by its path; "data_sheet" or "": those of the bundled data."""
+    if name_or_path in ("", DATA_SHEET):
+        return data_sheet()
+    if not is_path(name_or_path):
+        raise UnknownNameError("power parameters", name_or_path, (DATA_SHEET, "the path of a .yaml file"))
+    try:
+        text = read_regular_file(Path(name_or_path), PARAMETER_BYTES_MAX).decode("utf-8")
+    except (InvalidValueError, UnicodeDecodeError) as error:
+        raise RobotFileError(shown(name_or_path)[1:-1], 0, str(error)) from error
+    return power_parameters_from_yaml(text, name_or_path, data_sheet)
+
+
+@cache
+def data_sheet(robot: str = "kr210_r2700_extra", controller: str = "kr_c4") -> PowerParameters:
+    """Return the parameters as the data of a bundled robot and controller have them, with the deviations
+    that their marks of confidence give.
+    """
+    marks = {**robot_marks(robot), **power_marks(controller)}
+    return prior(load_robot(robot), load_power_data(controller), marks)
 
 
 def bundled_cells() -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from ir_description.files.cell_writer import cell_to_yaml
 from ir_description.files.confidence import confidence_marks
 from ir_description.files.mesh import read_regular_file
 from ir_description.files.power_file import power_from_yaml
+from ir_description.files.power_parameters_file import power_parameters_from_yaml, power_parameters_to_yaml
 from ir_description.files.robot_file import robot_from_yaml
 from ir_description.files.urdf import robot_urdf
 
@@ -16,6 +17,8 @@ __all__ = [
     "cell_to_yaml",
     "confidence_marks",
     "power_from_yaml",
+    "power_parameters_from_yaml",
+    "power_parameters_to_yaml",
     "read_cell",
     "read_regular_file",
     "robot_from_yaml",

@@ -5,7 +5,7 @@ Figures and their sources: data/robots/*.yaml, docs/robot_data.md. n joints, lin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -59,7 +59,8 @@ class RobotModel:
     position_min/max (n,) rad, velocity_max rad/s, acceleration_max rad/s^2 (the hard cap), jerk_max rad/s^3.
     link_mass (n+1,) kg, link_com (n+1, 3) m in the link frame, link_inertia (n+1, 3, 3) kg m^2 about the com.
     gear_ratio (n,), reflected_inertia kg m^2, friction_viscous Nm s/rad, friction_coulomb Nm (joint side),
-    copper_loss W/Nm^2 of MOTOR torque.
+    copper_loss W/Nm^2 of MOTOR torque; iron_loss W s^2/rad^2 of joint speed squared, inverter_loss W/Nm of
+    motor torque magnitude, gear_loss share of |joint torque x speed|: none where not given.
     envelope_speed (n, K) rad/s, envelope_torque (n, K+1) Nm: the torque available is envelope_torque[:, 0]
     below the first speed, steps down to [:, 1] there, is linear between (speed[k], torque[k+1]) and stays at
     the last value. It bounds the total torque, rotor inertia and friction included.
@@ -94,9 +95,15 @@ class RobotModel:
     load_self_capsules: tuple[str, ...]
     machine_home: FloatArray
     rated_payload: float
+    iron_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    inverter_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    gear_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
+        for name in ("iron_loss", "inverter_loss", "gear_loss"):
+            if len(getattr(self, name)) == 0:
+                object.__setattr__(self, name, np.zeros(n))
         shapes: dict[str, tuple[int | None, ...]] = {
             "joint_axis": (n, 3),
             "position_min": (n,),
@@ -111,6 +118,9 @@ class RobotModel:
             "friction_viscous": (n,),
             "friction_coulomb": (n,),
             "copper_loss": (n,),
+            "iron_loss": (n,),
+            "inverter_loss": (n,),
+            "gear_loss": (n,),
             "envelope_speed": (n, None),
             "envelope_torque": (n, None),
             "machine_home": (n,),
@@ -137,7 +147,8 @@ class RobotModel:
         for name in positive:
             if (getattr(self, name) <= 0.0).any():
                 raise InvalidValueError(f"{name} must be above 0 everywhere")
-        for name in ("reflected_inertia", "friction_viscous", "friction_coulomb", "copper_loss"):
+        losses = ("copper_loss", "iron_loss", "inverter_loss", "gear_loss")
+        for name in ("reflected_inertia", "friction_viscous", "friction_coulomb", *losses):
             if (getattr(self, name) < 0.0).any():
                 raise InvalidValueError(f"{name} must not be negative")
         if (self.position_min >= self.position_max).any():

@@ -1,0 +1,137 @@
+"""Power parameters: the prior of the marks, draws within physics, files that come back as they went."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ir_description import (
+    DescriptionFileError,
+    InvalidValueError,
+    PowerParameters,
+    UnknownNameError,
+    load_power_data,
+    load_power_parameters,
+    load_robot,
+    parameter_unit,
+    physical_bounds,
+    power_parameters_to_yaml,
+)
+
+
+@pytest.fixture
+def sheet() -> PowerParameters:
+    return load_power_parameters()
+
+
+def test_the_data_sheet_has_the_data_as_its_mean(sheet: PowerParameters) -> None:
+    robot, power = load_robot(), load_power_data()
+    assert np.array_equal(sheet.axis("viscous"), robot.friction_viscous)
+    assert np.array_equal(sheet.axis("copper"), robot.copper_loss)
+    assert not np.any([sheet.axis(term) for term in ("iron", "inverter", "gear")])
+    assert sheet.value("drives_watts") == power.drives_and_brake_release
+    same = sheet.robot_with(robot)
+    assert np.array_equal(same.link_mass, robot.link_mass)
+    assert same.counterbalance is not None
+    assert robot.counterbalance is not None
+    assert same.counterbalance.charge_pressure == robot.counterbalance.charge_pressure
+    assert sheet.power_with(power) == power
+    assert (sheet.deviation > 0.0).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**32), widening=st.floats(0.0, 20.0))
+def test_draws_are_possible_robots_and_follow_the_seed(seed: int, widening: float) -> None:
+    sheet = load_power_parameters()
+    wide = replace(sheet, covariance=sheet.covariance * widening)
+    draws = wide.draws(20, seed)
+    low, high = physical_bounds(sheet.names)
+    assert (draws >= low).all()
+    assert (draws <= high).all()
+    assert np.array_equal(draws, wide.draws(20, seed))
+    wide.drawn(seed).robot_with(load_robot())  # makes a robot, or raises
+
+
+def test_draws_have_the_covariance_where_no_bound_is_near(sheet: PowerParameters) -> None:
+    a, b = sheet.index("viscous.joint_a1"), sheet.index("coulomb.joint_a1")
+    covariance = sheet.covariance.copy()
+    covariance[a, b] = covariance[b, a] = -0.8 * sheet.deviation[a] * sheet.deviation[b]
+    draws = replace(sheet, covariance=covariance).draws(20_000, 1)
+    assert np.corrcoef(draws[:, a], draws[:, b])[0, 1] == pytest.approx(-0.8, abs=0.02)
+    assert draws[:, a].std() == pytest.approx(sheet.deviation[a], rel=0.03)
+    assert draws[:, a].mean() == pytest.approx(sheet.mean[a], rel=0.01)
+
+
+def test_a_file_comes_back_as_it_went(sheet: PowerParameters, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    a, b = sheet.index("viscous.joint_a1"), sheet.index("coulomb.joint_a3")
+    covariance, mean = 0.1 * sheet.covariance, sheet.mean * 1.0
+    covariance[a, b] = covariance[b, a] = 0.5 * np.sqrt(covariance[a, a] * covariance[b, b])
+    mean[sheet.index("iron.joint_a2")] = 12.5
+    mean[sheet.index("rectifier_efficiency")] = 0.97
+    fitted = replace(sheet, name="cell_3", mean=mean, covariance=covariance)
+    path = tmp_path / "fitted.yaml"
+    path.write_text(power_parameters_to_yaml(fitted, 'ir energy fit "run 1"'), encoding="utf-8")
+    read = load_power_parameters(str(path))
+    assert read.name == "cell_3"
+    assert read.sources == fitted.sources
+    assert read.mean == pytest.approx(fitted.mean, rel=1e-8)
+    assert read.covariance == pytest.approx(fitted.covariance, rel=1e-5, abs=1e-12)
+
+
+HEAD = "format: ir_description/power_parameters/1\nname: x\nrobot: kr210_r2700_extra\ncontroller: kr_c4\n"
+
+
+def test_what_a_file_does_not_name_stays_as_the_data_have_it(sheet: PowerParameters, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "one.yaml"
+    path.write_text(HEAD + "parameters: [{name: drives_watts, value: 300, deviation: 2}]\n", encoding="utf-8")
+    read = load_power_parameters(str(path))
+    k = sheet.index("drives_watts")
+    assert (read.mean[k], read.deviation[k], read.sources[k]) == (300.0, 2.0, "file")
+    others = np.arange(len(sheet.names)) != k
+    assert np.array_equal(read.mean[others], sheet.mean[others])
+    assert read.deviation[others] == pytest.approx(sheet.deviation[others])
+
+
+@pytest.mark.parametrize(
+    ("rest", "named"),
+    [
+        ("parameters: [{name: warp.joint_a1, value: 1, deviation: 1}]", "warp.joint_a1"),
+        ("parameters: [{name: drives_watts, value: -1, deviation: 1}]", "drives_watts is -1 W"),
+        ("parameters: [{name: gear.joint_a1, value: 0.95, deviation: 1}]", "[0, 0.9]"),
+        ("parameters: [{name: drives_watts, value: 1, deviation: 1, unit: Nm}]", "must be W"),
+        ("parameters: [{name: load_mass, value: 1, deviation: -1}]", "must be in [0"),
+        (
+            "parameters:\n" + 2 * "- {name: load_mass, value: 1, deviation: 1}\n",
+            "named twice",
+        ),
+        ("parameters: []\ncorrelation: {names: [load_mass, link_mass], below: [[1.5]]}", "[-1, 1]"),
+        (
+            "parameters: []\ncorrelation: {names: [load_mass, link_mass, tool_watts], below: [[1], [1, -1]]}",
+            "negative eigenvalue",
+        ),
+    ],
+)
+def test_a_file_that_makes_no_sense_is_refused_by_name(rest: str, named: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "bad.yaml"
+    path.write_text(HEAD + rest + "\n", encoding="utf-8")
+    with pytest.raises(DescriptionFileError) as refused:
+        load_power_parameters(str(path))
+    assert named in str(refused.value)
+
+
+def test_unknown_names_list_the_known(sheet: PowerParameters) -> None:
+    with pytest.raises(UnknownNameError, match="data_sheet"):
+        load_power_parameters("fitted")
+    with pytest.raises(UnknownNameError, match="viscous"):
+        sheet.value("viscous")
+    assert parameter_unit("viscous.joint_a3") == "Nm s/rad"
+    assert parameter_unit("watts.HIBERNATION") == "W"
+
+
+def test_a_covariance_that_is_none_is_refused(sheet: PowerParameters) -> None:
+    covariance = sheet.covariance.copy()
+    covariance[0, 1] = 1.0
+    with pytest.raises(InvalidValueError, match="symmetric"):
+        replace(sheet, covariance=covariance)
