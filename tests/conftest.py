@@ -13,9 +13,7 @@ import pytest
 from hypothesis import settings
 
 from ir_msgs_py.ros.network import apply_network
-
-DOMAINS = 100  # 1 to 100: the ports of higher domains lie among those that Linux hands out to clients
-
+from ir_msgs_py.ros.testing import own_domain
 
 # The same examples in every run, however long one takes: a red test is a change of the code, never luck.
 # To look for new examples:
@@ -26,9 +24,7 @@ settings.load_profile("repeatable")
 
 def pytest_configure(config: pytest.Config) -> None:
     """Choose domain and discovery before any test module imports rclpy."""
-    session = int(os.environ.setdefault("IR_TEST_SESSION", str(os.getpid())))
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    os.environ["ROS_DOMAIN_ID"] = str(1 + (7 * session + worker) % DOMAINS)
+    os.environ["ROS_DOMAIN_ID"] = str(own_domain())
     apply_network()
     os.environ["RCUTILS_COLORIZED_OUTPUT"] = "0"
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)

@@ -129,6 +129,10 @@ def test_a_driver_hears_the_planner_of_its_own_namespace_alone(
     wait_for(lambda: bool(heard), what="the other driver's load")
     tool = load_cell("open").tool
     assert heard[-1].load == ("none" if tool is None else tool.name)
-    carried = mine._driver.carried
-    wait_for(lambda: planner_node.planner.heard.load.text == carried.text, what="the load in the planner's cell")
-    np.testing.assert_allclose(carried.mass, DEMO.tool.mass if tool is not None else 0.0)
+
+    def heard_load() -> str:
+        load = planner_node.planner.heard.load
+        return "" if load is None else load.text
+
+    wait_for(lambda: heard_load() == mine._driver.carried.text, what="the load in the planner's cell")
+    np.testing.assert_allclose(mine._driver.carried.mass, DEMO.tool.mass if tool is not None else 0.0)

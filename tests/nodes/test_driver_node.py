@@ -87,7 +87,7 @@ def stamp_ns(msg):
 def test_joint_states_stand_on_a_gap_free_grid(make_driver, listen, wait_for):
     make_driver()
     received = listen(names.JOINT_STATES, JointState)
-    wait_for(lambda: len(received) >= 500, timeout=20.0)
+    wait_for(lambda: len(received) >= 500, timeout=60.0)
     stamps = np.array([stamp_ns(msg) for msg in received])
     assert (np.diff(stamps) == 2_000_000).all()
     assert (stamps % 2_000_000 == 0).all()
@@ -97,7 +97,7 @@ def test_joint_states_stand_on_a_gap_free_grid(make_driver, listen, wait_for):
 def test_power_state_is_the_derivative_of_its_energy(make_driver, listen, wait_for):
     make_driver()
     received = listen(names.POWER_STATE, PowerState)
-    wait_for(lambda: len(received) >= 100, timeout=20.0)
+    wait_for(lambda: len(received) >= 100, timeout=60.0)
     stamps = np.array([stamp_ns(msg) for msg in received])
     energy = np.array([msg.energy for msg in received])
     power = np.array([msg.power for msg in received])
@@ -128,12 +128,12 @@ def test_bus_power_off_by_bits_and_back(make_driver, cell_client, listen, wait_f
     outputs = listen(names.PLC_OUTPUTS, PlcOutputs, latched=True)
     answer = cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
     assert answer.inputs.ab
-    wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF, timeout=20.0)
+    wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF, timeout=60.0)
     wait_for(lambda: outputs and outputs[-1].ab)
     with pytest.raises(RequestRefusedError, match="BUS_POWER_OFF"):
         cell_client.execute(movement(), timeout=30.0)
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=False))
-    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=60.0)
 
 
 def test_a_bit_that_is_ignored_says_so_in_the_answer(make_driver, cell_client):
@@ -149,7 +149,7 @@ def test_a_bit_that_is_ignored_says_so_in_the_answer(make_driver, cell_client):
 def test_levels_in_force_are_published_whoever_sets_them(make_driver, cell_client, listen, wait_for):
     driver = make_driver(modbus=True, modbus_port=0)
     in_force = listen(names.PLC_INPUTS_IN_FORCE, PlcInputs, latched=True)
-    wait_for(lambda: in_force, timeout=20.0)
+    wait_for(lambda: in_force, timeout=60.0)
     assert in_force[0].move_enable
     assert in_force[0].operating_mode == PlcInputs.EXT
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
@@ -172,9 +172,9 @@ def test_inputs_belong_to_their_owner_but_the_emergency_stop_to_everybody(
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     publisher = ros_node.create_publisher(PlcInputs, names.PLC_INPUTS, latched)
     publisher.publish(PlcInputs(ab=True))
-    wait_for(lambda: any("plc.owner" in s.message for msg in heard for s in msg.status), timeout=20.0)
+    wait_for(lambda: any("plc.owner" in s.message for msg in heard for s in msg.status), timeout=60.0)
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="drives_on", value=True))
-    wait_for(lambda: in_force and in_force[-1].drives_on, timeout=20.0)
+    wait_for(lambda: in_force and in_force[-1].drives_on, timeout=60.0)
     publisher.publish(PlcInputs(ab=True, emergency_stop=True))
     wait_for(lambda: in_force[-1].emergency_stop)
     assert not any(msg.ab for msg in in_force)
@@ -199,21 +199,21 @@ def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wai
         PlcInputs, names.PLC_INPUTS, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     )
     publisher.publish(PlcInputs(hib=True))
-    wait_for(lambda: power and power[-1].mode == PowerMode.HIBERNATION, timeout=20.0)
+    wait_for(lambda: power and power[-1].mode == PowerMode.HIBERNATION, timeout=60.0)
     asleep_from = len(power)
     asleep = next(stamp_of(state) for state in power if state.mode == PowerMode.HIBERNATION)
     with pytest.raises(RequestRefusedError, match="Wake-on-LAN"):
         cell_client.ask(names.QUERY_MODES, QueryModes.Request())
     with pytest.raises(RequestRefusedError, match="HIBERNATION"):
         cell_client.execute(movement(), timeout=30.0)
-    wait_for(lambda: len(power) > asleep_from + 20, timeout=20.0)
+    wait_for(lambda: len(power) > asleep_from + 20, timeout=60.0)
     # what was sent before may arrive late; the stamp says when it was sent, the meter looks every 10 ms
     assert max(stamp_of(state) for state in states) <= asleep + 0.01
     silent = len(states)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(magic_packet("02:00:00:c4:02:11"), ("127.0.0.1", driver.port_of("wake_on_lan")))
         sender.sendto(magic_packet(MAC), ("127.0.0.1", driver.port_of("wake_on_lan")))
-    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=60.0)
     wait_for(lambda: len(states) > silent + 10)
 
 
@@ -223,9 +223,9 @@ def test_a_pause_is_entered_and_ended(make_driver, cell_client, listen, wait_for
     modes = cell_client.ask(names.QUERY_MODES, QueryModes.Request()).modes
     assert [mode.mode for mode in modes] == [0, 2, 3, 4]
     answer = cell_client.ask(names.START_PAUSE, StartPause.Request(pause=2.0))
-    wait_for(lambda: power and power[-1].mode == answer.mode.mode, timeout=20.0)
+    wait_for(lambda: power and power[-1].mode == answer.mode.mode, timeout=60.0)
     cell_client.ask(names.END_PAUSE, EndPause.Request())
-    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=60.0)
 
 
 def test_loads_and_their_refusals(make_driver, cell_client):
@@ -245,15 +245,14 @@ def test_loads_and_their_refusals(make_driver, cell_client):
 def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_client, listen, wait_for):
     make_driver(backend="pybullet")
     states, power = listen(names.JOINT_STATES, JointState), listen(names.POWER_STATE, PowerState)
-
+    button = cell_client.node.create_client(SetPlcInput, names.SET_PLC_INPUT)
+    wait_for(lambda: states and power and button.service_is_ready())
     pressed = []
-    wait_for(lambda: states, timeout=20.0)
 
     def watch(feedback):
         if not pressed:
             pressed.append(feedback)
-            future = cell_client.node.create_client(SetPlcInput, names.SET_PLC_INPUT)
-            future.call_async(SetPlcInput.Request(name="emergency_stop", value=True))
+            button.call_async(SetPlcInput.Request(name="emergency_stop", value=True))
 
     with pytest.raises(RequestRefusedError, match="emergency stop"):
         cell_client.execute(movement(0.3, 3.0), feedback=watch, timeout=30.0)
@@ -264,7 +263,7 @@ def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_cli
     wait_for(lambda: np.abs(states[-1].velocity).max() == 0.0)
     stopped = np.array(states[-1].position)
     wait_for(lambda: cell_client.call(names.RECOVER, Recover.Request()).status.code == 1)
-    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=20.0)
+    wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=60.0)
     assert np.allclose(states[-1].position, stopped, atol=1e-9)
 
 
@@ -273,7 +272,7 @@ def test_a_plc_reaches_the_node_by_modbus(make_driver, listen, wait_for):
     power = listen(names.POWER_STATE, PowerState)
     with ModbusTcpClient("127.0.0.1", port=driver.port_of("modbus")) as plc:
         plc.write_coil(COILS.index("ab"), True)
-        wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF, timeout=20.0)
+        wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF, timeout=60.0)
         assert plc.read_input_registers(0, count=1).registers == [PowerMode.BUS_POWER_OFF]
 
 
@@ -281,7 +280,7 @@ def test_faster_than_real_time_the_driver_is_the_clock(make_driver, listen, wait
     make_driver(real_time_factor=4.0)
     clock = listen("/clock", Clock)
     states = listen(names.JOINT_STATES, JointState)
-    wait_for(lambda: len(clock) > 50 and len(states) > 500, timeout=20.0)
+    wait_for(lambda: len(clock) > 50 and len(states) > 500, timeout=60.0)
     stamps = np.array([stamp_ns(msg) for msg in states])
     assert (np.diff(stamps) == 2_000_000).all()
     ticks = {msg.clock.sec * 1_000_000_000 + msg.clock.nanosec for msg in clock}
@@ -296,15 +295,16 @@ def test_a_movement_whose_client_has_gone_is_stopped_on_its_path(
     driver = make_driver(client_timeout=0.3)
     diagnostics = listen(names.DIAGNOSTICS, DiagnosticArray)
     client = ros_executor.run(lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY))
-    wait_for(client.server_is_ready, timeout=20.0)
+    wait_for(client.server_is_ready, timeout=60.0)
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(step=0.4, duration=20.0)))
+    power = listen(names.POWER_STATE, PowerState)
     accepted = ros_executor.run(lambda: client.send_goal_async(goal))
-    wait_for(accepted.done, timeout=20.0)
-    wait_for(lambda: driver._driver.moving, timeout=20.0)
+    wait_for(accepted.done)
+    wait_for(lambda: any(msg.mode == PowerMode.MOVING for msg in power), what="the movement begins")
     ros_executor.run(client.destroy)
     wait_for(lambda: not driver._driver.moving, timeout=15.0, what="the movement stops")
 
     def said():
         return any("no client" in status.message for msg in diagnostics for status in msg.status)
 
-    wait_for(said, timeout=20.0)
+    wait_for(said)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -32,20 +33,42 @@ def send(
     wait_for(client.server_is_ready, what="plan is offered")
 
     def goals(count: int) -> list[Any]:
-        goal = Plan.Goal(stations=["infeed_pick"], options=PlanOptions(planning_time=60.0))
+        goal = Plan.Goal(stations=["park"], options=PlanOptions(planning_time=60.0))
         futures = [ros_executor.run(lambda: client.send_goal_async(goal)) for _ in range(count)]
-        wait_for(lambda: all(future.done() for future in futures), timeout=30.0, what="goals are accepted")
+        wait_for(lambda: all(future.done() for future in futures), what="goals are accepted")
         return [future.result() for future in futures]
 
     return goals
 
 
+@pytest.fixture
+def go_on(planner_node: PlannerNode, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """Plans begin when this is set: what a test does before comes before their end."""
+    event, plan = threading.Event(), planner_node.planner.plan_program
+
+    def later(*arguments: Any, **more: Any) -> Any:
+        *_, cancelled = arguments
+        while not (event.wait(0.005) or cancelled()):
+            pass
+        return plan(*arguments, **more)
+
+    monkeypatch.setattr(planner_node.planner, "plan_program", later)
+    yield event
+    event.set()
+
+
 def test_eight_plans_hold_up_no_quick_request_and_all_end(
-    send: Callable[[int], list[Any]], call: Callable[..., Any], ros_executor: Any, wait_for: Any
+    send: Callable[[int], list[Any]],
+    call: Callable[..., Any],
+    ros_executor: Any,
+    wait_for: Any,
+    go_on: threading.Event,
 ) -> None:
     results = [ros_executor.run(goal.get_result_async) for goal in send(8)]
-    assert call(CheckState, "check_state", state=STATE, timeout=30.0).valid
-    assert not all(future.done() for future in results), "the plans ended first: nothing was shown"
+    assert call(CheckState, "check_state", state=STATE).valid
+    assert not any(future.done() for future in results)
+    go_on.set()
+    assert call(CheckState, "check_state", state=STATE).valid
     wait_for(lambda: all(future.done() for future in results), timeout=120.0, what="all plans end")
     programs = {future.result().result.program_id for future in results}
     assert {future.result().result.status.code for future in results} == {Status.SUCCESS}
@@ -53,14 +76,15 @@ def test_eight_plans_hold_up_no_quick_request_and_all_end(
 
 
 def test_a_plan_that_waits_is_cancelled_at_once(
-    send: Callable[[int], list[Any]], ros_executor: Any, wait_for: Any
+    send: Callable[[int], list[Any]], ros_executor: Any, wait_for: Any, go_on: threading.Event
 ) -> None:
     first, *_, last = send(3)
     answer = ros_executor.run(last.get_result_async)
     ros_executor.run(last.cancel_goal_async)
-    wait_for(answer.done, timeout=30.0, what="the cancelled goal ends")
+    wait_for(answer.done, what="the cancelled goal ends")
     assert answer.result().status == CANCELLED
     assert answer.result().result.status.code == Status.PREEMPTED
+    go_on.set()
     others = [ros_executor.run(goal.get_result_async) for goal in (first, *_)]
     wait_for(lambda: all(future.done() for future in others), timeout=120.0, what="the others end")
     assert {future.result().result.status.code for future in others} == {Status.SUCCESS}
@@ -71,9 +95,11 @@ def test_more_plans_than_may_wait_are_refused_in_words(
     planner_node: PlannerNode,
     ros_executor: Any,
     wait_for: Any,
+    go_on: threading.Event,
 ) -> None:
     planner_node._goals._most = 1
     results = [ros_executor.run(goal.get_result_async) for goal in send(4)]
+    go_on.set()
     wait_for(lambda: all(future.done() for future in results), timeout=120.0, what="all goals end")
     statuses = [future.result().result.status for future in results]
     assert [status.code for status in statuses].count(Status.SUCCESS) == 2
@@ -82,12 +108,13 @@ def test_more_plans_than_may_wait_are_refused_in_words(
     assert planner_module._GOALS_WAITING > 1
 
 
+@pytest.mark.usefixtures("go_on")
 def test_a_thousand_cancels_are_all_answered(
     send: Callable[[int], list[Any]], ros_executor: Any, wait_for: Any
 ) -> None:
     goal = send(1)[0]
     answer = ros_executor.run(goal.get_result_async)
-    cancels = [ros_executor.run(goal.cancel_goal_async) for _ in range(1000)]
+    cancels = [ros_executor.run(goal.cancel_goal_async) for _ in range(REQUESTS_WAITING)]
     wait_for(lambda: all(cancel.done() for cancel in cancels), timeout=120.0, what="cancels are answered")
     wait_for(answer.done, timeout=60.0, what="the goal ends")
     assert answer.result().status == CANCELLED
@@ -101,7 +128,7 @@ def test_a_large_cell_holds_up_no_quick_request(
     loading = ros_executor.run(lambda: client.call_async(SetCell.Request(cell_yaml=large_cell(3000))))
     answered = 0
     while not loading.done():
-        assert call(CheckState, "check_state", state=STATE, timeout=30.0).status.code == Status.SUCCESS
+        assert call(CheckState, "check_state", state=STATE).status.code == Status.SUCCESS
         answered += 1
     assert answered >= 3
     assert loading.result().status.code == Status.SUCCESS, loading.result().status.message

@@ -145,17 +145,17 @@ def test_the_start_defaults_to_the_last_joint_states(
         answer = call(PlanRegionalMovement, "plan_regional_movement", goal="park")
         return answer if answer.status.code == Status.SUCCESS else None
 
-    answer = wait_for(asked, timeout=10.0, what="the state arrives")
+    answer = wait_for(asked, what="the state arrives")
     assert list(answer.info.start.position) == pytest.approx(start)
 
-    def refused() -> Any:
+    def refused(kind: Any, name: str, **fields: Any) -> Any:
         ros_executor.run(lambda: publisher.publish(moving(0.3)))
-        answer = call(PlanRegionalMovement, "plan_regional_movement", goal="park")
-        return answer.status if answer.status.code == Status.START_STATE_INVALID else None
+        status = call(kind, name, **fields).status
+        return status if status.code == Status.START_STATE_INVALID else None
 
-    assert "the robot is moving: joint_a1" in wait_for(refused, timeout=10.0, what="it moves").message
-    program = call(PlanProgram, "plan_program", stations=["park"]).status
-    assert program.code == Status.START_STATE_INVALID, program.message
+    plan = wait_for(lambda: refused(PlanRegionalMovement, "plan_regional_movement", goal="park"))
+    assert "the robot is moving: joint_a1" in plan.message
+    assert wait_for(lambda: refused(PlanProgram, "plan_program", stations=["park"]))
 
 
 def test_plan_trajectory_passes_the_reference_points(call: Call) -> None:
@@ -339,7 +339,7 @@ def test_late_listeners_get_markers_and_trajectory_and_diagnostics_come(
                 kind, topic, lambda message: heard.__setitem__(topic, message), qos
             )
         )
-    wait_for(lambda: len(heard) == 3, timeout=5.0, what="markers, trajectory and diagnostics")
+    wait_for(lambda: len(heard) == 3, what="markers, trajectory and diagnostics")
     assert trajectory_from_msg(heard["/ir_planner/planned_trajectory"]).trajectory_id == plan.trajectory_id
     assert {"lathe", "zones", "stations"} <= {marker.ns for marker in heard["/ir_planner/markers"].markers}
     assert heard["/diagnostics"].status[0].name == "ir_planner"

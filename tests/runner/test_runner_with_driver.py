@@ -48,7 +48,7 @@ def client(ros_context, ros_executor):
 
         runner = ProgramRunnerNode(send, context=ros_context)
         ros_executor.add_node(runner)
-        with Client(context=ros_context) as client:
+        with Client(context=ros_context, timeout=60.0) as client:
             yield client
 
 
@@ -70,7 +70,7 @@ def test_a_program_with_every_power_mode_runs_on_the_driver(client):
         move(there, here),
     ]
     goal = RunProgram.Goal(movements=[planned_movement_to_msg(step) for step in program])
-    result = client.send_goal("/ir_program_runner/run_program", goal, timeout=60.0)
+    result = client.send_goal("/ir_program_runner/run_program", goal, timeout=120.0)
     assert result.status.code == StatusCode.SUCCESS, result.status.message
     assert result.executed == len(program)
     assert result.energy > 0.0

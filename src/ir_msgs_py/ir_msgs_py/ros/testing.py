@@ -12,8 +12,10 @@ tests run in parallel. A test over processes overrides `ros_discovery_range` wit
 from __future__ import annotations
 
 import os
+import socket
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
@@ -25,20 +27,42 @@ if TYPE_CHECKING:  # importing rclpy costs 0.2 s, and tests of a core don't need
     from ir_msgs_py.ros.background import BackgroundExecutor
 
 _DOMAINS = 101  # ids above need other ports than the system leaves free
+_RESERVED: list[socket.socket] = []
 _POLL = 0.005
+_PATIENCE = 60.0
+"""Longest wait [s] where a test chooses none: a busy machine does within it what a free one does at once."""
 
 
 class WaitFor(Protocol):
     """Wait until the condition holds and return what it gave; fail the test after `timeout` [s]."""
 
-    def __call__(self, condition: Callable[[], Any], timeout: float = 5.0, what: str = "") -> Any:
+    def __call__(self, condition: Callable[[], Any], timeout: float = _PATIENCE, what: str = "") -> Any:
         """Wait."""
+
+
+@cache
+def own_domain() -> int:
+    """ROS domain, 1 to 101, that no other test process of this host has: reserved until this process ends.
+
+    The reservation is a name among the host's abstract sockets. Raises RuntimeError when none is left.
+    """
+    for k in range(_DOMAINS):
+        domain = 1 + (os.getpid() + k) % _DOMAINS
+        name = socket.socket(socket.AF_UNIX)
+        try:
+            name.bind(f"\0ir_msgs_py/test_domain/{domain}")
+        except OSError:  # somebody has it
+            name.close()
+            continue
+        _RESERVED.append(name)
+        return domain
+    raise RuntimeError(f"each of the {_DOMAINS} domains for tests is in use")
 
 
 @pytest.fixture(scope="session")
 def ros_domain_id() -> int:
-    """Domain of this test process, 1 to 101: by process, so that parallel sessions don't meet."""
-    return 1 + os.getpid() % _DOMAINS
+    """Domain of this test process alone, so that parallel sessions don't meet."""
+    return own_domain()
 
 
 @pytest.fixture
@@ -81,9 +105,9 @@ def ros_node(ros_context: Context, ros_executor: BackgroundExecutor) -> Node:
 
 @pytest.fixture
 def wait_for() -> WaitFor:
-    """Wait for a condition, never for a duration: `wait_for(lambda: received, timeout=2.0)`."""
+    """Wait for a condition, never for a duration: `wait_for(lambda: received, what="the answer")`."""
 
-    def wait(condition: Callable[[], Any], timeout: float = 5.0, what: str = "") -> Any:
+    def wait(condition: Callable[[], Any], timeout: float = _PATIENCE, what: str = "") -> Any:
         deadline = time.monotonic() + timeout
         while not (value := condition()):
             if time.monotonic() >= deadline:
