@@ -6,15 +6,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from asking import planned
 
+from ir_description import Cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import TrajectoryReport
 from ir_planner.checks import movement_energy
+from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.regional import MovementPlan
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
@@ -22,6 +26,7 @@ from ir_planner.timing import stretched
 
 SceneOf = Callable[[str], PlanningScene]
 CLEAR = 0.05  # m: of both ends
+SHALLOW = 1.01  # so little do joules depend on the duration near the best one that a descent may end there
 FREE = (  # in the open cell: ends, durations [s] with the drive energy [J] of the best of six IPOPT starts
     (
         [1.66434, -1.271436, 0.446121, 3.491531, -0.372384, 2.864757],
@@ -29,6 +34,28 @@ FREE = (  # in the open cell: ends, durations [s] with the drive energy [J] of t
         ((0.7516096, 280.33), (0.939512, 50.92)),
     ),
 )
+
+
+def drives(report: TrajectoryReport) -> float:
+    """Joules without what controller and tool always draw."""
+    return report.energy - report.base_energy
+
+
+def asked_program(
+    cell: Cell, stations: tuple[str, ...], cycle_time: float = 0.0, **options: str
+) -> ProgramPlan:
+    work = Work(1_000_000, time.monotonic() + 300.0, time.monotonic)
+    request = ProgramRequest(
+        cell,
+        load_power_data(),
+        stations,
+        np.array(cell.park),
+        PlanOptions(planning_time=300.0, **options),  # type: ignore[arg-type]
+        cycle_time,
+    )
+    plan = plan_program(request, work)
+    assert plan.status.ok, plan.status.message
+    return plan
 
 
 def asked(q0: FloatArray, q1: FloatArray, scene: PlanningScene, **options: object) -> MovementPlan:
@@ -73,6 +100,26 @@ def test_no_answer_costs_more_than_a_shorter_one_stretched(cell: str, seed: int,
         factor = longer.report.duration / shorter.trajectory.duration
         energy = movement_energy(stretched(shorter.trajectory, factor), scene).total
         assert longer.report.energy <= energy * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize(("cell", "seed"), [("open", 1), ("deep_box", 2), ("open", 4), ("demo", 6)])
+def test_no_duration_takes_less_than_the_least_energy(cell: str, seed: int, scene_of: SceneOf) -> None:
+    """What controller and tool draw doesn't count: a second costs nothing by itself."""
+    scene = scene_of(cell)
+    q0, q1 = ends(scene, seed)
+    least = asked(q0, q1, scene, objective="energy").report
+    for factor in (0.5, 0.8, 1.25, 2.0):
+        other = asked(q0, q1, scene, objective="energy", duration=factor * least.duration).report
+        assert drives(least) <= SHALLOW * drives(other)
+
+
+def test_a_longer_cycle_with_the_wait_at_its_end_is_filled_with_the_least_energy(demo_cell: Cell) -> None:
+    """The objective energy of a program counts the controller too: a whole cycle is paid for."""
+    program = partial(asked_program, demo_cell, ("infeed_pick", "home"))
+    free = program(objective="energy")
+    cycle = 1.2 * free.report.duration
+    energy, other = (program(objective=o, cycle_time=cycle) for o in ("energy", "time_and_energy"))
+    assert energy.report.energy <= 1.01 * other.report.energy
 
 
 @pytest.mark.parametrize("cell", ["open", "demo"])

@@ -2,6 +2,7 @@
 
 from ir_planner.optimize.descents import Descents, path_of
 from ir_planner.optimize.movement_over import movement_over
+from ir_planner.optimize.near import optimised_near
 from ir_planner.optimize.path_timing import QUICK_TIMING, PathTiming, TimingEffort, along_its_path
 from ir_planner.optimize.portfolio import Portfolio
 from ir_planner.optimize.refinement import FEWEST, MOST, SPACING, Refinement
@@ -22,6 +23,7 @@ __all__ = [
     "TimingEffort",
     "along_its_path",
     "movement_over",
+    "optimised_near",
     "path_of",
     "rescaled",
 ]

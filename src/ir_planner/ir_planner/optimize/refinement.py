@@ -51,6 +51,7 @@ SPEED_MARGINS = (
 )  # shares of the speed tried where a duration is requested, until it is met
 _ROUNDING = 1e-9  # relative
 _STIFFER = 10.0  # penalties where a duration is requested: a second may be worth much more than usual
+_LEAST_COST = 1.0  # J: of a movement that takes next to nothing
 _ZONE_SAMPLES = 4  # per interval
 _WITHIN_REACH = 1.06  # of a requested duration: from there more effort may get to it
 _SHARE_OF_WORK = 0.4  # of what is left, that one descent may take: finer ones and repairs come after it
@@ -164,10 +165,7 @@ class Refinement:
     def _rounding(self, solution: Solution) -> float:
         """What a watt of smoothing weighs in the cost of a movement, as a share of it."""
         worth = objective_weights(self.context, solution.spline.control).energy
-        if self.context.options.duration > 0.0:  # the base load is not to be chosen
-            base = self.context.scene.base_watts * solution.spline.duration
-            return worth * solution.spline.duration / max(solution.cost - base, 1.0)
-        return worth * solution.spline.duration / max(solution.cost, 1e-9)
+        return worth * solution.spline.duration / max(solution.cost, _LEAST_COST)
 
     def _as_fast_as_requested(self, solution: Solution, path: FloatArray) -> Solution:
         """The solution with bounds that are tightened by as much as its motion exceeds them (between samples,

@@ -28,7 +28,7 @@ def rates_of(context: Context) -> Rates:
     options = context.options
     if options.objective == "time":
         return Rates(0.0, 1.0)
-    return Rates(1.0, context.scene.base_watts if options.objective == "energy" else options.time_value)
+    return Rates(1.0, 0.0 if options.objective == "energy" else options.time_value)
 
 
 def cost_of(report: TrajectoryReport, rates: Rates) -> float:

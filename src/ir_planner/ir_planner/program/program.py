@@ -31,6 +31,7 @@ from ir_planner.program.station_graph import ACROSS
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.request import Context, Journal, Work
 from ir_planner.service import exit_searches
+from ir_planner.timing import at_the_mains
 
 _CHOOSING = 8_000  # work of a movement while configurations are chosen; more of it improves the chosen ones
 
@@ -106,7 +107,10 @@ def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]
     steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start())
     settings, bare = request.settings, request.options.load == NO_LOAD
     scenes = Scenes(cell, request.power, settings.braking_energy, bare)
-    return Route.over(steps, scenes), Context(scenes.of(cell.parts_at_start()), request.options, journal)
+    context = Context(scenes.of(cell.parts_at_start()), request.options, journal)
+    if request.cycle_time > 0.0 and request.options.objective == "energy":
+        context = at_the_mains(context)
+    return Route.over(steps, scenes), context
 
 
 def program_hash(movements: tuple[PlannedMovement, ...]) -> str:

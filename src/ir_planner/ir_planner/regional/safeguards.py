@@ -6,7 +6,7 @@ The movements of least W have few turns: some of them are faster than what the d
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,13 +14,15 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import Portfolio, Refinement
+from ir_planner.optimize import optimised_near as near
 from ir_planner.regional.exploration import Path, Searches, improve
-from ir_planner.request import Context
+from ir_planner.request import DURATION_MAX, Context
 from ir_planner.search import Ends
 from ir_planner.timing import DURATION_SLACK, Movement, baseline, straight_steps
 
 Answer = tuple[str, Movement]  # the search that found it
 _OPTIMISED_AGAIN = 2  # coarse solutions refined for another objective, and the best of them thoroughly
+_OTHER_DURATIONS, _DURATION_STEPS = (0.75, 1.33), 4  # factors tried on that of least joules, in so many steps
 _WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
 DIRECT = "direct"  # the search that finds straight segments
 
@@ -60,7 +62,29 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
     if options.duration > 0.0 or options.objective == "time":
         least, duration = _as_asked(_optimised_again(own, context.asking("movement_cost")), context)
         best, shortest = _cheaper(best, least), min(shortest, duration)
+    if options.objective == "energy" and options.duration <= 0.0 and best is not None:
+        best = best[0], _least_over_durations(best[1], context)
     return best, shortest
+
+
+def _least_over_durations(best: Movement, context: Context) -> Movement:
+    """The movement, or a faster or slower one near its path that takes less: joules depend so little on a
+    long duration that a descent ends far from the best one.
+    """
+    with context.journal.stage("other durations") as notes:
+        begin, steps = best, 0
+        for factor in _OTHER_DURATIONS:
+            while best is begin or steps < _DURATION_STEPS:
+                duration = factor * best.trajectory.duration
+                found = None if duration > DURATION_MAX else near(best, context.asking("energy", duration))
+                steps += 1
+                if found is None or found.cost >= best.cost:
+                    break
+                best = replace(found, context=context)
+            if best is not begin:
+                break
+        notes.append(f"{begin.trajectory.duration:.3f} s became {best.trajectory.duration:.3f} s")
+    return best
 
 
 def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Context) -> Answer | None:

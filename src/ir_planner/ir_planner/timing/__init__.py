@@ -8,6 +8,7 @@ from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.movement import Movement
 from ir_planner.timing.objective import (
     ObjectiveWeights,
+    at_the_mains,
     best_stretch,
     coarse_energy_cost,
     objective_value,
@@ -28,6 +29,7 @@ __all__ = [
     "StepLaws",
     "TimedPath",
     "at_best_duration",
+    "at_the_mains",
     "baseline",
     "best_stretch",
     "blended",

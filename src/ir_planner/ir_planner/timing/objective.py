@@ -1,10 +1,11 @@
 """What a movement is judged by, and the stretch of its duration that serves it best.
 
-movement_cost: W of eq. (9); time: T; energy: E at the mains; time_and_energy: J = E of the drives +
-time_value x T, without the base load of the controller, which is part of what a second is worth.
+movement_cost: W of eq. (9); time: T; energy: E_drive, what the drives take from the mains; time_and_energy:
+J = E_drive + time_value x T. What controller and tool always draw is in neither: it is part of what a second
+is worth.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from ir_planner.request import Context
 from ir_planner.scene import path_cost
 
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
+_SLOWER = np.array(
+    [*_FACTORS, 3.0, 4.0, 6.0, 9.0, 14.0]
+)  # where a second costs what holding costs, and no more
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported
 _FEWEST_STEPS, _MOST_STEPS = 100, 5000  # of a movement that is short, or lasts long
@@ -26,21 +30,34 @@ _TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
 _BESIDE = 5e-3  # weight of what breaks ties
 
 
+def drive_energy(report: TrajectoryReport) -> float:
+    """E_drive [J]: at the mains, without what controller and tool always draw."""
+    return report.energy - report.base_energy
+
+
 def objective_value(report: TrajectoryReport, objective: str, time_value: float) -> float:
     """What is minimised; ties between equal W are broken by time."""
     values = {
         "movement_cost": report.movement_cost * (1.0 + 1e-6 * report.duration),
         "time": report.duration,
-        "energy": report.energy,
-        "time_and_energy": report.energy - report.base_energy + time_value * report.duration,
+        "energy": drive_energy(report),
+        "time_and_energy": drive_energy(report) + time_value * report.duration,
     }
     return values[objective]
 
 
+def at_the_mains(context: Context) -> Context:
+    """The same request, free in its duration, for E_mains: a second costs what is always drawn."""
+    options = replace(
+        context.options, objective="time_and_energy", duration=0.0, time_value=context.scene.base_watts
+    )
+    return replace(context, options=options)
+
+
 def request_cost(report: TrajectoryReport, options: PlanOptions) -> float:
-    """What a request minimises: its objective, or joules where it asks for a duration."""
+    """What a request minimises: its objective, or E_drive where it asks for a duration."""
     if options.duration > 0.0:
-        return report.energy
+        return drive_energy(report)
     return objective_value(report, options.objective, options.time_value)
 
 
@@ -63,7 +80,7 @@ def objective_weights(context: Context, path: FloatArray) -> ObjectiveWeights:
     options, scene = context.options, context.scene
     still = np.zeros(len(scene.weights))
     if options.duration > 0.0 or options.objective == "energy":
-        return ObjectiveWeights(1.0, scene.base_watts, still, _DRIVES_WATTS + scene.base_watts)
+        return ObjectiveWeights(1.0, 0.0, still, _DRIVES_WATTS)
     if options.objective == "time":
         return ObjectiveWeights(_BESIDE, _TIME_WATTS, still, _TIME_WATTS)
     if options.objective == "movement_cost":  # in watts for a path of a second
@@ -78,18 +95,23 @@ def coarse_step(trajectory: JointTrajectory) -> float:
 
 
 def coarse_energy_cost(trajectory: JointTrajectory, context: Context) -> float:
-    """J of a trajectory as it is, or its joules where the objective is not J; sampled coarsely."""
-    energy = movement_energy(trajectory, context.scene, coarse_step(trajectory))
+    """J of a trajectory as it is, or E_drive where the objective is not J; sampled coarsely."""
+    joules = _coarse_drives(trajectory, context)
     if context.options.objective == "time_and_energy":
-        return energy.total - energy.base + context.options.time_value * trajectory.duration
-    return energy.total
+        return joules + context.options.time_value * trajectory.duration
+    return joules
+
+
+def _coarse_drives(trajectory: JointTrajectory, context: Context) -> float:
+    energy = movement_energy(trajectory, context.scene, coarse_step(trajectory))
+    return energy.total - energy.base
 
 
 def coarse_cost(trajectory: JointTrajectory, context: Context) -> float:
     """What a request minimises, for comparisons: energies and path lengths are sampled coarsely."""
     weights = context.scene.weights
     if context.options.duration > 0.0:
-        return movement_energy(trajectory, context.scene, coarse_step(trajectory)).total
+        return _coarse_drives(trajectory, context)
     if context.options.objective == "time":
         return trajectory.duration
     if context.options.objective == "movement_cost":
@@ -102,17 +124,17 @@ def best_stretch(fastest: JointTrajectory, context: Context) -> float:
     """Factor >= 1 on the duration of the fastest movement that minimises the objective."""
     if context.options.objective in ("time", "movement_cost"):
         return 1.0
-
-    costs = _costs(fastest, _FACTORS, context)
+    factors = _SLOWER if context.options.objective == "energy" else _FACTORS
+    costs = _costs(fastest, factors, context)
     k = int(np.argmin(costs))
-    around = np.linspace(_FACTORS[max(k - 1, 0)], _FACTORS[min(k + 1, len(_FACTORS) - 1)], _REFINED + 2)[1:-1]
+    around = np.linspace(factors[max(k - 1, 0)], factors[min(k + 1, len(factors) - 1)], _REFINED + 2)[1:-1]
     refined = _costs(fastest, around, context)
     best = int(np.argmin(refined))
-    return float(around[best]) if refined[best] < costs[k] else float(_FACTORS[k])
+    return float(around[best]) if refined[best] < costs[k] else float(factors[k])
 
 
 def _costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> FloatArray:
-    """J, or joules where the objective is not J (F,), of a trajectory stretched by `factors` (F,); all of
+    """J, or E_drive where the objective is not J (F,), of a trajectory stretched by `factors` (F,); all of
     them from the same samples.
     """
     scene, begin = context.scene, float(fastest.times[0])
@@ -129,7 +151,6 @@ def _costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> F
         float(dc_bus(power, float(step), scene.dc_bus).mains.sum() * step)
         for power, step in zip(axes.reshape(len(factors), count, -1), steps, strict=True)
     ]
-    per_second = scene.base_watts
-    if context.options.objective == "time_and_energy":
-        per_second = context.options.time_value
+    options = context.options
+    per_second = options.time_value if options.objective == "time_and_energy" else 0.0
     return np.array(drives) + per_second * factors * span

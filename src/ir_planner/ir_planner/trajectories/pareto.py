@@ -1,7 +1,7 @@
 """Time against energy: certified movements between the fastest and the one of least energy at the mains.
 
-Each is optimised at a duration of its own, from its neighbour among others. Energy is that of the report,
-with the base load: beyond the duration at which it is least, slower costs more of both.
+Each is optimised at a duration of its own, from its neighbour among others. Energy is E_mains: beyond the
+duration at which it is least, slower costs more of both.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Descents
 from ir_planner.request import Context
-from ir_planner.timing import Movement
+from ir_planner.timing import Movement, at_the_mains
 
 COUNT = 8  # durations from the fastest to the slowest end
 _APART = (1.005, 0.98)  # factors on duration or energy by which neighbours of a thinned front differ
@@ -23,26 +23,27 @@ def pareto_front(known: list[Movement], context: Context) -> tuple[Movement, ...
     """
     points = list(known)
 
-    def descend(start: Movement, objective: str, duration: float = 0.0) -> Movement | None:
+    def descend(start: Movement, asked: Context) -> Movement | None:
         if context.work.exhausted:
             return None
-        rounds = 1 if duration > 0.0 else 3
+        rounds = 1 if asked.options.duration > 0.0 else 3
         try:
-            found = Descents(context.asking(objective, duration)).improved(start.trajectory, rounds=rounds)
+            found = Descents(asked).improved(start.trajectory, rounds=rounds)
         except RequestError:  # longer than a movement may be
             return None
         if found is not None:
             points.append(found)
         return found
 
-    for objective in ("energy", "time"):
-        descend(points[0], objective)
+    fastest = context.asking("time")
+    for asked in (at_the_mains(context), fastest):
+        descend(points[0], asked)
     ends = non_dominated(points)
     neighbour = ends[-1]
     between = np.geomspace(ends[0].report.duration, ends[-1].report.duration, COUNT)[1:-1]
     for duration in between[::-1] if len(ends) > 1 else ():  # slow movements lead to fast ones
-        neighbour = descend(neighbour, "energy", float(duration)) or neighbour
-    descend(neighbour, "time")
+        neighbour = descend(neighbour, context.asking("energy", float(duration))) or neighbour
+    descend(neighbour, fastest)
     return non_dominated(points)
 
 
