@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ir_recorder import Analysis, analyse, findings, read_recording
+from ir_recorder.analysis.agreement import LEVEL, agreement, mean_of
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 
@@ -36,7 +37,25 @@ def test_energy_is_base_axes_brake_resistor_and_capacitor(analysis: Analysis) ->
 
 def test_motion_and_torque_give_the_same_energy_as_the_meter(analysis: Analysis) -> None:
     for result in analysis.movements:
-        assert result.indirect_energy == pytest.approx(result.energy, abs=110.0)  # the capacitor's charge
+        assert result.indirect_energy == pytest.approx(result.energy, abs=116.0)  # the capacitor holds 106 J
+
+
+def test_both_measurements_agree_where_the_robot_is_as_its_data_say(analysis: Analysis) -> None:
+    both = agreement(analysis)
+    assert len(both.movements) == 3
+    assert both.difference.low <= both.difference.value <= both.difference.high
+    assert abs(both.difference.value) < 0.02
+    assert "over 3 movements the indirect measurement is" in both.sentence
+    for row in both.movements:
+        assert row.from_torques == pytest.approx(row.direct, abs=116.0)
+        assert np.isnan(row.second_opinion) or row.second_opinion == pytest.approx(row.indirect, rel=1e-6)
+
+
+def test_the_interval_of_a_mean_covers_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(7)
+    intervals = [mean_of(rng.normal(0.1, 0.05, 8)) for _ in range(2000)]
+    inside = np.mean([each.low <= 0.1 <= each.high for each in intervals])
+    assert inside == pytest.approx(LEVEL, abs=0.02)  # three standard deviations of 2000 draws
 
 
 def test_a_recording_without_power_or_cell_gives_what_is_left(demo_file: Path) -> None:

@@ -26,7 +26,10 @@ KNOWS = {
     "listen": {"errors", "format"},
     "gather": {"format", "write"},
     "play": READING | {"arguments"},
-    "analysis": READING,
+    "traces": {"errors", "read"},
+    "measure": {"errors", "traces"},
+    "fit": {"analysis", "errors", "measure", "read", "report", "traces"},
+    "analysis": READING | {"measure", "traces"},
     "report": READING | {"analysis"},
     "report_main": READING | {"analysis", "arguments", "report"},
     "node": {

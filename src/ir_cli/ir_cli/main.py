@@ -27,6 +27,7 @@ COMMAND_MODULES = {
     "check": "ir_cli.offline.state_commands",
     "standby": "ir_cli.offline.standby_command",
     "evaluate": "ir_cli.offline.evaluate_command",
+    "energy": "ir_cli.offline.energy_command",
     "cell": "ir_cli.offline.cell_commands",
     "robot": "ir_cli.offline.robot_commands",
     "completion": "ir_cli.completion_command",
@@ -49,13 +50,26 @@ HELP = {
     "check": "whether a configuration is free, and its nearest pairs; needs no ROS",
     "standby": "the power mode of least energy for a pause; needs no ROS",
     "evaluate": "joules, limits and clearance of a trajectory in a file; needs no ROS",
+    "energy": "compare measurements, fit power parameters, plan what identifies them; needs no ROS",
     "cell": "check cell files, list the bundled cells",
     "robot": "list the bundled robots",
     "completion": "completion for bash: source <(ir completion)",
 }
 """What `ir --help` prints without importing any of the modules."""
 
-WITHOUT_ROS = ("report", "plan", "move", "ik", "check", "standby", "evaluate", "cell", "robot", "completion")
+WITHOUT_ROS = (
+    "report",
+    "plan",
+    "move",
+    "ik",
+    "check",
+    "standby",
+    "evaluate",
+    "energy",
+    "cell",
+    "robot",
+    "completion",
+)
 """Commands that need no middleware, whatever its environment is."""
 
 MISUSED = 2

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, load_power_data
+from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, data_sheet, load_power_data
 from ir_kernels import KernelError
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES
@@ -139,6 +139,8 @@ class _Analyser:
             dissipated_energy=meter.dissipated(start, end) if meter else NAN,
             peak_power=meter.peak(start, end) if meter else NAN,
             indirect_energy=indirect.energy(start, end, loads) if indirect and moved else NAN,
+            second_opinion=indirect.second_opinion(start, end, loads) if indirect and moved else NAN,
+            torque_energy=indirect.from_torques(start, end, loads) if indirect and moved else NAN,
             stored_energy=meter.stored(start, self.data.dc_link) if meter else NAN,
             motors_power=self._resting(MOTORS, step, cell),
             tool_deviation=self._deviation(step),
@@ -148,7 +150,9 @@ class _Analyser:
     def _indirect(self, cell: Cell | None) -> IndirectMeter | None:
         if self.recording.joints is None or cell is None:
             return None
-        return IndirectMeter(self.recording.joints, cell.robot, self.data)
+        parameters = data_sheet(cell.robot.name, self.data.name)
+        link = self.data.dc_link
+        return IndirectMeter(self.recording.joints, cell.robot, cell.base_pose, link, parameters)
 
     def _clearances(
         self, steps: Sequence[ExecutedStep], cell: Cell | None

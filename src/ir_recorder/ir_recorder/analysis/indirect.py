@@ -1,39 +1,90 @@
-"""Indirect measurement (section VI of the paper): mains energy rebuilt from recorded motion and torque.
+"""Indirect measurement (section VI of the paper): mains energy rebuilt from what the robot did.
 
-Axis power from joint speed and motor torque, one DC bus for all axes, and the base load that mode and tool
-have by the data: what can be measured without a power meter.
+From recorded positions alone: differentiated, torques of the bodies, losses and DC link by code that planner
+and plant know nothing of (`ir_recorder.measure`). From recorded torques: their power instead of the bodies'.
+Both use the power parameters that they are given, by default the data sheet's.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ir_description import Load, PowerData, RobotModel
-from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
+from ir_description import Load, PowerParameters, RobotModel
+from ir_description.robot import DcLink
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_recorder.errors import RecorderError
+from ir_recorder.measure.bus import bus_flow
+from ir_recorder.measure.on_one_grid import samples_of
+from ir_recorder.measure.power_model import PowerModel
+from ir_recorder.measure.second_opinion import available, pinocchio_torques
 from ir_recorder.read.recording import JointSeries
+from ir_recorder.traces.trace import Trace
 
-MOTORS_ON = "STAND_ON_MOTORS"
+_AROUND = 0.5  # s of the recording beside a movement that the filter may look at
+NAN = float("nan")
 
 
 class IndirectMeter:
-    """Mains energy of stretches in which the motors are on."""
+    """Mains energy of stretches in which the motors are on; base_pose (4, 4) of the robot in the cell."""
 
-    def __init__(self, joints: JointSeries, robot: RobotModel, power: PowerData) -> None:
-        self._joints = joints
-        self._model = DynamicsModel(robot)
-        self._bus = DcBusParameters(power.dc_link_capacity_energy)
-        self._controller = power.mode(MOTORS_ON).controller_watts + power.drives_and_brake_release
+    def __init__(
+        self,
+        joints: JointSeries,
+        robot: RobotModel,
+        base_pose: FloatArray,
+        link: DcLink,
+        parameters: PowerParameters,
+    ) -> None:
+        self._joints, self._robot, self._link = joints, robot, link
+        self._parameters = parameters
+        self._model = PowerModel(robot, link, base_pose, parameters)
+        self._second = PowerModel(robot, link, base_pose, parameters, pinocchio_torques)
 
     def energy(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
-        """J between two times [s] with these loads; NaN where speed or torque wasn't recorded."""
+        """J between two times [s] with these loads, from positions alone; NaN where they are missing."""
+        return self._by(self._model, start, end, loads)
+
+    def second_opinion(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
+        """The same with torques by Pinocchio; NaN where it isn't installed."""
+        return self._by(self._second, start, end, loads) if available() else NAN
+
+    def _by(self, model: PowerModel, start: float, end: float, loads: tuple[Load, ...]) -> float:
         joints = self._joints
+        rows = (joints.time >= start - _AROUND) & (joints.time <= end + _AROUND)
+        if np.count_nonzero(rows) < 2 or joints.position.shape[1] != self._robot.n:
+            return NAN
+        try:
+            samples = samples_of(
+                Trace("joint states", joints.time[rows].copy(), self._columns(rows)),
+                None,
+                self._robot.joint_names,
+                self._parameters.modes,
+                [(-np.inf, np.inf, loads)],
+            ).part(start, end)
+        except RecorderError:  # too short, or not the robot's joints
+            return NAN
+        if not len(samples) or not samples.known.all():
+            return NAN
+        watts = model.watts(self._parameters.mean, model.prepare(samples))
+        return float(watts.mean() * (end - start))
+
+    def _columns(self, rows: BoolArray) -> dict[str, FloatArray]:
+        positions = self._joints.position[rows]
+        return {name: positions[:, k].copy() for k, name in enumerate(self._joints.names)}
+
+    def from_torques(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
+        """The same from recorded speed and torque; NaN where they weren't recorded."""
+        joints, of = self._joints, self._parameters.axis
         inside = (joints.time >= start - 1e-9) & (joints.time < end - 1e-9)
         speed, torque, time = joints.velocity[inside], joints.effort[inside], joints.time[inside]
-        if len(time) < 2 or speed.shape[1] != self._model.n or not np.isfinite([speed, torque]).all():
-            return float("nan")
-        steps = np.diff(time, append=end)
-        if (steps <= 0.0).any():
-            return float("nan")
-        bus = dc_bus(self._model.axis_power(speed, torque), steps, self._bus)
-        base = self._controller + sum(load.watts_always + load.watts_drive_bus for load in loads)
-        return float(steps @ bus.mains + base * (end - start))
+        if len(time) < 2 or speed.shape[1] != self._robot.n or not np.isfinite([speed, torque]).all():
+            return NAN
+        step = float((end - start) / len(time))
+        motor = torque / self._robot.gear_ratio
+        axes = torque * speed + of("copper") * motor**2 + of("inverter") * np.abs(motor)
+        flow = bus_flow(self._link, (axes + of("iron") * speed**2).sum(axis=1), step)
+        value = self._parameters.value
+        base = value("watts.STAND_ON_MOTORS") + value("drives_watts")
+        tool = sum(load.watts_always + load.watts_drive_bus for load in loads)
+        bus = flow.watts.mean() / value("rectifier_efficiency")
+        return float((bus + base + value("tool_watts") * tool) * (end - start))

@@ -23,7 +23,9 @@ class StepResult:
     """A step with what it took, measured at the mains meter.
 
     energy, base_energy, dissipated_energy [J]; joint_energy (n,) [J] at the DC bus; peak_power [W];
-    indirect_energy [J]: from recorded motion and torque; stored_energy [J]: in the capacitors at the
+    indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and torque;
+    second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
+    stored_energy [J]: in the capacitors at the
     start; motors_power [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
     commanded and simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
     """
@@ -35,6 +37,8 @@ class StepResult:
     dissipated_energy: float
     peak_power: float
     indirect_energy: float
+    torque_energy: float
+    second_opinion: float
     stored_energy: float
     motors_power: float
     tool_deviation: float

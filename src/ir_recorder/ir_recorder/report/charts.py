@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from ir_recorder.analysis import Analysis
+from ir_recorder.analysis.agreement import agreement
 from ir_recorder.report.bars import joule_bars
 from ir_recorder.report.savings import savings_section
 from ir_recorder.report.tables import (
     fact_table,
+    measurement_table,
     mode_table,
     problem_list,
     resting_table,
@@ -31,6 +33,7 @@ CHARTS: Mapping[str, Chart] = {
     "stations": station_table,
     "modes": mode_table,
     "resting": resting_table,
+    "measurements": lambda analysis: measurement_table(agreement(analysis)),
     "warnings": warning_table,
     "facts": fact_table,
 }

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from ir_recorder.analysis import Analysis, Finding, Verdict
+from ir_recorder.analysis.agreement import Agreement
 from ir_recorder.analysis.findings import row_name
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.report.words import (
@@ -53,12 +54,36 @@ def _step(result: StepResult) -> tuple[str, ...]:
         text(step.movement.load or DASH),
         f"{result.seconds:.2f} s",
         joules(plan) if plan else DASH,
-        joules(result.energy) + _small("from joint states", joules(result.indirect_energy)),
+        joules(result.energy) + _small("from positions", joules(result.indirect_energy)),
         percent(result.energy / plan - 1.0) if plan else DASH,
         watts(result.mean_power) + _small("peak", watts(result.peak_power)),
         f"{millimetres(near.least)}<small>{text(near.least_pair)}</small>" if near else DASH,
         millimetres(result.tool_deviation),
     )
+
+
+def measurement_table(both: Agreement) -> str:
+    """Every movement by the meter, from positions, from torques and by Pinocchio."""
+    rows = [
+        (
+            text(row.label),
+            joules(row.direct),
+            joules(row.indirect),
+            percent(row.difference),
+            joules(row.from_torques),
+            joules(row.second_opinion) if math.isfinite(row.second_opinion) else "not available",
+        )
+        for row in both.movements
+    ]
+    heads = (
+        "movement",
+        ">meter",
+        ">from positions",
+        ">difference",
+        ">from torques",
+        ">by Pinocchio's torques",
+    )
+    return table(heads, rows) + f"<p>{text(both.sentence)}.</p>"
 
 
 def station_table(analysis: Analysis) -> str:

@@ -1,0 +1,141 @@
+"""Torques of a moving arm, one rigid body after another: what each of them asks of every joint before it.
+
+Velocities and accelerations go outwards from the base; the force and moment that a body needs are projected
+onto the axes (Kane's method). Nothing here is shared with planner, driver or kernels: this is what their
+torques are compared with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_description import Load, RobotModel
+from ir_msgs_py.arrays import FloatArray
+
+GRAVITY = 9.80665  # m/s^2, standard
+
+
+@dataclass(frozen=True, eq=False)
+class ArmTorques:
+    """What moves the bodies, each (N, n) Nm at the joints: links, loads, rotors, and the counterbalance,
+    which helps.
+    """
+
+    links: FloatArray
+    loads: FloatArray
+    rotors: FloatArray
+    counterbalance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """A link: turn (N, 3, 3), place (N, 3), angular speed and acceleration (N, 3), and the acceleration of
+    its origin (N, 3), gravity as an acceleration upwards included.
+    """
+
+    turn: FloatArray
+    place: FloatArray
+    spin: FloatArray
+    spin_rate: FloatArray
+    push: FloatArray
+
+
+def arm_torques(
+    robot: RobotModel,
+    loads: Sequence[Load],
+    base_pose: FloatArray,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+) -> ArmTorques:
+    """Torques at q, qd, qdd (N, n) of the robot with loads, mounted at base_pose (4, 4)."""
+    N, n = q.shape
+    axes, places = np.empty((n, N, 3)), np.empty((n, N, 3))
+    links, held = np.zeros((N, n)), np.zeros((N, n))
+    frame = _base(N, np.asarray(base_pose))
+    for i in range(n):
+        frame, axes[i] = _next(frame, robot, i, q[:, i], qd[:, i], qdd[:, i])
+        places[i] = frame.place
+        link = (float(robot.link_mass[i + 1]), robot.link_com[i + 1], robot.link_inertia[i + 1])
+        _project(links, frame, axes[: i + 1], places[: i + 1], *link)
+    for load in loads:
+        _project(held, frame, axes, places, load.mass, load.com, load.inertia)
+    return ArmTorques(links, held, qdd * robot.reflected_inertia, spring_torque(robot, q))
+
+
+def _base(N: int, pose: FloatArray) -> _Frame:
+    none = np.zeros((N, 3))
+    up = np.broadcast_to([0.0, 0.0, GRAVITY], (N, 3))
+    turn = np.broadcast_to(pose[:3, :3], (N, 3, 3))
+    return _Frame(turn, np.broadcast_to(pose[:3, 3], (N, 3)), none, none, up)
+
+
+def _next(
+    before: _Frame, robot: RobotModel, i: int, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> tuple[_Frame, FloatArray]:
+    """The link after joint i, and the joint's axis (N, 3) in the world."""
+    origin, axis = robot.joint_origin[i], robot.joint_axis[i]
+    arm = before.turn @ origin[:3, 3]
+    still = before.turn @ origin[:3, :3]
+    turn = still @ _turned(axis, q)
+    world = turn @ axis
+    spin = before.spin + qd[:, None] * world
+    rate = before.spin_rate + qdd[:, None] * world + np.cross(before.spin, qd[:, None] * world)
+    push = before.push + _carried(before.spin, before.spin_rate, arm)
+    return _Frame(turn, before.place + arm, spin, rate, push), world
+
+
+def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:
+    """Turns (N, 3, 3) by angles (N,) about an axis (3,)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sin, cos = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.asarray(np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross))
+
+
+def _carried(spin: FloatArray, rate: FloatArray, arm: FloatArray) -> FloatArray:
+    """Acceleration (N, 3) at the end of an arm (N, 3) that turns, relative to its foot."""
+    return np.asarray(np.cross(rate, arm) + np.cross(spin, np.cross(spin, arm)))
+
+
+def _project(
+    torque: FloatArray,
+    frame: _Frame,
+    axes: FloatArray,
+    places: FloatArray,
+    mass: float,
+    com: FloatArray,
+    inertia: FloatArray,
+) -> None:
+    """Add what a body of the frame asks of the joints 0..len(axes) to torque (N, n)."""
+    arm = frame.turn @ com
+    force = mass * (frame.push + _carried(frame.spin, frame.spin_rate, arm))
+    world = frame.turn @ inertia @ frame.turn.transpose(0, 2, 1)
+    momentum = (world @ frame.spin[:, :, None])[:, :, 0]
+    moment = (world @ frame.spin_rate[:, :, None])[:, :, 0] + np.cross(frame.spin, momentum)
+    centre = frame.place + arm
+    for j, (axis, place) in enumerate(zip(axes, places, strict=True)):
+        torque[:, j] += ((np.cross(centre - place, force) + moment) * axis).sum(axis=1)
+
+
+def spring_torque(robot: RobotModel, q: FloatArray) -> FloatArray:
+    """What the gas spring does about the joints' axes (N, n) Nm: the slope of its energy over the angle.
+
+    By the principle of virtual work: force times the change of the rod's length per radian.
+    """
+    torque, spring = np.zeros_like(q), robot.counterbalance
+    if spring is None:
+        return torque
+    eye, pivot = spring.rod_eye, spring.pivot
+    angle = q[:, spring.joint]
+    x = eye[0] * np.cos(angle) + eye[1] * np.sin(angle)
+    z = eye[1] * np.cos(angle) - eye[0] * np.sin(angle)
+    length = np.hypot(x - pivot[0], z - pivot[1])
+    lengthening = (z * (x - pivot[0]) - x * (z - pivot[1])) / length  # m per rad
+    stroke = spring.piston_area * (length - spring.rod_length_at_charge)
+    pressure = spring.charge_pressure * (1.0 - stroke / spring.gas_volume) ** -spring.exponent
+    torque[:, spring.joint] = -spring.piston_area * pressure * lengthening
+    return torque

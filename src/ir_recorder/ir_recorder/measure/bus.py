@@ -1,0 +1,57 @@
+"""The DC link as a tank of joules: a rectifier that only fills, a chopper with hysteresis that empties.
+
+The charge above the rectified mains is what the capacitors hold; at its upper switching voltage the chopper
+empties them down to the lower one. With the watts, their derivatives go through the same steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_description.robot import DcLink
+from ir_msgs_py.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class BusFlow:
+    """Watts (N,) that the rectifier gives, their derivatives (N, P), and joules (N,) held after each step."""
+
+    watts: FloatArray
+    slopes: FloatArray
+    charge: FloatArray
+
+
+def bus_flow(
+    link: DcLink, wanted: FloatArray, step: float, slopes: FloatArray | None = None, charge: float = 0.0
+) -> BusFlow:
+    """Run the link over N steps of `step` [s] in which the axes together want `wanted` (N,) W.
+
+    slopes (N, P): derivatives of `wanted` by parameters. charge [J]: at the start.
+    """
+    top = _joules(link, link.chopper_on)
+    emptied = _joules(link, link.chopper_off)
+    tangents = np.zeros((len(wanted), 0)) if slopes is None else slopes
+    given, given_slopes = np.zeros(len(wanted)), np.zeros_like(tangents)
+    held, held_slope = np.empty(len(wanted)), np.zeros(tangents.shape[1])
+    free = False  # whether held_slope is anything but zero
+    for k, joules in enumerate((wanted * step).tolist()):
+        rest = charge - joules
+        if rest < 0.0:
+            given[k], charge = -rest / step, 0.0
+            given_slopes[k] = tangents[k] - held_slope / step if free else tangents[k]
+            free = False
+        elif rest > top:
+            charge, free = emptied, False
+        else:
+            charge = rest
+            held_slope = (held_slope if free else 0.0) - tangents[k] * step
+            free = True
+        held[k] = charge
+    return BusFlow(given, given_slopes, held)
+
+
+def _joules(link: DcLink, volts: float) -> float:
+    """Above what the rectified mains keep in the capacitors."""
+    return 0.5 * link.capacitance * (volts**2 - link.voltage**2)

@@ -1,0 +1,137 @@
+"""Watts at the mains that motion asks for, and how they change with every power parameter.
+
+Per axis: torque times speed, copper loss of the motor torque squared, inverter loss of its magnitude, iron
+loss of the speed squared; friction viscous, Coulomb, and a share of the torque through the gear. The axes
+share the DC link; the rectifier's efficiency and the standing watts come on top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_description import PowerParameters, RobotModel
+from ir_description.robot import DcLink
+from ir_msgs_py.arrays import FloatArray
+from ir_recorder.errors import FitError
+from ir_recorder.measure.arm import ArmTorques, arm_torques
+from ir_recorder.measure.bus import bus_flow
+from ir_recorder.measure.samples import Samples
+
+STILL = 1e-3  # rad/s over which friction changes its sign
+_BUS_UP = ("STAND_ON_MOTORS", "STAND_ON_BRAKES")  # modes in which the drive bus feeds the tool
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Samples with the torques of their bodies; tool_watts (M,) W of the tool by its declaration."""
+
+    samples: Samples
+    torques: ArmTorques
+    tool_watts: FloatArray
+
+
+class PowerModel:
+    """Watts of one robot; `layout` names the parameters, the vectors of which the methods take; `bodies`
+    computes torques as `arm_torques` does at q, qd, qdd (N, n).
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        link: DcLink,
+        base_pose: FloatArray,
+        layout: PowerParameters,
+        bodies: Callable[..., ArmTorques] = arm_torques,
+    ) -> None:
+        if layout.robot != robot.name or layout.joints != robot.joint_names:
+            raise FitError(f"power parameters are of {layout.robot}, the robot is {robot.name}")
+        self._robot, self._link, self._pose, self.layout = robot, link, base_pose, layout
+        self._bodies = bodies
+        self._ratio = np.array(robot.gear_ratio)
+
+    def prepare(self, samples: Samples) -> Prepared:
+        """Torques of the bodies at every sample; where the motion is unknown the robot counts as at rest."""
+        known = samples.known[:, None]
+        q, qd, qdd = (np.where(known, each, 0.0) for each in (samples.q, samples.qd, samples.qdd))
+        q = np.where(known, q, self._robot.machine_home)
+        parts = [np.zeros((len(samples), self._robot.n)) for _ in range(4)]
+        watts = np.zeros(len(samples))
+        bus_up = np.isin(samples.mode, [k for k, mode in enumerate(self.layout.modes) if mode in _BUS_UP])
+        for k in np.unique(samples.load):
+            rows, loads = samples.load == k, samples.loads[k] if k >= 0 else ()
+            own = self._bodies(self._robot, loads, self._pose, q[rows], qd[rows], qdd[rows])
+            for part, each in zip(parts, (own.links, own.loads, own.rotors, own.counterbalance), strict=True):
+                part[rows] = each
+            watts[rows] = sum(load.watts_always for load in loads)
+            watts[rows & bus_up] += sum(load.watts_drive_bus for load in loads)
+        return Prepared(samples, ArmTorques(*parts), watts)
+
+    def watts(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
+        """Predicted W (M,) at the mains for parameters `mean` (P,)."""
+        wanted = self._wanted(mean, prepared, None)
+        flow = bus_flow(self._link, wanted, prepared.samples.step)
+        return self._base(mean, prepared) + flow.watts / self._one(mean, "rectifier_efficiency")
+
+    def watts_and_slopes(self, mean: FloatArray, prepared: Prepared) -> tuple[FloatArray, FloatArray]:
+        """The same with derivatives (M, P) by all parameters."""
+        slopes = np.zeros((len(prepared.samples), len(mean)))
+        wanted = self._wanted(mean, prepared, slopes)
+        flow = bus_flow(self._link, wanted, prepared.samples.step, slopes)
+        efficiency = self._one(mean, "rectifier_efficiency")
+        result = flow.slopes / efficiency
+        result[:, self.layout.index("rectifier_efficiency")] = -flow.watts / efficiency**2
+        samples = prepared.samples
+        for k, mode in enumerate(self.layout.modes):
+            result[:, self.layout.index(f"watts.{mode}")] = samples.mode == k
+        result[:, self.layout.index("drives_watts")] = samples.motors
+        result[:, self.layout.index("tool_watts")] = prepared.tool_watts
+        return self._base(mean, prepared) + flow.watts / efficiency, result
+
+    def _one(self, mean: FloatArray, name: str) -> float:
+        return float(mean[self.layout.index(name)])
+
+    def _base(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
+        samples = prepared.samples
+        modes = np.array([self._one(mean, f"watts.{mode}") for mode in self.layout.modes])
+        watts = np.where(samples.mode >= 0, modes[samples.mode], 0.0)
+        watts += self._one(mean, "drives_watts") * samples.motors
+        return np.asarray(watts + self._one(mean, "tool_watts") * prepared.tool_watts)
+
+    def _wanted(self, mean: FloatArray, prepared: Prepared, slopes: FloatArray | None) -> FloatArray:
+        """W (M,) that the axes together take from the link; fills `slopes` (M, P) where given."""
+        of = self.layout.places
+        viscous, coulomb, copper, iron, inverter, gear = (
+            mean[of(term)] for term in ("viscous", "coulomb", "copper", "iron", "inverter", "gear")
+        )
+        arm, qd = prepared.torques, np.where(prepared.samples.known[:, None], prepared.samples.qd, 0.0)
+        on = prepared.samples.motors[:, None]
+        through = (
+            self._one(mean, "link_mass") * arm.links
+            + self._one(mean, "load_mass") * arm.loads
+            + self._one(mean, "rotor_inertia") * arm.rotors
+            - self._one(mean, "counterbalance") * arm.counterbalance
+        )
+        side = np.tanh(qd / STILL)
+        torque = through + viscous * qd + (coulomb + gear * np.abs(through)) * side
+        motor = torque / self._ratio
+        axes = torque * qd + copper * motor**2 + inverter * np.abs(motor) + iron * qd**2
+        if slopes is not None:
+            by_torque = on * (qd + (2.0 * copper * motor + inverter * np.sign(motor)) / self._ratio)
+            slopes[:, of("viscous")] = by_torque * qd
+            slopes[:, of("coulomb")] = by_torque * side
+            slopes[:, of("gear")] = by_torque * np.abs(through) * side
+            slopes[:, of("copper")] = on * motor**2
+            slopes[:, of("inverter")] = on * np.abs(motor)
+            slopes[:, of("iron")] = on * qd**2
+            by_body = by_torque * (1.0 + gear * np.sign(through) * side)
+            for name, body in (
+                ("link_mass", arm.links),
+                ("load_mass", arm.loads),
+                ("rotor_inertia", arm.rotors),
+                ("counterbalance", -arm.counterbalance),
+            ):
+                slopes[:, self.layout.index(name)] = (by_body * body).sum(axis=1)
+        return np.asarray((on * axes).sum(axis=1))
