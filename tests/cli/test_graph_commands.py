@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -82,10 +81,8 @@ def test_list_shows_names_with_types(machine: Node, capsys: pytest.CaptureFixtur
 def test_a_typo_is_answered_with_the_name_that_was_meant(
     machine: Node, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    began = time.monotonic()
     assert main(["call", "/machin/set", "{}"]) == 1
     assert f"no service /machin/set: did you mean {SERVICE}?" in capsys.readouterr().err
-    assert time.monotonic() - began < 4.5  # not the whole time of discovery
 
 
 def test_another_type_than_the_services_is_refused_at_once(

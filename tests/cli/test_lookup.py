@@ -2,15 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
+from ir_cli import lookup
 from ir_cli.errors import CommandError
-from ir_cli.lookup import checked_type, type_of
+from ir_cli.lookup import DISCOVERY_SECONDS, SETTLED_SECONDS, checked_type, settled, type_of
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Callable[[], float]:
+    """The time that `lookup` sees [s]: it passes while it sleeps."""
+    now = [0.0]
+
+    def sleep(seconds: float) -> None:
+        now[0] += seconds
+
+    monkeypatch.setattr(lookup.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(lookup.time, "sleep", sleep)
+    return lambda: now[0]
 
 
 def test_a_name_that_comes_late_is_found() -> None:
     graphs = iter([{}, {"/a": "x/srv/A"}, {"/a": "x/srv/A", "/b": "x/srv/B"}])
     assert type_of(lambda: next(graphs), "/b", "service") == "x/srv/B"
+
+
+def test_a_typo_is_answered_when_the_graph_has_settled(clock: Callable[[], float]) -> None:
+    with pytest.raises(CommandError, match=r"did you mean /machine\?"):
+        type_of(lambda: {"/machine": "x/srv/A"}, "/machin", "service")
+    assert SETTLED_SECONDS < clock() < SETTLED_SECONDS + 0.1
+    with pytest.raises(CommandError, match="no service /other"):
+        type_of(lambda: {"/machine": "x/srv/A"}, "/other", "service")
+    assert clock() > SETTLED_SECONDS + DISCOVERY_SECONDS
+
+
+def test_a_graph_has_settled_when_it_has_not_grown_for_a_second(clock: Callable[[], float]) -> None:
+    seen = {"/late": "x/srv/B"}
+    assert settled(lambda: seen if clock() > 0.9 else {}) == seen
+    assert 0.9 + SETTLED_SECONDS < clock() < 1.0 + SETTLED_SECONDS
+    begin = clock()
+    assert settled(lambda: {f"/{clock()}": "x/srv/B"})
+    assert DISCOVERY_SECONDS <= clock() - begin < DISCOVERY_SECONDS + 0.1
 
 
 def test_an_empty_graph_hints_at_the_domain(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ def write_module(folder: Path, name: str, body: str) -> dict[str, str]:
 
 
 def wait_for(path: Path, text: str) -> None:
-    for _ in range(400):
+    for _ in range(2400):
         if path.exists() and text in path.read_text():
             return
         threading.Event().wait(0.025)
@@ -26,7 +26,7 @@ def wait_for(path: Path, text: str) -> None:
 
 
 def check_until_it_raises(nodes: NodeProcesses) -> None:
-    for _ in range(400):
+    for _ in range(2400):
         nodes.check()
         threading.Event().wait(0.025)
 

@@ -29,9 +29,9 @@ def driver(make):
 
 
 def wait_for_start(driver, ticket):
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while driver.following(ticket) is None:
-        assert time.monotonic() < deadline, "the goal has not started within 10 s"
+        assert time.monotonic() < deadline, "the goal has not started within 60 s"
         time.sleep(0.001)
 
 
@@ -96,7 +96,7 @@ def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
         done.set()
 
     driver.submit(2, refuse, ended)
-    assert done.wait(10.0)
+    assert done.wait(60.0)
     assert (heard[0].goal_id, heard[0].code, heard[0].sentence) == (
         NO_GOAL,
         ErrorCode.INVALID_JOINTS,
@@ -108,7 +108,7 @@ def test_a_flood_of_goals_is_bounded(driver):
     release, answers = threading.Event(), []
 
     def slow():
-        release.wait(10.0)
+        release.wait(60.0)
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
     for _ in range(QUEUE_MAX + 20):
@@ -130,11 +130,11 @@ def test_a_check_does_not_hold_up_the_plant(driver):
 
     def slow():
         blocking.set()
-        release.wait(10.0)
+        release.wait(60.0)
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
     driver.submit(2, slow, lambda outcome: None)
-    assert blocking.wait(10.0)
+    assert blocking.wait(60.0)
     assert len(frames(driver, 100)) == 100
     release.set()
 

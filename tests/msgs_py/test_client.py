@@ -80,7 +80,7 @@ def cell(ros_context, ros_executor):
 
 @pytest.fixture
 def client(cell, ros_context):
-    with Client(context=ros_context, timeout=5.0) as client:
+    with Client(context=ros_context, timeout=60.0) as client:
         yield client
 
 
@@ -90,7 +90,7 @@ class TestOnAContextOfItsOwn:
         return "LOCALHOST"  # two contexts are two participants: without discovery they never meet
 
     def test_the_cell_is_found(self, cell, ros_domain_id):
-        with Client(domain_id=ros_domain_id) as client:
+        with Client(domain_id=ros_domain_id, timeout=60.0) as client:
             assert client.set_cell("demo") == ("lathe", "table")
 
 
@@ -121,7 +121,7 @@ def test_a_service_that_does_not_answer_is_named(client, cell, ros_executor):
     heard = threading.Event()
 
     def stay_silent(request, response):
-        heard.wait(5.0)
+        heard.wait(60.0)
         return response
 
     ros_executor.run(lambda: cell.create_service(SetCell, "silent", stay_silent))

@@ -5,18 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 import threading
-import time
 
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.types import interface_type
 from ir_msgs_py.ros.yaml_messages import message_from_yaml, message_to_yaml
 
-from .lookup import absolute, checked_type, type_of
+from .lookup import absolute, checked_type, settled, type_of
 from .terminal import SHOWN_ELEMENTS
 from .words import type_and_text
-
-LISTING_SECONDS = 1.0
-"""Wait before a list is printed, so that discovery is complete."""
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -71,10 +67,9 @@ def run_echo(arguments: argparse.Namespace) -> int:
 
 
 def run_list(arguments: argparse.Namespace) -> int:
-    """Print names and types of what is there after a moment of discovery."""
+    """Print names and types of what is there when discovery shows no more."""
     with Client(node_name="ir_list") as client:
-        time.sleep(LISTING_SECONDS)
-        found = getattr(client.graph, arguments.kind)()
+        found = settled(getattr(client.graph, arguments.kind))
     for name, kind in sorted(found.items()):
         sys.stdout.write(f"{name} [{kind}]\n")
     return 0

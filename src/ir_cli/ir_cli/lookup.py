@@ -39,6 +39,18 @@ def type_of(
     return known[name]
 
 
+def settled(look: Callable[[], Mapping[str, str]]) -> dict[str, str]:
+    """Names with their types once the graph has not grown for a moment, or changes without end."""
+    began = grown = time.monotonic()
+    known = dict(look())
+    while (now := time.monotonic()) - grown < SETTLED_SECONDS and now - began < DISCOVERY_SECONDS:
+        time.sleep(POLL_SECONDS)
+        found = dict(look())
+        if found != known:
+            known, grown = found, time.monotonic()
+    return known
+
+
 def checked_type(typed: str, found: str, name: str, kind: str) -> str:
     """The type that was typed, where it is that of the name; CommandError at once where it is another."""
     short = "/".join(part for k, part in enumerate(found.split("/")) if k != 1)

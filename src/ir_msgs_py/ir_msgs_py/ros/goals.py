@@ -50,6 +50,7 @@ class GoalSender:
         result: Future = self._executor.run(handle.get_result_async)
         try:
             if self._executor.wait(result, result_timeout):
+                self._executor.run(_nothing)  # feedback that came with the result is called back after it
                 return result.result().result
         except BaseException:  # Ctrl-C in a script must not leave the robot moving
             self._cancel(handle, result, cancel_grace)
@@ -72,3 +73,7 @@ class GoalSender:
         if key not in self._clients:
             self._clients[key] = ActionClient(self._node, action_type, action, **ACTION_SERVICES)
         return self._clients[key]
+
+
+def _nothing() -> None:
+    """A turn of the spinning thread."""
