@@ -164,6 +164,7 @@ def test_where_pushing_fails_a_path_around_is_found_and_noted(scene_of: SceneOf)
     plan = optimized(quintic(ends, 6.0, scene), scene, replace(OPTIONS, max_iterations=400_000))
     assert plan.status.ok, plan.status.message
     check_movement(plan.trajectory, ends, scene)
+    assert plan.info.timing == "synchronous"
     assert "new paths" in next(stage for stage in plan.info.stages if stage.name == "repair").note
 
 

@@ -50,6 +50,12 @@ def demo(demo_cell: Cell, power: PowerData) -> ProgramPlan:
     return plan
 
 
+def test_an_answer_names_its_timing(demo: ProgramPlan, demo_cell: Cell, power: PowerData) -> None:
+    assert demo.info.timing == "synchronous"
+    own = planned(demo_cell, power, "home", "park", "home", timing="asynchronous", planner_id="direct")
+    assert own.info.timing == "asynchronous"
+
+
 def test_every_movement_is_certified_and_costs_joules(demo: ProgramPlan) -> None:
     moves = [movement for movement in demo.movements if not movement.is_pause]
     assert len(moves) > 10

@@ -150,6 +150,7 @@ def test_candidates_are_certified_distinct_and_ranked(
     assert plan.status.ok, plan.status.message
     times = [candidate.report.duration for candidate in plan.candidates]
     assert times == sorted(times)
+    assert plan.info.timing == "synchronous"
     for candidate in plan.candidates:
         trajectory = candidate.trajectory
         assert trajectory is not None

@@ -44,7 +44,8 @@ class Choice:
     def found(self, progress: Progress) -> dict[Part, Movement]:
         """The movements of all parts. Raises StageError where one of them isn't found."""
         movements, result = self.movements, dict[Part, Movement]()
-        with movements.context.journal.stage("movements") as notes:
+        journal = movements.context.journal
+        with journal.stage("movements") as notes:
             for hop, parts in enumerate(parts_of(self.chain, movements)):
                 progress("movements", hop, len(movements.route), self.chain.cost)
                 for part, found in zip(parts, movements.plan(parts, self.ladder.improvement), strict=True):
@@ -52,6 +53,8 @@ class Choice:
                         raise StageError(found.status)
                     result[part] = found
             notes.append(f"{len(result)} movements")
+        own_laws = any(movement.timing == "asynchronous" for movement in result.values())
+        journal.timing = "asynchronous" if own_laws else "synchronous"
         return result
 
     def steps(self, found: Found, *, until: float = 0.0, by_itself: bool = False) -> Steps:

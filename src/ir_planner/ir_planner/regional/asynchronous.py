@@ -10,7 +10,7 @@ from ir_planner.errors import RequestError, TimingError
 from ir_planner.regional.safeguards import DIRECT
 from ir_planner.regional.waypoints import over_free_steps
 from ir_planner.request import Context
-from ir_planner.timing import NO_OWN_LAW, Movement, straight_steps
+from ir_planner.timing import Movement, straight_steps
 
 Found = tuple[Status, Movement | None]
 SYNCHRONOUS = "timing is synchronous: own laws for the joints serve no better"
@@ -31,7 +31,7 @@ def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
         own = None if common is None else _own(common, context)
         if own is not None and common is not None and (_as_named(context) or own.cost <= common.cost):
             notes.append(own.note or "each joint has its own law")
-            context.journal.timing = "asynchronous"
+            context.journal.timing = own.timing
             return status, own
         notes.append(SYNCHRONOUS)
     if refused is not None:
@@ -54,6 +54,6 @@ def _own(common: Movement, context: Context) -> Movement | None:
     except (TimingError, RequestError) as error:
         context.journal.reject(f"own laws: {error}")
         return None
-    if movement.note == NO_OWN_LAW:
+    if movement.timing == "synchronous":
         return None
     return movement if movement.certified else None

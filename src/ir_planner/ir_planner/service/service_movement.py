@@ -68,7 +68,9 @@ def _search(
             notes.append(f"{len(certified)} of {len(timed)} certified")
         if certified:
             journal.planner_id = certified[0][0].method
-            return Status.success(), _ranked(certified, context)
+            ranked = _ranked(certified, context)
+            journal.timing = ranked[0][1].timing
+            return Status.success(), tuple(_candidate(path, movement, context) for path, movement in ranked)
         failed = blocked(found, problem, journal)
         if journal.work.exhausted:
             break
@@ -89,7 +91,8 @@ def _timed(path: ExitPath, request: ServiceRequest, context: Context) -> tuple[E
     return path, movement
 
 
-def _ranked(certified: list[tuple[ExitPath, Movement]], context: Context) -> tuple[ServiceCandidate, ...]:
+def _ranked(certified: list[tuple[ExitPath, Movement]], context: Context) -> list[tuple[ExitPath, Movement]]:
+    """The best by the objective first, then by clearance, then by time."""
     options = context.options
 
     def key(entry: tuple[ExitPath, Movement]) -> tuple[float, float, float]:
@@ -97,17 +100,18 @@ def _ranked(certified: list[tuple[ExitPath, Movement]], context: Context) -> tup
         cost = objective_value(report, options.objective, options.time_value)
         return round(cost, 6), -report.min_clearance, report.duration
 
-    return tuple(
-        ServiceCandidate(
-            method=path.method,
-            joint_names=context.joint_names,
-            work=path.points[0],
-            outside=path.points[-1],
-            trajectory_id=movement.trajectory.trajectory_id,
-            trajectory=movement.trajectory,
-            report=movement.report,
-        )
-        for path, movement in sorted(certified, key=key)
+    return sorted(certified, key=key)
+
+
+def _candidate(path: ExitPath, movement: Movement, context: Context) -> ServiceCandidate:
+    return ServiceCandidate(
+        method=path.method,
+        joint_names=context.joint_names,
+        work=path.points[0],
+        outside=path.points[-1],
+        trajectory_id=movement.trajectory.trajectory_id,
+        trajectory=movement.trajectory,
+        report=movement.report,
     )
 
 

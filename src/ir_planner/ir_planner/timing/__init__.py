@@ -16,13 +16,12 @@ from ir_planner.timing.objective import (
     request_cost,
 )
 from ir_planner.timing.spline_timing import time_spline
-from ir_planner.timing.straight_steps import NO_OWN_LAW, distinct, straight_steps
+from ir_planner.timing.straight_steps import distinct, straight_steps
 from ir_planner.timing.time_law import StepLaws
 from ir_planner.timing.torque_shares import TORQUE_SHARES, within_torque
 
 __all__ = [
     "DURATION_SLACK",
-    "NO_OWN_LAW",
     "TORQUE_SHARES",
     "Movement",
     "ObjectiveWeights",

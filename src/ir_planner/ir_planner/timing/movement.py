@@ -28,13 +28,14 @@ from ir_planner.timing.objective import coarse_cost, coarse_energy_cost, request
 @dataclass(frozen=True, eq=False)
 class Movement:
     """path (M, n): the waypoints that it passes or came from. context: what it must keep and is judged by.
-    note: where it differs from what was asked.
+    note: where it differs from what was asked. timing: "asynchronous" where joints have laws of their own.
     """
 
     path: FloatArray
     trajectory: JointTrajectory
     context: Context
     note: str = ""
+    timing: str = "synchronous"
 
     @cached_property
     def clearance(self) -> Violation | None:

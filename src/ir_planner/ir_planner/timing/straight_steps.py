@@ -50,7 +50,8 @@ def straight_steps(waypoints: FloatArray, context: Context) -> Movement:
 
     def timed(limits: MotionLimits) -> Movement:
         trajectory, note = _best_shape(waypoints, limits, context)
-        return Movement(waypoints, trajectory, context, note)
+        own = context.options.timing == "asynchronous" and note != NO_OWN_LAW
+        return Movement(waypoints, trajectory, context, note, "asynchronous" if own else "synchronous")
 
     movement = within_torque(timed, context)
     assert movement is not None  # timed always makes one

@@ -212,6 +212,8 @@ class _Optimization:
     def _answer(
         self, status: Status, best: Movement | None = None, front: tuple[Movement, ...] = ()
     ) -> OptimizationPlan:
+        if best is not None and best is not self.original:  # nobody knows of a given one
+            self.journal.timing = best.timing
         info = self.journal.info(self.path[0], self.scene.cell.robot.joint_names)
         before = self.original.report
         if best is None:

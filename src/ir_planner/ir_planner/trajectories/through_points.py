@@ -65,6 +65,7 @@ def plan_through(
     except TimingError as error:
         status = Status(StatusCode.INVALID_MOTION_PLAN, str(error))
         return MovementPlan(status, context.journal.info(start, context.joint_names), TrajectoryReport())
+    context.journal.timing = movement.timing
     info = context.journal.info(start, context.joint_names)
     status = movement.verification.status
     if not status.ok:
