@@ -112,9 +112,7 @@ class Dynamics : public core::Core {
 
   // upper, sampled, time (n,) and the number of intervals
   py::tuple torque_bounds(const Array& coefficients, const Array& durations, double tolerance, long most) const {
-    if (coefficients.ndim() != 3 || coefficients.shape(1) != model.n || durations.ndim() != 1 ||
-        durations.shape(0) != coefficients.shape(0) || coefficients.shape(2) > core::kMaxTerms)
-      throw std::invalid_argument("coefficients have to be (S, n, d + 1) and durations (S,)");
+    check_motion(coefficients, durations);
     core::TorqueBounds bounds;
     {
       py::gil_scoped_release released;
@@ -124,6 +122,20 @@ class Dynamics : public core::Core {
     const auto n = static_cast<py::ssize_t>(model.n);
     return py::make_tuple(Array(n, bounds.upper.data()), Array(n, bounds.sampled.data()), Array(n, bounds.time.data()),
                           bounds.intervals);
+  }
+
+  // seconds, net, taken (K,) of consecutive pieces of time
+  py::tuple power_bounds(const Array& coefficients, const Array& durations, double longest) const {
+    check_motion(coefficients, durations);
+    core::PowerBounds bounds;
+    {
+      py::gil_scoped_release released;
+      bounds = core::power_bounds(model, coefficients.data(), durations.data(), coefficients.shape(0),
+                                static_cast<int>(coefficients.shape(2)), longest);
+    }
+    const auto count = static_cast<py::ssize_t>(bounds.net.size());
+    return py::make_tuple(Array(count, bounds.seconds.data()), Array(count, bounds.net.data()),
+                          Array(count, bounds.taken.data()));
   }
 
  private:
@@ -136,6 +148,11 @@ class Dynamics : public core::Core {
     for (const Array* other : others)
       fits = fits && other->ndim() == 2 && other->shape(0) == first.shape(0) && other->shape(1) == model.n;
     if (!fits) throw std::invalid_argument("arrays have to be (N, n) of one length");
+  }
+  void check_motion(const Array& coefficients, const Array& durations) const {
+    if (coefficients.ndim() != 3 || coefficients.shape(1) != model.n || durations.ndim() != 1 ||
+        durations.shape(0) != coefficients.shape(0) || coefficients.shape(2) > core::kMaxTerms)
+      throw std::invalid_argument("coefficients have to be (S, n, d + 1) and durations (S,)");
   }
   Array cube(py::ssize_t N) const { return Array({N, py::ssize_t(model.n), py::ssize_t(model.n)}); }
 
@@ -201,7 +218,8 @@ void bind_dynamics(py::module_& m) {
       .def("axis_power", &Dynamics::axis_power)
       .def("mass_matrix", &Dynamics::mass_matrix)
       .def("torque_gradients", &Dynamics::torque_gradients)
-      .def("torque_bounds", &Dynamics::torque_bounds);
+      .def("torque_bounds", &Dynamics::torque_bounds)
+      .def("power_bounds", &Dynamics::power_bounds);
   m.def("dc_bus", &dc_bus);
   m.def("polynomial_extrema", &polynomial_extrema);
 }

@@ -1,4 +1,4 @@
-// A proof of the torque limits: interval arithmetic over pieces of the trajectory, halved where it is not sharp enough.
+// Torque and power by interval arithmetic over pieces of the trajectory: never too small, whatever is between samples.
 #pragma once
 
 #include <vector>
@@ -19,5 +19,15 @@ struct TorqueBounds {
 // tolerance and no joint is left with sampled <= 1 < upper, or `most` intervals are spent.
 TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, const double* coefficients,
                            const double* durations, long S, int terms, double tolerance, long most);
+
+// Of consecutive pieces of time: their lengths [s]; the sum of the axes' powers at the DC bus is nowhere above `net` W in
+// them, the sum of those that take power nowhere above `taken` W.
+struct PowerBounds {
+  std::vector<double> seconds, net, taken;
+};
+
+// The same arguments; no piece is longer than `longest` s.
+PowerBounds power_bounds(const Model<double>& m, const double* coefficients, const double* durations, long S, int terms,
+                         double longest);
 
 }  // namespace ir::dynamics

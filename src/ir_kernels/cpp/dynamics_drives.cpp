@@ -10,8 +10,7 @@ bool axis_power(const Model<double>& m, const double* qd, const double* tau, lon
   bool finite = true;
   for (long k = 0; k < N; ++k)
     for (int i = 0; i < m.n; ++i) {
-      const double t = tau[k * m.n + i], w = qd[k * m.n + i];
-      const double p = t * w + m.drive[i].copper_at_joint * t * t;
+      const double p = axis_power(m.drive[i], tau[k * m.n + i], qd[k * m.n + i]);
       power[k * m.n + i] = p;
       finite &= p - p == 0.0;
     }

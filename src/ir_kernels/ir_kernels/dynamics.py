@@ -15,7 +15,9 @@ from ir_kernels.arguments import finite, same_length, shaped
 from ir_kernels.dynamics_data import STANDARD_GRAVITY, dynamics_data
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
+from ir_kernels.power_bounds import PowerBounds, power_bounds
 from ir_kernels.reference import dynamics as reference
+from ir_kernels.reference import power_bounds as power_reference
 from ir_kernels.reference import torque_bounds as bounds_reference
 from ir_kernels.robot_like import LoadLike, RobotLike
 from ir_kernels.torque_bounds import TorqueBounds, torque_bounds
@@ -140,11 +142,30 @@ class DynamicsModel:
         (S,) s. Interval arithmetic over pieces of time that are halved until upper - sampled <=
         `tolerance` and every joint is decided, or `max_intervals` pieces are spent. Raises InputError.
         """
-        c, T = segments(coefficients, durations)
-        if c.shape[1] != self.n or not 1 <= c.shape[2] <= MAX_TERMS:
-            raise InputError(f"coefficients has shape {c.shape}, expected (S, {self.n}, 1..{MAX_TERMS})")
+        c, T = self._motion(coefficients, durations)
         if not tolerance > 0.0:
             raise InputError(f"tolerance is {tolerance}: it has to be above 0")
         if self._core is None:
             return torque_bounds(*bounds_reference.torque_bounds(self.data, c, T, tolerance, max_intervals))
         return torque_bounds(*self._core.torque_bounds(c, T, tolerance, max_intervals))
+
+    def power_bounds(
+        self, coefficients: ArrayLike, durations: ArrayLike, longest: float = 2e-3
+    ) -> PowerBounds:
+        """Bounds of the power that the axes take from the DC bus along q(t) = sum_k c_k t^k, by interval
+        arithmetic over pieces of at most `longest` s; half as long a piece leaves a fourth of the excess.
+
+        coefficients (S, n, d + 1), d <= 7; durations (S,) s. Raises InputError.
+        """
+        c, T = self._motion(coefficients, durations)
+        if not longest > 0.0:
+            raise InputError(f"longest is {longest} s: it has to be above 0")
+        if self._core is None:
+            return power_bounds(*power_reference.power_bounds(self.data, c, T, longest))
+        return power_bounds(*self._core.power_bounds(c, T, longest))
+
+    def _motion(self, coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        c, T = segments(coefficients, durations)
+        if c.shape[1] != self.n or not 1 <= c.shape[2] <= MAX_TERMS:
+            raise InputError(f"coefficients has shape {c.shape}, expected (S, {self.n}, 1..{MAX_TERMS})")
+        return c, T

@@ -1,20 +1,15 @@
 """A proof of the torque limits by interval arithmetic over pieces of the trajectory, halved where it isn't
 sharp.
 
-Over a piece with middle m the smooth part of the torque lies in tau(m) + (d tau / dt over the piece) (t -
-m): the mean value form, whose excess shrinks with the square of the piece. Coulomb friction of either sign
-counts where the velocity may vanish, none where the joint rests through the segment.
+Over a piece the torque lies in its enclosure (`enclosures`).
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.reference import dynamics
-from ir_kernels.reference.interval import Dual, Interval, intersect, interval, power, sine_cosine
+from ir_kernels.reference.enclosures import Pieces, enclosure, pieces_of
 from ir_kernels.reference.limits import derivative, evaluate
-from ir_kernels.reference.vectors import Number
 from ir_msgs_py.arrays import FloatArray, IntArray
 
 FIRST_PIECE = 0.05  # s, longest piece to begin with
@@ -22,34 +17,6 @@ FEWEST_PIECES = 8  # of a segment to begin with
 SHORTEST = 1e-7  # of a segment: pieces below this are not halved any more
 REST = 1e-9  # rad/s: below, a sample lets Coulomb friction have either sign
 ROUNDING_MARGIN = 1e-9  # of the limit
-
-
-@dataclass(frozen=True)
-class Pieces:
-    """Times begin..end (K,) within the segments (K,)."""
-
-    segment: IntArray
-    begin: FloatArray
-    end: FloatArray
-
-
-def _horner(a: list[Interval], x: Interval) -> Interval:
-    value = a[-1]
-    for coefficient in reversed(a[:-1]):
-        value = value * x + coefficient
-    return value
-
-
-def _smooth_torque(data: DynamicsData, sin: Number, cos: Number, qd: Number, qdd: Number) -> list[Number]:
-    tau = dynamics.rigid_body_torque(data, sin, cos, qd, qdd)
-    for j in range(data.n):
-        tau[j] = tau[j] + qdd[j] * float(data.rotor_inertia[j]) + qd[j] * float(data.viscous[j])
-    if data.counterbalance is not None:
-        j = data.counterbalance.joint
-        tau[j] = tau[j] - dynamics.counterbalance_torque(
-            data.counterbalance, sin[j], cos[j], lambda x: power(x, 0.5), power
-        )
-    return tau
 
 
 def least_limit(data: DynamicsData, joint: int, slowest: FloatArray, fastest: FloatArray) -> FloatArray:
@@ -70,37 +37,12 @@ def upper_ratios(
     data: DynamicsData, coefficients: FloatArray, rests: FloatArray, pieces: Pieces
 ) -> FloatArray:
     """(K, n): |tau| / limit is nowhere in a piece above this."""
-    middle = 0.5 * (pieces.begin + pieces.end)
-    step = Interval((interval(pieces.begin) - middle).lo, (interval(pieces.end) - middle).hi)
-    points: list[list[Interval]] = [[], [], []]
-    ranges: list[list[Interval]] = [[], [], [], []]
+    found = enclosure(data, coefficients, rests, pieces)
+    ratio = np.empty((len(pieces.segment), data.n))
     for j in range(data.n):
-        a = [interval(c) for c in coefficients[pieces.segment, j].T]
-        for i in range(len(a) - 1):  # Taylor shift to the middle
-            for k in reversed(range(i, len(a) - 1)):
-                a[k] = a[k] + a[k + 1] * middle
-        for order in range(4):
-            ranges[order].append(_horner(a, step) if a else interval(0.0 * middle))
-            if order < 3:
-                points[order].append(a[0] if a else interval(0.0 * middle))
-            a = [c * float(k) for k, c in enumerate(a) if k > 0]
-    sin0, cos0 = zip(*(sine_cosine(q) for q in points[0]), strict=True)
-    at_middle = _smooth_torque(data, sin0, cos0, points[1], points[2])
-    both = [sine_cosine(q) for q in ranges[0]]
-    over = _smooth_torque(
-        data,
-        [Dual(s, c * v) for (s, c), v in zip(both, ranges[1], strict=True)],
-        [Dual(c, -(s * v)) for (s, c), v in zip(both, ranges[1], strict=True)],
-        [Dual(v, a) for v, a in zip(ranges[1], ranges[2], strict=True)],
-        [Dual(a, jerk) for a, jerk in zip(ranges[2], ranges[3], strict=True)],
-    )
-    ratio = np.empty((len(middle), data.n))
-    for j in range(data.n):
-        tau = intersect(over[j].v, at_middle[j] + over[j].d * step)
-        speed, coulomb, still = ranges[1][j], float(data.coulomb[j]), rests[pieces.segment, j]
-        least = np.where(still, 0.0, np.where(speed.lo > 0.0, coulomb, -coulomb))
-        most = np.where(still, 0.0, np.where(speed.hi < 0.0, -coulomb, coulomb))
-        size = np.maximum(np.abs(tau.lo + least), np.abs(tau.hi + most))
+        tau, friction, speed = found.torque[j].v, found.coulomb[j], found.speed[j].v
+        still = rests[pieces.segment, j]
+        size = np.maximum(np.abs(tau.lo + friction.lo), np.abs(tau.hi + friction.hi))
         ends = np.abs(speed.lo), np.abs(speed.hi)
         slowest = np.where(still | ((speed.lo <= 0.0) & (speed.hi >= 0.0)), 0.0, np.minimum(*ends))
         fastest = np.where(still, 0.0, np.maximum(*ends))
@@ -134,10 +76,7 @@ def torque_bounds(
     rests = (coefficients[:, :, 1:] == 0.0).all(axis=2)
     start = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
     counts = np.maximum(FEWEST_PIECES, np.ceil(durations / FIRST_PIECE)).astype(int)
-    segment = np.repeat(np.arange(len(durations)), counts)
-    k = np.concatenate([np.arange(count) for count in counts])
-    width = durations / counts
-    pieces = Pieces(segment, k * width[segment], np.minimum((k + 1) * width[segment], durations[segment]))
+    pieces = pieces_of(durations, counts)
     spent = 0
     while len(pieces.segment):
         bound = upper_ratios(data, coefficients, rests, pieces)

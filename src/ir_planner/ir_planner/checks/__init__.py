@@ -6,6 +6,7 @@ from ir_planner.checks.energy import MovementEnergy, carried, holding_watts, mov
 from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
+from ir_planner.checks.peak_power import peak_power
 from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
 from ir_planner.checks.states import StateCheck, end_in_collision, state_check, too_near, too_near_sentence
 from ir_planner.checks.verification import TorqueProof, Verification, torque_proof, verified
@@ -37,6 +38,7 @@ __all__ = [
     "nearest_pair",
     "nearest_pairs",
     "pair_value",
+    "peak_power",
     "state_check",
     "too_near",
     "too_near_sentence",

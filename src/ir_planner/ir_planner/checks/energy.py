@@ -23,7 +23,7 @@ class MovementEnergy:
     """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), dissipated,
     capacitor.
 
-    peak [W] at the mains; dt [s]: of the steps; times (N,) s (their middles) and watts (N,) at the mains: its
+    dt [s]: of the steps; times (N,) s (their middles) and watts (N,) at the mains: its
     profile; axes (N,) W: what all joints together take from the DC bus (none: where nothing is shared).
     """
 
@@ -32,7 +32,6 @@ class MovementEnergy:
     joints: FloatArray
     dissipated: float
     capacitor: float
-    peak: float
     dt: float
     times: FloatArray
     watts: FloatArray
@@ -52,7 +51,7 @@ def movement_energy(
     axes = np.concatenate([_axis_power(trajectory, scene, piece) for piece in pieces])
     if dt <= 0.0:  # a single point: nothing lasts
         nothing = np.zeros(0)
-        return MovementEnergy(0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, 0.0, dt, nothing, nothing, nothing)
+        return MovementEnergy(0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, dt, nothing, nothing, nothing)
     bus = dc_bus(axes, dt, scene.dc_bus)
     shares = scene.dc_bus.regeneration != "none"
     taken = axes.sum(axis=1) if shares else np.zeros(0)
@@ -77,7 +76,6 @@ def _on_bus(
         joints=joints,
         dissipated=float(bus.dissipated.sum() * dt),
         capacitor=float(bus.stored[-1]),
-        peak=float(watts.max()),
         dt=dt,
         times=times,
         watts=watts,

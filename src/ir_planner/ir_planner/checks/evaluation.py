@@ -10,6 +10,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy
+from ir_planner.checks.peak_power import peak_power
 from ir_planner.checks.verification import Verification, verify
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
@@ -49,7 +50,7 @@ def measured(
         joint_energy=energy.joints,
         base_energy=energy.base,
         burnt_energy=energy.dissipated,
-        peak_power=energy.peak,
+        peak_power=peak_power(trajectory, scene),
         min_clearance=_least_clearance(clearance, verification, safety_distance),
         closest=clearance.smallest,
         closest_time=clearance.smallest_time,

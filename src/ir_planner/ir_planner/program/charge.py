@@ -9,7 +9,7 @@ from dataclasses import replace
 from ir_msgs_py.modes import modes_of
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.transitions import TransitionTimes
-from ir_planner.checks import carried, holding_watts
+from ir_planner.checks import carried, holding_watts, peak_power
 from ir_planner.program.pauses import Pause
 from ir_planner.timing import Movement
 
@@ -23,13 +23,13 @@ class Charge:
     def moved(self, step: PlannedMovement, movement: Movement) -> PlannedMovement:
         """The step of a movement with the energy that it takes from the mains now."""
         alone = movement.evaluation.energy
-        energy = carried(alone, self.stored, movement.context.scene)
+        scene, charge = movement.context.scene, self.stored
+        energy = carried(alone, charge, scene)
         self.stored = energy.capacitor
         report = step.report
         if energy is not alone:
-            report = replace(
-                report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=energy.peak
-            )
+            peak = peak_power(movement.trajectory, scene, charge)
+            report = replace(report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=peak)
         return replace(step, report=report)
 
     def stood(self, step: PlannedMovement, pause: Pause) -> PlannedMovement:
