@@ -34,6 +34,7 @@ class ModeControl:
         self.pauses = Pauses(self.modes, plc, power, pe_ids)
         self.latches = Latches()
         self._operating_mode = plc.operating_mode
+        self._demand = Demand()
 
     def react_to_plc(self) -> str:
         """Take what is new from the PLC; why a movement stops therefore, "" when it goes on."""
@@ -46,8 +47,11 @@ class ModeControl:
 
     def interruption(self) -> str:
         """Why the power mode that is asked for stops a movement, "" when it goes on."""
-        if self.latches.restart:
+        latches = self.latches
+        if latches.restart:
             return f"Cold start {_STOPS}"
+        if self._plc.rest is None and not (latches.drives_off or self.pauses.active):
+            return ""
         rest = self._rest()
         return "" if rest in (None, Mode.STAND_ON_MOTORS) else f"{ROW[rest].name} {_STOPS}"
 
@@ -61,19 +65,19 @@ class ModeControl:
         latches, before = self.latches, self.modes.mode
         if emergency:
             latches.recover = False
-        self.modes.step(
-            dt,
-            Demand(
-                self._rest(),
-                motion,
-                standing,
-                latches.wake,
-                emergency,
-                latches.recover,
-                latches.restart,
-                self._plc.operating_mode in MANUAL,
-            ),
+        demand = (
+            self._rest(),
+            motion,
+            standing,
+            latches.wake,
+            emergency,
+            latches.recover,
+            latches.restart,
+            self._plc.operating_mode in MANUAL,
         )
+        if demand != self._demand:  # the same one as long as nothing changes: this runs every millisecond
+            self._demand = Demand(*demand)
+        self.modes.step(dt, self._demand)
         latches.wake = False
         now = self.modes.mode
         if now is before:

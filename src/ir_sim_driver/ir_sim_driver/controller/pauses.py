@@ -31,8 +31,15 @@ class Pauses:
         self.wants_motors = False
 
     @property
+    def active(self) -> bool:
+        """Whether a pause is on."""
+        return bool(self._route)
+
+    @property
     def rest(self) -> Mode | None:
         """The mode that the pause asks for now, maybe not the deepest yet; None while no pause is on."""
+        if not self._route:
+            return None
         depth = _DEPTH.get(self._modes.mode, 0)
         settled = self._modes.mode in ROW  # a mode that is being entered is asked for until it is reached
         return next(
@@ -41,7 +48,7 @@ class Pauses:
                 for mode in self._route
                 if ROW[mode].depth > depth or (ROW[mode].depth == depth and not settled)
             ),
-            self._route[-1] if self._route else None,
+            self._route[-1],
         )
 
     def forget(self) -> None:

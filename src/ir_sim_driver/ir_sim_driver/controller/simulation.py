@@ -218,7 +218,7 @@ class Simulation:
 
     def _listen(self) -> None:
         """Take what the PLC has said, and whether it is still there."""
-        if self.plc.step(self.settings.dt, self.pauses.rest is not None):
+        if self.plc.step(self.settings.dt, self.pauses.active):
             sentence = self.control.react_to_plc()
             if sentence:
                 self.abort(sentence)
@@ -242,29 +242,30 @@ class Simulation:
             dt,
             motion=active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
             standing=self._still(),
-            emergency=self.stopped,
+            emergency=self.safety.stopped,
         )
         if changed is not None:
             self._mode_changed(*changed)
 
     def _move(self) -> None:
         backend, executor = self.backend, self.executor
-        braked = self.modes.mode is Mode.EMERGENCY_STOP or (self.stopped and not self.modes.motors_on)
-        if braked or self.safety.broken:
-            self.safety.brake()
-        elif self.modes.level is Mode.STAND_ON_MOTORS:
-            backend.track(executor.advance(self._scaling(), self.modes.motors_on))
+        modes, safety = self.modes, self.safety
+        braked = modes.mode is Mode.EMERGENCY_STOP or (not modes.motors_on and safety.stopped)
+        if braked or safety.broken:
+            safety.brake()
+        elif modes.level is Mode.STAND_ON_MOTORS:
+            backend.track(executor.advance(self._scaling(), modes.motors_on))
             executor.supervise(backend)
         else:
             backend.rest()
 
     def _scaling(self) -> float:
-        scaling = self.speed_scaling if self.plc.levels.move_enable else 0.0
-        path = self.executor.path
-        if self.plc.operating_mode is OperatingMode.T1 and path is not None:
-            s, stop_time = self.executor.path_parameter, self.settings.execution.stop_time
-            scaling = min(scaling, manual_scaling(self.tool, path, s, stop_time))
-        return scaling
+        if not self.plc.levels.move_enable:
+            return 0.0
+        path, s = self.executor.path, self.executor.path_parameter
+        if path is None or self.plc.operating_mode is not OperatingMode.T1:
+            return self.speed_scaling
+        return min(self.speed_scaling, manual_scaling(self.tool, path, s, self.settings.execution.stop_time))
 
     def _still(self) -> bool:
         return self.executor.path_speed == 0.0 and self.backend.standing
@@ -293,7 +294,7 @@ class Simulation:
         self.executor.set_dynamics(self.dynamics)
 
     def _collect_outcomes(self) -> None:
-        outcomes = self.executor.take_outcomes()
-        if outcomes:
+        if self.executor.ended:
+            outcomes = self.executor.take_outcomes()
             energy = self.mains.energy() - self._goal_energy
             self._outcomes += [replace(outcome, energy=energy) for outcome in outcomes]

@@ -95,8 +95,6 @@ class Supervision:
         self._speed = robot.velocity_max * (1.0 + settings.speed_margin)
         self._change = robot.acceleration_max * (1.0 + settings.acceleration_margin) * (PERIOD * _WINDOW * dt)
         self._saturation_looks = max(1, round(settings.saturation_time / (PERIOD * dt)))
-        self._row = np.empty(3 * len(robot.joint_names))
-        self._of_range, self._of_speed, self._of_change = np.split(self._row, 3)
         self._allow(self._low, self._high)
         self._speeds: deque[FloatArray] = deque(maxlen=_WINDOW + 1)
         self._saturated = 0
@@ -112,13 +110,13 @@ class Supervision:
     def _allow(self, low: FloatArray, high: FloatArray) -> None:
         """Positions (n,) from now on."""
         self._allowed_low, self._allowed_high = low, high
-        self._centre = 0.5 * (low + high)
-        self._bounds = np.concatenate((0.5 * (high - low), self._speed, self._change))
+        rows = np.stack((low, high, self._speed, self._change), axis=1)
+        self._bounds: list[list[float]] = rows.tolist()
 
     def look(self, backend: Backend, command: Command, braking: bool) -> Fault | None:
         """What is wrong now. command: of the last step; braking: motors are off, the brakes close or hold."""
-        q = backend.q
-        if q is self._seen and not backend.saturated:  # nothing has moved since
+        q, saturated = backend.q, backend.saturated
+        if q is self._seen and not saturated:  # nothing has moved since
             self._speeds.clear()
             self._saturated = 0
             return None
@@ -127,15 +125,16 @@ class Supervision:
         before = self._speed_before(qd, braking)
         fault = None if self._within(q, qd, before) else self._exceeded(q, qd, qd - before)
         fault = fault or self._left_tube(q, command)
-        return fault if braking else fault or self._saturation(backend)
+        return fault if braking else fault or self._saturation(saturated)
 
     def _within(self, q: FloatArray, qd: FloatArray, before: FloatArray) -> bool:
-        """Whether nothing is exceeded: one row and one comparison take a third of the time of three."""
-        np.subtract(q, self._centre, out=self._of_range)
-        self._of_speed[:] = qd
-        np.subtract(qd, before, out=self._of_change)
-        np.abs(self._row, out=self._row)
-        return bool((self._row <= self._bounds).all())
+        """Whether nothing is exceeded; plain floats take a third of the time of so small arrays."""
+        for x, v, u, (low, high, speed, change) in zip(
+            q.tolist(), qd.tolist(), before.tolist(), self._bounds, strict=True
+        ):
+            if not (low <= x <= high and -speed <= v <= speed and -change <= v - u <= change):
+                return False  # of what is not a number too
+        return True
 
     def _speed_before(self, qd: FloatArray, braking: bool) -> FloatArray:
         """Speed (n,) at the begin of the window; the present one while it is not full."""
@@ -184,8 +183,8 @@ class Supervision:
         scale = limit * (1.0 + self._settings.acceleration_margin) / self._change
         return self._worst("accelerates at", change * scale, limit, "rad/s^2")
 
-    def _saturation(self, backend: Backend) -> Fault | None:
-        self._saturated = self._saturated + 1 if backend.saturated else 0
+    def _saturation(self, saturated: bool) -> Fault | None:
+        self._saturated = self._saturated + 1 if saturated else 0
         if self._saturated <= self._saturation_looks:
             return None
         seconds = self._settings.saturation_time

@@ -7,13 +7,15 @@ docs/driver.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ir_description import RobotModel
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
+from ir_sim_driver.motion.ahead import ahead
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.motion.lead_in import Route
@@ -37,6 +39,7 @@ class _Run:
     wait: int  # steps until it may start
     quiet: float  # bound of the tool's deviation [m] below which nothing can be broken
     s: float = 0.0
+    ahead: Iterator[tuple[float, FloatArray]] = field(default_factory=lambda: iter(()))  # at an even speed
     settling: int = 0
     stopping: bool = False
     deviation: float = 0.0
@@ -84,6 +87,11 @@ class Executor:
     def active(self) -> bool:
         """Whether a goal is executed (or still stopping)."""
         return self._run is not None
+
+    @property
+    def ended(self) -> bool:
+        """Whether goals have ended since `take_outcomes`."""
+        return bool(self._outcomes)
 
     @property
     def goal_id(self) -> int | None:
@@ -209,23 +217,36 @@ class Executor:
             self._speed.value, self._fresh = target, False
         speed, path = self._speed, run.route.path
         if run.s < path.duration:
-            motion = path.motion(run.s) if speed.value != target else None
-            run.s = min(run.s + speed.advance(target, motion), path.duration)
-            self.command = path.position(run.s)
+            if speed.value != target:
+                run.ahead = iter(())
+                run.s = min(run.s + speed.advance(target, path.motion(run.s)), path.duration)
+                self.command = path.position(run.s)
+            elif target > 0.0:
+                self._go_on(run, target)
         if run.stopping and (speed.value == 0.0 or run.s >= path.duration):
             self._finish()
         return self.command
 
+    def _go_on(self, run: _Run, speed: float) -> None:
+        """Make a step at the present speed."""
+        following = next(run.ahead, None)
+        if following is None:
+            run.ahead = ahead(run.route.path, run.s, speed * self._dt)
+            following = next(run.ahead)
+        run.s, self.command = following
+
     def supervise(self, robot: Backend) -> None:
         """Compare the robot with the command after the step: tube, tolerances, end."""
-        q = robot.q
-        error = self._still if q is self.command else self.command - q
-        bound = 0.0 if q is self.command else self._tool.bound(error)
+        q, run = robot.q, self._run
+        error, bound = self._still, 0.0
+        if q is not self.command:
+            error = self.command - q
+            bound = self._tool.bound(error)
         self.deviation = bound if bound <= EXACT_FROM else self._tool.deviation(self.command, q)
-        run = self._run
         if run is None:
             return
-        run.deviation = max(run.deviation, self.deviation)
+        if self.deviation > run.deviation:
+            run.deviation = self.deviation
         if not run.stopping:
             sentence = "" if bound <= run.quiet else self._broken(run, error, robot)
             if sentence:

@@ -52,6 +52,16 @@ class Path:
         segment = bisect_right(self._starts, s) - 1
         return self._at(segment, min(s - self._starts[segment], self._lengths[segment]))
 
+    def positions(self, s: FloatArray) -> FloatArray:
+        """Positions (K, n) at path times s (K,) [s], all within the path."""
+        if not self._starts:
+            return np.repeat(self.start[None], len(s), axis=0)
+        segment = np.searchsorted(self._starts, s, side="right") - 1
+        t = np.minimum(s - np.take(self._starts, segment), np.take(self._lengths, segment))
+        powers = np.vander(t, 6, increasing=True)
+        positions: FloatArray = np.einsum("kp,kpn->kn", powers, self._c[segment])
+        return positions
+
     def motion(self, s: float) -> Motion:
         """Position and derivatives at path time s; derivatives are zero before the start and after the
         end.

@@ -36,15 +36,12 @@ class PathSpeed:
         """Take another shortest stop [s]."""
         self._rate = 1.0 / stop_time
 
-    def advance(self, target: float, motion: Motion | None) -> float:
-        """Step towards the target; returns the path time [s] covered. motion: at the present path time."""
-        if self.value == target:
-            return self.value * self._dt
+    def advance(self, target: float, motion: Motion) -> float:
+        """Step towards another target; the path time [s] covered. motion: at the present path time."""
         before = self.value
         wanted = min(max((target - before) / self._dt, -self._rate), self._rate)
-        if motion is not None:
-            low, high = self._bounds(motion, wanted < 0.0)
-            wanted = min(max(wanted, low), high)
+        low, high = self._bounds(motion, wanted < 0.0)
+        wanted = min(max(wanted, low), high)
         after = before + wanted * self._dt
         if (wanted < 0.0 and after < target) or (wanted > 0.0 and after > target) or after < 0.0:
             after = target

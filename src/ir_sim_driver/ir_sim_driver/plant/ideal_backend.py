@@ -50,8 +50,8 @@ class IdealBackend:
     @property
     def qd(self) -> FloatArray:
         """Speed now: the last difference and half of its change."""
-        last, change = self.q - self._before, self.q - 2.0 * self._before + self._earlier
-        return (last + 0.5 * change) / self._dt
+        last, before = self.q - self._before, self._before - self._earlier
+        return (1.5 / self._dt) * last - (0.5 / self._dt) * before
 
     @property
     def saturated(self) -> bool:
