@@ -15,6 +15,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import holding_watts, movement_energy
 from ir_planner.request.context import Context
 from ir_planner.request.work import Work
+from ir_planner.scene import Drives
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import standing, stretched
 from ir_planner.timing.objective import best_stretch
@@ -33,7 +34,7 @@ def fast(demo_scene: PlanningScene, degrees: Degrees, budget: Work) -> JointTraj
 def test_base_axes_brake_resistor_and_capacitor_sum_up(
     fast: JointTrajectory, demo_scene: PlanningScene, regeneration: Any
 ) -> None:
-    energy = movement_energy(fast, replace(demo_scene, regeneration=regeneration))
+    energy = movement_energy(fast, replace(demo_scene, drives=Drives(regeneration)))
     parts = energy.base + energy.joints.sum() + energy.dissipated + energy.capacitor
     assert energy.total == pytest.approx(parts, rel=1e-9)
     assert energy.total == pytest.approx(float(np.mean(energy.watts)) * fast.duration, rel=1e-9)
@@ -44,7 +45,7 @@ def test_sharing_the_bus_costs_no_more_than_burning_and_no_less_than_feeding_bac
     fast: JointTrajectory, demo_scene: PlanningScene
 ) -> None:
     total = {
-        kind: movement_energy(fast, replace(demo_scene, regeneration=kind)).total for kind in REGENERATIONS
+        kind: movement_energy(fast, replace(demo_scene, drives=Drives(kind))).total for kind in REGENERATIONS
     }
     assert total["fed_back"] < total["shared"] < total["none"]
 

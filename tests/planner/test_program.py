@@ -27,6 +27,7 @@ from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
 from ir_planner.service.service_lines import timed_service
 from ir_planner.service.withdrawals import EXIT_SEARCHES
+from ir_planner.settings import PlannerSettings
 
 
 def no_progress(phase: str, done: int, total: int, cost: float) -> None:
@@ -225,7 +226,7 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
         return Context(scene, options, Journal(Work(10**7, np.inf, lambda: 0.0), 0))
 
     steps = placed_steps(demo_cell, steps_of(demo_cell, stations), demo_cell.parts_at_start())
-    scenes = Scenes(demo_cell, power, "shared")
+    scenes = Scenes(demo_cell, power, PlannerSettings().drives)
     route = Route.over(steps, scenes)
     home = np.array(demo_cell.machine_home)
     layers = layers_of(route, home, asked(route.arriving(0)), EXIT_SEARCHES, no_progress)
@@ -251,10 +252,10 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
 def test_with_movement_cost_the_chain_is_the_shortest_path_of_eq_9(demo_cell: Cell, power: PowerData) -> None:
     plan = planned(demo_cell, power, "gauge_measure", "park", objective="movement_cost")
     assert plan.status.ok, plan.status.message
-    scene = scene_with(demo_cell, load_text(demo_cell), power)
+    scene = scene_with(demo_cell, load_text(demo_cell), power, PlannerSettings().drives)
     home, park = np.array(demo_cell.machine_home), np.array(demo_cell.park)
     steps = placed_steps(demo_cell, steps_of(demo_cell, ("gauge_measure",)), demo_cell.parts_at_start())
-    route = Route.over(steps, Scenes(demo_cell, power, "shared"))
+    route = Route.over(steps, Scenes(demo_cell, power, PlannerSettings().drives))
     context = Context(scene, PlanOptions(), Journal(Work(10**7, np.inf, lambda: 0.0), 0))
     nodes = layers_of(route, home, context, EXIT_SEARCHES, no_progress)[1]
     costs = [

@@ -27,6 +27,7 @@ from ir_planner.program.station_graph import Chain
 from ir_planner.request import Journal, Work
 from ir_planner.search.registry import registered
 from ir_planner.service.withdrawals import EXIT_SEARCHES
+from ir_planner.settings import PlannerSettings
 
 STATIONS = ("home", "infeed_pick", "gauge_measure", "park")
 
@@ -86,7 +87,8 @@ def test_a_movement_of_the_common_program_is_a_straight_segment_at_full_speed(
         along = q[-1] - q[0]
         share = (q - q[0]) @ along / (along @ along)
         assert np.abs(q - q[0] - share[:, None] * along).max() < 1e-6  # all joints at once
-        assert float(np.max(movement.report.torque_ratio)) > 0.93  # of the share 0.98 or the next one, 0.95
+        most = 1.0 - PlannerSettings().torque_reserve
+        assert 0.93 * most < np.max(movement.report.torque_ratio) <= most  # the share is 0.98 of it, or 0.95
 
 
 def test_both_programs_last_equally_long_and_the_planned_one_costs_less(

@@ -30,6 +30,9 @@ class MovementKind(StrEnum):
     PAUSE = "pause"
 
 
+_INTERVAL = ("energy_low", "energy_high")
+
+
 def _zeros(shape: int) -> FloatArray:
     return np.zeros(shape)
 
@@ -62,17 +65,21 @@ class DistancePair:
 class TrajectoryReport:
     """What a trajectory costs and how near it comes to its limits.
 
-    duration [s]; movement_cost: W of eq. (9), not joules; energy at the mains, joint_energy (n,) at the DC
-    bus (signed), base_energy of controller, drives and tool, burnt_energy in the brake resistor [J];
+    duration [s]; movement_cost: W of eq. (9), not joules; energy at the mains with its 90 % interval
+    energy_low to energy_high (from the uncertainty of power_parameters), joint_energy (n,) at the DC bus
+    (signed), base_energy of controller, drives and tool, burnt_energy in the brake resistor [J];
     peak_power [W]; min_clearance [m] over all pairs without an allowed contact (inf: no pair), closest:
     that pair at closest_time [s]; *_ratio (n,): largest used share of each joint's limit; path_length of
     the tcp [m]; certified: clearance and limits proved for every instant, in the cell of cell_hash and with
-    this load; contacts: pairs that were allowed their own safety distance.
+    this load; contacts: pairs that were allowed their own safety distance. torque_reserve:
+    share of the torque envelope that was left to the feedback.
     """
 
     duration: float = 0.0
     movement_cost: float = 0.0
     energy: float = 0.0
+    energy_low: float = 0.0
+    energy_high: float = 0.0
     joint_energy: FloatArray = field(default_factory=lambda: _zeros(0))
     base_energy: float = 0.0
     burnt_energy: float = 0.0
@@ -89,11 +96,13 @@ class TrajectoryReport:
     cell_hash: str = ""
     load: str = ""
     contacts: tuple[DistancePair, ...] = ()
+    power_parameters: str = ""
+    torque_reserve: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("duration", "burnt_energy", "path_length"):
+        for name in ("duration", "burnt_energy", "path_length", "torque_reserve"):
             set_field(self, name, at_least(getattr(self, name), 0.0, name))
-        for name in ("movement_cost", "energy", "base_energy", "peak_power", "closest_time"):
+        for name in ("movement_cost", "energy", "base_energy", "peak_power", "closest_time", *_INTERVAL):
             set_field(self, name, finite(getattr(self, name), name))
         set_field(self, "min_clearance", not_nan(self.min_clearance, "min_clearance", "m"))
         joints = np.shape(self.joint_energy)[:1] or (0,)

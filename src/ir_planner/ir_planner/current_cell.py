@@ -5,13 +5,12 @@ from dataclasses import replace
 from threading import Lock
 
 from ir_description import Cell, cell_from_yaml, cell_hash, load_cell
-from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.heard import Heard
-from ir_planner.scene import PlanningScene, load_text, scene_with
+from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
 
 ReadCell = Callable[[str, str], Cell]
 """Gives the cell of a text, or else of a path or a bundled name."""
@@ -25,20 +24,18 @@ def read_cell_here(cell_yaml: str, cell_file: str) -> Cell:
 class CurrentCell:
     """Holds one immutable cell after the other; a scene that was taken never changes.
 
-    heard: what the driver says. braking_energy: asked for each scene, what the drives' bus does with it.
+    heard: what the driver says. drives: asked for each scene, what is assumed of them.
     Changes wait for each other, readers for none: a cell is replaced when it is read and its models are
     built.
     """
 
-    def __init__(
-        self, heard: Heard, braking_energy: Callable[[], Regeneration], read: ReadCell = read_cell_here
-    ) -> None:
-        self._heard, self._braking_energy, self._read = heard, braking_energy, read
+    def __init__(self, heard: Heard, drives: Callable[[], Drives], read: ReadCell = read_cell_here) -> None:
+        self._heard, self._drives, self._read = heard, drives, read
         self._cell: Cell | None = None
         self._changing = Lock()
         self._hashed: tuple[Cell | None, str] = None, ""
         # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
-        self._scenes: dict[tuple[str, str, float], tuple[Cell, PlanningScene]] = {}
+        self._scenes: dict[tuple[str, Drives, float], tuple[Cell, PlanningScene]] = {}
 
     @property
     def cell(self) -> Cell:
@@ -94,11 +91,11 @@ class CurrentCell:
             self._scenes[key] = cell, scene
         return scene
 
-    def _key(self, load: str) -> tuple[str, str, float]:
-        return load, self._braking_energy(), self._heard.data.motors_to_brakes_in_program
+    def _key(self, load: str) -> tuple[str, Drives, float]:
+        return load, self._drives(), self._heard.data.motors_to_brakes_in_program
 
     def _scene_of(self, cell: Cell, load: str) -> PlanningScene:
-        scene = scene_with(cell, load, self._heard.data, self._braking_energy())
+        scene = scene_with(cell, load, self._heard.data, self._drives())
         return replace(scene, cell_hash=self.hash_of(cell))
 
     def _replaced_by(self, cell: Cell) -> Cell:

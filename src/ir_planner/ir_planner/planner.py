@@ -84,9 +84,9 @@ class Planner:
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
-        self.power = power or load_power_data()
+        self.power = self.settings.drives.power(power or load_power_data())
         self.heard = Heard(self.power, lambda: self.settings.transitions)
-        self._current = CurrentCell(self.heard, lambda: self.settings.braking_energy, read_cell)
+        self._current = CurrentCell(self.heard, lambda: self.settings.drives, read_cell)
         megabytes = self.settings.stored_megabytes
         self.trajectories = trajectory_store(self.settings.stored_trajectories, megabytes)
         self.programs = program_store(self.settings.stored_programs, megabytes)

@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import cast
 
+from ir_description import load_power_parameters
 from ir_kernels.power import Regeneration
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.settings import check_settings, setting, stage
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.configurations import InteractionSettings
+from ir_planner.scene import Drives
 from ir_planner.search import Search, registered
 from ir_planner.service import ModifiedGa
 
@@ -35,6 +38,17 @@ class PlannerSettings:
         "shared",
         "Braking energy: shared over the DC bus, none, or fed_back to the mains.",
         choices=("shared", "none", "fed_back"),
+    )
+    torque_reserve: float = setting(
+        0.1,
+        "Share of the torque envelope that plans leave to the feedback: a robot is never quite as its data.",
+        minimum=0.0,
+        maximum=0.5,
+    )
+    power_parameters: str = setting(
+        "",
+        "Power parameters that joules and torques follow from: path of a .yaml file; empty: the data sheet.",
+        read_only=True,
     )
     stored_trajectories: int = setting(
         500, "Trajectories remembered by id; the oldest go first.", minimum=1, maximum=100_000, read_only=True
@@ -80,6 +94,10 @@ class PlannerSettings:
         return FileRoots.of(self.roots)
 
     @property
-    def braking_energy(self) -> Regeneration:
-        """The choice of `regeneration`, as the kernels take it."""
-        return cast(Regeneration, self.regeneration)
+    def drives(self) -> Drives:
+        """What is assumed of the drives. Raises DescriptionError for parameters that can't be read."""
+        parameters = _parameters(self.power_parameters) if self.power_parameters else None
+        return Drives(cast(Regeneration, self.regeneration), self.torque_reserve, parameters)
+
+
+_parameters = cache(load_power_parameters)  # a file is read once

@@ -27,7 +27,7 @@ def visits(cell: Cell) -> Iterator[Visit]:
     """Every station as the program finds it when it arrives and as it leaves it; as it is before the program
     where that does not go. Each situation once.
     """
-    scenes = Scenes(cell, load_power_data(), "shared")
+    scenes = Scenes(cell, load_power_data())
     start = cell.parts_at_start()
     found: dict[str, list[PartPlaces]] = {station.name: [] for station in cell.stations}
     places = start

@@ -25,12 +25,15 @@ _NUMBERS = (
     "duration",
     "movement_cost",
     "energy",
+    "energy_low",
+    "energy_high",
     "base_energy",
     "burnt_energy",
     "peak_power",
     "min_clearance",
     "closest_time",
     "path_length",
+    "torque_reserve",
 )
 _PER_JOINT = ("joint_energy", "velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio")
 _TEXTS = ("kind", "from_station", "to_station", "trajectory_id", "power_mode", "attach", "detach", "load")
@@ -75,6 +78,7 @@ def report_to_msg(report: TrajectoryReport) -> TrajectoryReportMsg:
         certified=report.certified,
         cell_hash=report.cell_hash,
         load=report.load,
+        power_parameters=report.power_parameters,
         contacts=[distance_pair_to_msg(pair) for pair in report.contacts],
     )
 
@@ -88,6 +92,7 @@ def report_from_msg(msg: TrajectoryReportMsg) -> TrajectoryReport:
         certified=msg.certified,
         cell_hash=msg.cell_hash,
         load=msg.load,
+        power_parameters=msg.power_parameters,
         contacts=tuple(pair for pair in contacts if pair is not None),
     )
 

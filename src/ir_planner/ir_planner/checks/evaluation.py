@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
@@ -61,8 +62,14 @@ def measured(
         path_length=clearance.path_length,
         certified=verification.certified,
         contacts=clearance.contacts,
+        torque_reserve=_reserve(verification.torque, scene),
     )
     return Evaluation(report, verification, clearance, energy)
+
+
+def _reserve(torque: FloatArray, scene: PlanningScene) -> float:
+    """What a trajectory that needs the shares (n,) of the torque leaves of the reserve that plans keep."""
+    return min(scene.drives.torque_reserve, max(1.0 - float(torque.max(initial=0.0)), 0.0))
 
 
 def _least_clearance(
@@ -103,6 +110,7 @@ def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ..
         path_length=sum(report.path_length for report in reports),
         certified=all(report.certified for report in moving),
         contacts=tuple(pair for report in reports for pair in report.contacts),
+        torque_reserve=min(report.torque_reserve for report in moving),
         velocity_ratio=ratios["velocity_ratio"],
         acceleration_ratio=ratios["acceleration_ratio"],
         jerk_ratio=ratios["jerk_ratio"],

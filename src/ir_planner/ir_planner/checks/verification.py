@@ -64,7 +64,7 @@ class Verification:
 @dataclass(frozen=True, eq=False)
 class TorqueProof:
     """upper (n,): guaranteed bound of the share of the torque envelope that is used; the violation where it
-    exceeds 1.
+    exceeds what may be used.
     """
 
     upper: FloatArray
@@ -111,22 +111,22 @@ def verified(
     )
 
 
-def torque_proof(trajectory: JointTrajectory, scene: PlanningScene) -> TorqueProof:
-    """Bounds of the torque that a trajectory needs."""
+def torque_proof(trajectory: JointTrajectory, scene: PlanningScene, most: float = 1.0) -> TorqueProof:
+    """Bounds of the torque that a trajectory needs; `most`: the share of the envelope that it may use."""
     coefficients, durations = trajectory.coefficients()
     if len(durations) == 0:
         rest = np.zeros_like(trajectory.positions)
         return TorqueProof(torque_use(scene.dynamics, trajectory.positions, rest, rest).max(axis=0), None)
     bounds = scene.dynamics.torque_bounds(coefficients, durations)
     upper = np.asarray(bounds.upper)
-    if upper.max() <= 1.0 + SLACK:
+    if upper.max() <= most + SLACK:
         return TorqueProof(upper, None)
     j = int(np.argmax(upper))
     time = float(trajectory.times[0]) + float(bounds.time[j])
     k = segment_at(trajectory, time)
     sentence = (
         f"{scene.cell.robot.joint_names[j]} needs {bounds.sampled[j]:.3f} (at most {upper[j]:.3f}) times its "
-        f"torque limit after waypoint {k} at {time:.3f} s: it must be at most 1 "
-        f"(excess {100.0 * (upper[j] - 1.0):.1f} %)"
+        f"torque limit after waypoint {k} at {time:.3f} s: it must be at most {most:g} "
+        f"(excess {100.0 * (upper[j] - most):.1f} %)"
     )
-    return TorqueProof(upper, Violation(time, k, "torque", float(upper[j] - 1.0), sentence))
+    return TorqueProof(upper, Violation(time, k, "torque", float(upper[j] - most), sentence))

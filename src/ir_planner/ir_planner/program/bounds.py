@@ -52,11 +52,11 @@ def least_cost(
     viscous = (distance**2) @ robot.friction_viscous  # J s: joules at an even speed, times the duration
     with np.errstate(divide="ignore", invalid="ignore"):
         best = np.sqrt(rates.joule * viscous / rates.second) if rates.second > 0.0 else np.inf
-        if scene.regeneration != "fed_back":  # energy from the mains is never negative
+        if scene.dc_bus.regeneration != "fed_back":  # energy from the mains is never negative
             best = np.minimum(best, np.where(work < 0.0, viscous / -work, np.inf))
         at = np.maximum(seconds, best)
         energy = work + np.where(at > 0.0, viscous / at, 0.0)
-    if scene.regeneration != "fed_back":
+    if scene.dc_bus.regeneration != "fed_back":
         energy = np.maximum(energy, 0.0)
     time = np.where(np.isfinite(at), at, 0.0) * rates.second
     return np.asarray(rates.joule * energy + time)

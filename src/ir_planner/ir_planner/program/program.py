@@ -106,7 +106,7 @@ def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]
     cell = request.cell
     steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start())
     settings, bare = request.settings, request.options.load == NO_LOAD
-    scenes = Scenes(cell, request.power, settings.braking_energy, bare)
+    scenes = Scenes(cell, request.power, settings.drives, bare)
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)
     if request.cycle_time > 0.0 and request.options.objective == "energy":
         context = at_the_mains(context)

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 
 from ir_description import Cell, InvalidValueError, PartPlaces, PowerData, ProgramStep, Signal
 from ir_description import UnknownNameError as DescriptionNameError
-from ir_kernels.power import Regeneration
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.request import POSTURES
-from ir_planner.scene import PlanningScene, with_parts
+from ir_planner.scene import Drives, PlanningScene, with_parts
 
 STEPS_MAX = 500
 
@@ -30,7 +29,7 @@ class Scenes:
 
     cell: Cell
     power: PowerData
-    regeneration: Regeneration
+    drives: Drives = field(default_factory=Drives)
     bare: bool = False
     _built: dict[tuple[str, tuple[tuple[str, str], ...]], PlanningScene] = field(default_factory=dict)
 
@@ -40,7 +39,7 @@ class Scenes:
         if key not in self._built:
             cell = with_parts(self.cell, places)
             loads = () if self.bare else cell.loads(places.held)
-            self._built[key] = PlanningScene(cell, loads, self.power, self.regeneration)
+            self._built[key] = PlanningScene(cell, loads, self.power, self.drives)
         return self._built[key]
 
 

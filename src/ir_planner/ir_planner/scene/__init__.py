@@ -1,5 +1,6 @@
 """What a request plans in: the cell, what the robot holds, their models, bounds of motion, the cost W."""
 
+from ir_planner.scene.drives import Drives
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with, with_parts
@@ -8,6 +9,7 @@ from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_insid
 __all__ = [
     "PROOF_TOLERANCE",
     "STILL",
+    "Drives",
     "Dynamics",
     "MotionLimits",
     "PlanningScene",

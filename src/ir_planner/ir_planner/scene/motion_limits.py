@@ -1,6 +1,6 @@
 """Bounds of every joint's motion, and the share of the torque envelope that a motion needs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -22,12 +22,15 @@ class Dynamics(Protocol):
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """Bounds per joint (n,): rad/s, rad/s^2, rad/s^3; and the share (0, 1] of the torque envelope to use."""
+    """Bounds per joint (n,): rad/s, rad/s^2, rad/s^3; the share (0, 1] of the torque envelope to use, and the
+    share of it that is left to the feedback.
+    """
 
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
     torque_share: float = 0.98
+    torque_reserve: float = 0.0
 
     def scaled(self, velocity: float, acceleration: float) -> "MotionLimits":
         """Bounds times the request's scalings; acceleration scaling holds for the jerk as well."""
@@ -36,6 +39,7 @@ class MotionLimits:
             self.acceleration * acceleration,
             self.jerk * acceleration,
             self.torque_share,
+            self.torque_reserve,
         )
 
     def for_speed(self, share: float) -> "MotionLimits":
@@ -47,11 +51,12 @@ class MotionLimits:
             self.acceleration * share**2,
             self.jerk * share**3,
             self.torque_share * share**2,
+            self.torque_reserve,
         )
 
     def with_torque_share(self, share: float) -> "MotionLimits":
-        """The same bounds with another share of the torque."""
-        return MotionLimits(self.velocity, self.acceleration, self.jerk, share)
+        """The same bounds with another share of the torque that the reserve leaves."""
+        return replace(self, torque_share=share * (1.0 - self.torque_reserve))
 
 
 def torque_use(dynamics: Dynamics, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:

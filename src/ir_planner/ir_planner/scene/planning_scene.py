@@ -5,18 +5,18 @@ A request takes its snapshot once; a cell that changes meanwhile does not reach 
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station, Zone
 from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
-from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.scene.drives import Drives
 from ir_planner.scene.motion_limits import MotionLimits
 from ir_planner.scene.movement_cost import movement_weights
 
@@ -33,13 +33,14 @@ def load_text(cell: Cell, held: str = "") -> str:
 @dataclass(frozen=True, eq=False)
 class PlanningScene:
     """cell: its parts lie where they are for this request. loads: what is attached, in the frame of the
-    last link. cell_hash: of the cell as it stood when the request came, "" where nobody asked.
+    last link. drives: what is assumed of them. cell_hash: of the cell as it stood when the request came, ""
+    where nobody asked.
     """
 
     cell: Cell
     loads: tuple[Load, ...]
     power: PowerData
-    regeneration: Regeneration = "shared"
+    drives: Drives = field(default_factory=Drives)
     cell_hash: str = ""
 
     @property
@@ -55,7 +56,8 @@ class PlanningScene:
     @cached_property
     def dynamics(self) -> DynamicsModel:
         """Dynamics with the loads."""
-        return DynamicsModel(self.cell.robot, self.loads, self.cell.base_pose)
+        drives = self.drives
+        return DynamicsModel(drives.robot(self.cell.robot), drives.loads(self.loads), self.cell.base_pose)
 
     @cached_property
     def collision(self) -> CollisionModel:
@@ -91,18 +93,21 @@ class PlanningScene:
     def limits(self) -> MotionLimits:
         """Bounds of every joint's motion."""
         robot = self.cell.robot
-        return MotionLimits(robot.velocity_max, robot.acceleration_max, robot.jerk_max)
+        bounds = (robot.velocity_max, robot.acceleration_max, robot.jerk_max)
+        limits = MotionLimits(*bounds, torque_reserve=self.drives.torque_reserve)
+        return limits.with_torque_share(limits.torque_share)
 
     @property
     def base_watts(self) -> float:
         """Mains power [W] of controller, drives and tool while the motors are on, without the axes."""
-        tool = sum(load.watts_always + load.watts_drive_bus for load in self.loads)
+        loads = self.drives.loads(self.loads)
+        tool = sum(load.watts_always + load.watts_drive_bus for load in loads)
         return self.power.mode(RUNNING).controller_watts + self.power.drives_and_brake_release + tool
 
     @property
     def dc_bus(self) -> DcBusParameters:
         """What the drives' bus does with braking energy."""
-        return DcBusParameters(self.power.dc_link_capacity_energy, self.regeneration)
+        return DcBusParameters(self.power.dc_link_capacity_energy, self.drives.regeneration)
 
     def thresholds(self, safety_distance: float, station: str = "") -> FloatArray:
         """Distance (Z,) m that each pair must exceed: S_m, or what `station` allows the pair."""
@@ -152,9 +157,7 @@ def with_parts(cell: Cell, parts: PartPlaces) -> Cell:
     return replace(cell, parts=moved, program=())
 
 
-def scene_with(
-    cell: Cell, load: str, power: PowerData, regeneration: Regeneration = "shared"
-) -> PlanningScene:
+def scene_with(cell: Cell, load: str, power: PowerData, drives: Drives | None = None) -> PlanningScene:
     """Scene in which `load` ("gripper+part", "none") is attached; a part that is held lies nowhere.
 
     Raises UnknownNameError (the known loads) or RequestError (two parts at once).
@@ -169,7 +172,7 @@ def scene_with(
         *(cell.part(name).held(cell.tcp) for name in held),
     )
     standing = cell if not held else replace(cell, parts=parts, program=())
-    return PlanningScene(standing, loads, power, regeneration)
+    return PlanningScene(standing, loads, power, drives or Drives())
 
 
 def _check_load(cell: Cell, names: Iterable[str], held: list[str]) -> None:

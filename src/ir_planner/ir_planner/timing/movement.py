@@ -45,8 +45,9 @@ class Movement:
 
     @cached_property
     def torque(self) -> TorqueProof:
-        """Bounds of the torque that it needs."""
-        return torque_proof(self.trajectory, self.context.scene)
+        """Bounds of the torque that it needs, which has to leave the reserve."""
+        scene = self.context.scene
+        return torque_proof(self.trajectory, scene, 1.0 - scene.drives.torque_reserve)
 
     @cached_property
     def verification(self) -> Verification:

@@ -1,4 +1,4 @@
-"""The shares of the torque envelope that are tried until the guaranteed bounds of torque hold."""
+"""The shares of the torque that the reserve leaves, tried until the guaranteed bounds of torque hold."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ TORQUE_SHARES = (0.98, 0.95, 0.9, 0.8)
 
 
 def within_torque(make: Callable[[MotionLimits], Movement | None], context: Context) -> Movement | None:
-    """The movement made for the largest share of the torque envelope with which its guaranteed bounds hold.
+    """The movement made for the largest share of the torque with which its guaranteed bounds hold.
 
     Ends with what `make` returns where that is None, is too near to something, or uses the smallest share.
     Raises CancelledError when asked to stop.

@@ -1,0 +1,63 @@
+"""The torque that plans leave to the feedback: kept at every instant, said in every report, paid in time."""
+
+import time
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from ir_msgs_py.options import PlanOptions
+from ir_planner import Planner, PlannerSettings
+from ir_planner.regional import MovementPlan
+from ir_planner.request import Goal
+from ir_planner.scene import MotionLimits
+
+RESERVES = (0.0, 0.1, 0.3)
+
+
+@cache
+def movement(reserve: float) -> tuple[Planner, MovementPlan]:
+    """The fastest movement of a task of the open cell."""
+    planner = Planner(time.monotonic, PlannerSettings(torque_reserve=reserve))
+    task = planner.set_cell("", "open").task("home->p1")
+    goal = Goal(configuration=task.goal, text="p1")
+    return planner, planner.plan_regional(task.start, goal, PlanOptions(objective="time"))
+
+
+@pytest.mark.parametrize("reserve", RESERVES)
+def test_a_plan_leaves_its_reserve_at_every_instant(reserve: float) -> None:
+    planner, plan = movement(reserve)
+    assert plan.trajectory is not None
+    assert plan.report.certified
+    assert plan.report.torque_reserve == pytest.approx(reserve, abs=1e-6)
+    dynamics = planner.scene().dynamics
+    motion = plan.trajectory.sample(np.linspace(0.0, plan.trajectory.duration, 2000))
+    torque = dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
+    use = np.abs(torque / dynamics.torque_limit(motion.qd)).max()
+    assert use <= 1.0 - reserve + 1e-6
+    assert use > 0.85 * (1.0 - reserve)  # the reserve is what bounds the fastest movement here
+
+
+def test_a_larger_reserve_takes_longer() -> None:
+    durations = [movement(reserve)[1].report.duration for reserve in RESERVES]
+    assert durations == sorted(durations)
+    assert durations[-1] > 1.02 * durations[0]
+
+
+def test_what_uses_the_reserve_is_no_violation_but_its_report_says_so() -> None:
+    """The driver can follow it: the limit itself is kept."""
+    fast = movement(0.0)[1].trajectory
+    assert fast is not None
+    found = movement(0.1)[0].evaluate(fast, 0.02, "", "")
+    assert found.verification.certified
+    assert found.report.torque_reserve < 0.03
+
+
+def test_scalings_keep_the_reserve() -> None:
+    one = np.ones(6)
+    limits = MotionLimits(one, one, one, torque_reserve=0.2).with_torque_share(0.9)
+    for changed in (limits, limits.scaled(0.5, 0.5), limits.for_speed(1.0)):
+        assert changed.torque_share == pytest.approx(0.9 * 0.8)
+        assert changed.with_torque_share(1.0).torque_share == pytest.approx(0.8)
+    assert replace(limits, torque_reserve=0.0).with_torque_share(0.9).torque_share == 0.9
