@@ -7,19 +7,21 @@ a line, so none is missed and no sampling takes part.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ir_kernels import Extrema, polynomial_extrema
-from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.arrays import BoolArray, FloatArray
 
 _HALVINGS = 15  # a root to 3e-5 of the segment: the value at an extreme is off by its square
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Extremes:
-    """Largest values per segment and joint, each (S, n): rad, rad/s, rad/s^2, rad/s^3; `travel` is sum
-    |dq|.
+    """Largest values per segment and joint, each (S, n): rad, rad/s, rad/s^2, rad/s^3.
+
+    positions (S, n, K): polynomials over the share of their segment; turning (S, n): where a joint turns.
     """
 
     lowest: FloatArray
@@ -27,7 +29,16 @@ class Extremes:
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
-    travel: FloatArray
+    positions: FloatArray
+    turning: BoolArray
+
+    @cached_property
+    def travel(self) -> FloatArray:
+        """Sum |dq| (S, n) rad; found when it is asked for, because it costs more than all the others."""
+        travel = np.abs(self.positions[:, :, 1:].sum(axis=2))
+        if self.turning.any():
+            travel[self.turning] = _turning_travel(self.positions[self.turning])
+        return np.asarray(travel)
 
 
 def evaluate(polynomial: FloatArray, u: FloatArray) -> FloatArray:
@@ -74,20 +85,17 @@ def extremes(coefficients: FloatArray, durations: FloatArray) -> Extremes:
     """Extremes of the trajectory with `coefficients` (S, n, K) and `durations` (S,) s."""
     if len(durations) == 0:
         nothing = np.zeros(coefficients.shape[:2])
-        return Extremes(nothing, nothing, nothing, nothing, nothing, nothing)
+        still = nothing.astype(np.bool_)
+        return Extremes(nothing, nothing, nothing, nothing, nothing, coefficients, still)
     position, speed, change, jerk = (polynomial_extrema(coefficients, durations, k) for k in range(4))
-    powers = durations[:, None, None] ** np.arange(coefficients.shape[2])
-    travel = np.abs((coefficients[:, :, 1:] * powers[:, :, 1:]).sum(axis=2))
-    turning = (speed.minimum < 0.0) & (speed.maximum > 0.0)
-    if turning.any():
-        travel[turning] = _turning_travel((coefficients * powers)[turning])
     return Extremes(
         lowest=position.minimum,
         highest=position.maximum,
         velocity=_size(speed),
         acceleration=_size(change),
         jerk=_size(jerk),
-        travel=travel,
+        positions=coefficients * durations[:, None, None] ** np.arange(coefficients.shape[2]),
+        turning=(speed.minimum < 0.0) & (speed.maximum > 0.0),
     )
 
 

@@ -6,12 +6,13 @@ station's allowed contacts hold; the outer end keeps S_m from everything.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ir_description import Station
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
 from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled
@@ -32,6 +33,7 @@ class ServiceLine:
 
     points: FloatArray
     straight: bool = True
+    _quickest: dict[tuple[object, ...], JointTrajectory] = field(default_factory=dict, repr=False)
 
     @property
     def interaction(self) -> FloatArray:
@@ -44,6 +46,22 @@ class ServiceLine:
         """At the outer end."""
         last: FloatArray = self.points[-1]
         return last
+
+    def along(self, entry: bool) -> FloatArray:
+        """Points (L, n) in the order in which they are passed."""
+        return self.points[::-1] if entry else self.points
+
+    def quickest(self, entry: bool, limits: MotionLimits, context: Context) -> JointTrajectory:
+        """The fastest spline through the points in a context's scene. It doesn't depend on the objective, so
+        requests for several find it once. Raises TimingError when a torque does not suffice.
+        """
+        bounds = (limits.velocity, limits.acceleration, limits.jerk)
+        key = (entry, context.scene, limits.torque_share, *(bound.tobytes() for bound in bounds))
+        if key not in self._quickest:
+            points, dynamics = self.along(entry), context.scene.dynamics
+            self._quickest[key] = time_spline(points, context.joint_names, limits, dynamics)
+            context.work.check()
+        return self._quickest[key]
 
 
 def line_poses(station: Station) -> FloatArray:
@@ -99,13 +117,12 @@ def timed_service(line: ServiceLine, entry: bool, context: Context) -> Movement:
 
     Raises TimingError when a torque does not suffice.
     """
-    points = line.points[::-1] if entry else line.points
+    points = line.along(entry)
     if len(points) < 3 or not line.straight:
         return movement_over(points, context)
 
     def timed(limits: MotionLimits) -> Movement:
-        quickest = time_spline(points, context.joint_names, limits, context.scene.dynamics)
-        context.work.check()
+        quickest = line.quickest(entry, limits, context)
         trajectory = stretched(quickest, best_stretch(quickest, context))
         return Movement(np.array(points), trajectory, context)
 
