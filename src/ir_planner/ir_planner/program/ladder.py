@@ -2,14 +2,15 @@
 in their cycle time choose among the same movements.
 
 Movements are searched at the request's own value, at one in the middle of the ladder and for time alone; at
-the rungs beside these they are optimised again from the movements there.
+the rungs beside these they are optimised again from the movements there. Along service lines, which hardly
+change with the value, they are those of the faster searched rungs, slowed down.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from ir_planner.program.movements import Movements, rates_of
+from ir_planner.program.movements import Movements, Near, rates_of
 
 _LEAST = 250.0  # W: a second less of moving and more of waiting on brakes saves more than that
 _STEP = 2.0**0.5  # between two rungs: a mixture of neighbours is within about a percent of the rung between
@@ -53,7 +54,8 @@ class Ladder:
         else:
             asked = replace(own.context.asking("time_and_energy").options, time_value=LADDER[rung])
             context = replace(own.context, options=asked)
-        return Movements(own.route, own.layers, context, own.searches, self._beside(rung))
+        near = Near(self._beside(rung), self._lines(rung), self._scaling(rung))
+        return Movements(own.route, own.layers, context, own.searches, near)
 
     def _beside(self, rung: int) -> Movements | None:
         """Searched movements near which those of a rung are optimised; None where they are searched."""
@@ -62,3 +64,16 @@ class Ladder:
         if abs(rung - self._place) < _REACH:
             return self.own
         return self.at(_MIDDLE) if 0 < abs(rung - _MIDDLE) < _REACH else None
+
+    def _lines(self, rung: int) -> tuple[Movements, ...]:
+        """Movements along service lines that are slowed down at a rung; none where they are searched."""
+        if rung in (_MIDDLE, FASTEST):
+            return ()
+        if rung < self._place <= _MIDDLE:
+            return (self.own,)
+        faster = (self.own, self.at(_MIDDLE), *([self.at(FASTEST)] if rung > _MIDDLE else []))
+        return tuple(dict.fromkeys(faster))
+
+    def _scaling(self, rung: int) -> Movements | None:
+        """Movements from whose time scaling faster ones along service lines are searched."""
+        return self.own if -np.inf < self._place < rung else None

@@ -10,7 +10,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import TimingError
 from ir_planner.program.bounds import Rates
-from ir_planner.program.near import optimised_near
+from ir_planner.program.near import optimised_near, slowed_near
 from ir_planner.program.node import Node
 from ir_planner.program.parallel import mapped
 from ir_planner.program.route import Route
@@ -43,9 +43,20 @@ class Failure:
     status: Status
 
 
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Known movements from which others are made, instead of searched: across, by descent from those of
+    `across`; along service lines, those of `lines` slowed down, or by descent from those of `scaling`.
+    """
+
+    across: "Movements | None" = None
+    lines: tuple["Movements", ...] = ()
+    scaling: "Movements | None" = None
+
+
 class Movements:
-    """Movements between the configurations in `layers` of a route, by the objective of `context`; optimised
-    from those of `near`, where that is given, instead of searched.
+    """Movements between the configurations in `layers` of a route, by the objective of `context`; `near`
+    those that are known, where that is given.
     """
 
     def __init__(
@@ -54,11 +65,11 @@ class Movements:
         layers: list[list[Node]],
         context: Context,
         searches: Searches,
-        near: "Movements | None" = None,
+        near: Near | None = None,
     ) -> None:
         self.route, self.layers, self.context, self.searches = route, layers, context, searches
         plain = context.options.planner_id == "" and context.options.timing == "synchronous"
-        self._near = near if plain else None
+        self._near = near if near is not None and plain else Near()
         self._found: dict[Key, Movement | Failure] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
@@ -72,14 +83,22 @@ class Movements:
     def plan(self, parts: Sequence[Part], improvement: int) -> list[Movement | Failure]:
         """The movements of parts of hops; those that aren't known yet side by side."""
         new = {key: part for part in parts if (key := self._key(part)) not in self._found}
-        if self._near is not None:
-            self._near.plan([part for part in new.values() if part.kind == ACROSS], improvement)
+        near, lines = self._near, [part for part in new.values() if part.kind != ACROSS]
+        for known in (*near.lines, *([near.scaling] if near.scaling else [])):
+            known.plan(lines, improvement)
+        if near.across is not None:
+            near.across.plan([part for part in new.values() if part.kind == ACROSS], improvement)
         planned = mapped(self._planned, list(new.values()), self.context, improvement)
         for key, found in zip(new, planned, strict=True):
             self._found[key] = found
             if isinstance(found, Failure):
                 self.unreachable = found.status
         return [self._found[self._key(part)] for part in parts]
+
+    def movement(self, part: Part) -> Movement | None:
+        """The movement of a part that was planned; None where none was found."""
+        found = self._found[self._key(part)]
+        return found if isinstance(found, Movement) else None
 
     def better(self, parts: Sequence[Part], improvement: int) -> None:
         """Plan parts again with more work, and keep what is cheaper."""
@@ -119,22 +138,37 @@ class Movements:
         return ends if part.kind == LEAVE else ends[::-1]
 
     def _planned(self, part: Part, context: Context) -> Movement | Failure:
-        first, second = self.nodes(part)
-        here, there = self.route.name(part.hop - 1), self.route.name(part.hop)
         inside = context.inside(self.route.arriving(part.hop))
-        if part.kind == ACROSS:
-            known = self._near._found[self._near._key(part)] if self._near is not None else None
-            if isinstance(known, Movement) and (again := optimised_near(known, inside)) is not None:
+        return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
+
+    def _across(self, part: Part, context: Context) -> Movement | Failure:
+        for known in _known((self._near.across,), part):
+            if (again := optimised_near(known, context)) is not None:
                 return again
-            status, found = search_regional(first.outside, second.outside, inside, self.searches)
-            what = f"from {here or 'the start'} to {there}"
-            return found or Failure(Status(status.code, f"{what}: {status.message}"))
+        first, second = self.ends(part)
+        status, found = search_regional(first, second, context, self.searches)
+        here, there = self.route.name(part.hop - 1), self.route.name(part.hop)
+        what = f"from {here or 'the start'} to {there}"
+        return found or Failure(Status(status.code, f"{what}: {status.message}"))
+
+    def _along_line(self, part: Part, context: Context) -> Movement | Failure:
         entry = part.kind == ENTER
-        station, what = (there, f"entering {there}") if entry else (here, f"leaving {here}")
+        station = self.route.name(part.hop if entry else part.hop - 1)
+        what, at = f"{'entering' if entry else 'leaving'} {station}", context.at(station)
+        slower = slowed_near(_known(self._near.lines, part), at)
+        if slower is not None:
+            return slower
+        scaling = _known((self._near.scaling,), part)
         try:
-            movement = timed_service(first.line, entry, inside.at(station))
+            found = timed_service(self.nodes(part)[0].line, entry, at, scaling[0] if scaling else None)
         except TimingError as error:
             return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {error}"))
-        if movement.violation is not None:
-            return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {movement.violation.sentence}"))
-        return movement
+        if found.violation is not None:
+            return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {found.violation.sentence}"))
+        same = slowed_near(scaling, at)
+        return same if same is not None and same.cost < found.cost else found
+
+
+def _known(those: Sequence[Movements | None], part: Part) -> list[Movement]:
+    """The movements of a part among those that were planned."""
+    return [known for one in those if one is not None and (known := one.movement(part)) is not None]

@@ -1,10 +1,12 @@
-"""A movement that is known, optimised again for another value of a second: near its path, from its own time
+"""A movement that is known, made again for another value of a second: near its path, from its own time
 scaling.
 """
 
+from collections.abc import Sequence
+
 from ir_planner import optimize
 from ir_planner.request import Context
-from ir_planner.timing import Movement
+from ir_planner.timing import Movement, best_stretch, stretched
 
 
 def optimised_near(known: Movement, context: Context) -> Movement | None:
@@ -15,3 +17,17 @@ def optimised_near(known: Movement, context: Context) -> Movement | None:
     found = optimize.optimised_near(known, context)
     certified = [movement for movement in (found, same) if movement is not None and movement.certified]
     return min(certified, key=lambda movement: movement.cost, default=None)
+
+
+def slowed_near(known: Sequence[Movement], context: Context) -> Movement | None:
+    """The cheapest of known movements along one line, each slowed down evenly as far as that pays; None where
+    none is certified.
+    """
+    slower = [
+        Movement(
+            one.path, stretched(one.trajectory, best_stretch(one.trajectory, context)), context, one.note
+        )
+        for one in known
+    ]
+    cheapest = sorted(slower, key=lambda movement: movement.coarse_cost)
+    return next((movement for movement in cheapest if movement.certified), None)

@@ -111,9 +111,9 @@ def lines_free(lines: list[ServiceLine], context: Context, rejected: Counter[str
     return [bool(free) for free in inside & ends]
 
 
-def timed_service(line: ServiceLine, entry: bool, context: Context) -> Movement:
+def timed_service(line: ServiceLine, entry: bool, context: Context, near: Movement | None = None) -> Movement:
     """The movement along the line, outwards or (entry) inwards, verified with the allowed contacts of the
-    context's station.
+    context's station. near: one along it from whose time scaling the search for a better one starts.
 
     Raises TimingError when a torque does not suffice.
     """
@@ -134,5 +134,6 @@ def timed_service(line: ServiceLine, entry: bool, context: Context) -> Movement:
         return movement_over(points, context)
     if violation is not None and violation.what != "torque":
         raise TimingError(violation.sentence, 0)
-    better = rescaled(movement, context, QUICK_TIMING)
+    begin = movement if near is None else Movement(movement.path, near.trajectory, context)
+    better = rescaled(begin, context, QUICK_TIMING)
     return better if better is not None and better.cost < movement.cost else movement
