@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from ir_planner.program.choice import Choice
 from ir_planner.program.gap import cycle_bound, cycle_gap
-from ir_planner.program.station_graph import Chain
 
 BASE = 600.0  # W, while a program moves
 CAPACITY = 100.0  # J
@@ -46,7 +45,7 @@ def test_no_program_within_a_cycle_costs_less_than_its_bound(
     best = min(e + BASE * t + waiting * (seconds - t) for t, e in programs if t <= seconds)
     at_value = min(e + value * t for t, e in programs)
     choice = choice_with(waiting)
-    bound = cycle_bound(choice, Chain([], at_value, at_value, at_value), value, seconds)
+    bound = cycle_bound(choice, at_value, value, seconds)
     assert bound <= best + 1e-6
     carried = 2 * CAPACITY  # what charge could save over three movements
     gap = cycle_gap(choice, 3, best, bound)

@@ -13,6 +13,7 @@ from ir_planner.program.gap import cycle_bound
 from ir_planner.program.ladder import FASTEST, LADDER
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
+from ir_planner.program.station_graph import Chain
 from ir_planner.program.time_values import TimeValues
 from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement
@@ -45,36 +46,62 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
 
     Raises RequestError where the cycle is shorter than the fastest movements.
     """
-    seconds, journal = cycle_time - standing + _ROUNDING, choice.movements.context.journal
-    values = TimeValues(choice.ladder, choice.parts)
-    with journal.stage("cycle time") as notes:
-        rung = values.bracket(seconds)
-        best = choice, shared_out(values, task_of(choice, seconds, standing))
-        notes.append("too short for the chain" if best[1] is None else f"{best[1].energy:.0f} J")
-    rates = rates_of(choice.movements.context)
+    seconds = cycle_time - standing + _ROUNDING
+    first = _tried(choice, seconds, standing, None)
+    rates, rung = rates_of(choice.movements.context), first.rung
     bound = 0.0
     if rates.joule and choice.movements.context.options.objective != "movement_cost":
-        bound = cycle_bound(choice, choice.chain, rates.second, seconds)
+        bound = first.bound(choice.chain, rates.second, seconds)
+    if first.timed is not None and rung == FASTEST:
+        rung = FASTEST - 1  # the chain that is fastest of all is not needed, and says nothing of joules
+    other = None
     if abs(rung - choice.ladder.first) > _SAME_CHAIN:
         other = _cheapest_at(rung, choice, progress)
-        if other is not None and rung != FASTEST:
-            bound = max(bound, cycle_bound(choice, other.chain, LADDER[rung], seconds))
-        if other is not None and other.chain.chosen != choice.chain.chosen:
-            values = TimeValues(other.ladder, other.parts)
-            with journal.stage("cycle time") as notes:
-                values.bracket(seconds, rung)
-                timed = shared_out(values, task_of(other, seconds, standing))
-                if timed is not None and (best[1] is None or timed.energy < best[1].energy):
-                    best = other, timed
-                notes.append("too short for the chain" if timed is None else f"{timed.energy:.0f} J")
-    if best[1] is None:
-        shortest = values.seconds(FASTEST)
+    best = first
+    if other is not None:
+        if other.chain.chosen != choice.chain.chosen:
+            second = _tried(other, seconds, standing, rung)
+            best = second if second.energy < first.energy else first
+        if rung != FASTEST:
+            bound = max(bound, best.bound(other.chain, LADDER[rung], seconds))
+    if best.timed is None:
+        shortest = best.values.seconds(FASTEST)
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"cycle_time is {cycle_time:g} s: the shortest is {shortest + standing:.3f} s, "
             f"of which {standing:.3f} s are pauses",
         )
-    return TimedChoice(best[0], best[1], cycle_time, bound)
+    return TimedChoice(best.choice, best.timed, cycle_time, bound)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A chain in a cycle: its movements by value, the rung that it needs, its program (None: too slow)."""
+
+    choice: Choice
+    values: TimeValues
+    rung: int
+    timed: Timed | None
+
+    @property
+    def energy(self) -> float:
+        """Of the program [J]."""
+        return np.inf if self.timed is None else self.timed.energy
+
+    def bound(self, chain: Chain, value: float, seconds: float) -> float:
+        """Least energy [J] in a cycle, by the bound of the cheapest chain at a value; movements of other
+        values that are cheaper at this one show that the bound is too high.
+        """
+        return cycle_bound(self.choice, min(chain.bound, self.values.least(value)), value, seconds)
+
+
+def _tried(choice: Choice, seconds: float, standing: float, rung: int | None) -> _Tried:
+    values = TimeValues(choice.ladder, choice.parts)
+    with choice.movements.context.journal.stage("cycle time") as notes:
+        found = values.bracket(seconds, rung)
+        timed = shared_out(values, task_of(choice, seconds, standing))
+        notes.append("too short for the chain" if timed is None else f"{timed.energy:.0f} J")
+    return _Tried(choice, values, found, timed)
 
 
 def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.movements import rates_of
-from ir_planner.program.station_graph import Chain
 
 _SHARES = 128  # of a cycle that may be spent moving, at which the bound is looked at
 
@@ -32,15 +31,15 @@ def cycle_gap(choice: Choice, count: int, energy: float, bound: float) -> float:
     return _above(energy, bound - could_be_carried(choice, count))
 
 
-def cycle_bound(choice: Choice, chain: Chain, value: float, seconds: float) -> float:
-    """Least energy [J] at the mains of movements and wait in a cycle of `seconds`, by the bound of a chain
-    that was chosen at a value of a second [W].
+def cycle_bound(choice: Choice, least: float, value: float, seconds: float) -> float:
+    """Least energy [J] at the mains of movements and wait in a cycle of `seconds`, where no chain costs less
+    than `least` at a value of a second [W].
     """
     base = choice.movements.context.scene.base_watts
     waits = np.linspace(0.0, seconds, _SHARES + 1)
     standing = np.array([choice.waiting(float(wait)) if wait > 0.0 else 0.0 for wait in waits])
     moving = seconds - waits
-    return float((chain.bound + (base - value) * moving + standing).min())
+    return float((least + (base - value) * moving + standing).min())
 
 
 def could_be_carried(choice: Choice, count: int) -> float:

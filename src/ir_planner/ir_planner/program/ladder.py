@@ -3,7 +3,7 @@ in their cycle time choose among the same movements.
 
 Movements are searched at the request's own value, at one in the middle of the ladder and for time alone; at
 the rungs beside these they are optimised again from the movements there. Along service lines, which hardly
-change with the value, they are those of the faster searched rungs, slowed down.
+change with the value, they are those of the searched rungs, slowed down.
 """
 
 from dataclasses import replace
@@ -71,8 +71,7 @@ class Ladder:
             return ()
         if rung < self._place <= _MIDDLE:
             return (self.own,)
-        faster = (self.own, self.at(_MIDDLE), *([self.at(FASTEST)] if rung > _MIDDLE else []))
-        return tuple(dict.fromkeys(faster))
+        return self.own, self.at(_MIDDLE if rung < _MIDDLE else FASTEST)
 
     def _scaling(self, rung: int) -> Movements | None:
         """Movements from whose time scaling faster ones along service lines are searched."""

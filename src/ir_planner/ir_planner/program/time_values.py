@@ -94,6 +94,10 @@ class TimeValues:
         self.seconds(fast)
         return fast
 
+    def least(self, value: float) -> float:
+        """What the chain costs at a value of a second [W], by all movements that are known."""
+        return sum(min(p.joules + value * p.seconds for p in points) for points in self._points.values())
+
     def fronts(self) -> dict[Part, list[Point]]:
         """The convex Pareto front of every part, fastest first."""
         return {part: convex_front(points) for part, points in self._points.items()}
