@@ -147,3 +147,19 @@ def test_the_cost_of_the_best_chain_is_reported() -> None:
     heard: list[float] = []
     chain = StationGraph(world.hops(), world.settle).solve(heard.append)
     assert heard[-1] == chain.cost == 6.0
+
+
+@given(worlds(), st.integers(0, 5))
+@settings(deadline=None)
+def test_a_search_that_must_end_knows_a_chain_or_none(world: World, most: int) -> None:
+    chain = StationGraph(world.hops(), world.settle, must_end=lambda: len(world.asked) >= most).solve()
+    best = world.enumerated()
+    assert chain.cost == pytest.approx(best) or chain.cost == np.inf
+    if np.isfinite(chain.cost):
+        assert all(world.cost(part) < np.inf for part in parts_of(chain.chosen))
+
+
+def parts_of(chosen: list[int]) -> list[Part]:
+    """All parts of a chain."""
+    kinds = (LEAVE, ACROSS, ENTER)
+    return [Part(k, kind, a, b) for k, (a, b) in enumerate(itertools.pairwise(chosen)) for kind in kinds]

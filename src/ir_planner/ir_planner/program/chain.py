@@ -19,6 +19,7 @@ from ir_planner.service import ExitSearch, ServiceLine
 
 TOLERANCE = 2e-3  # of the cost: a cheaper chain than that isn't looked for
 _PLANNED_PER_STOP = 8  # movements that may be planned for each stop once there is a chain
+_LATE_PER_STOP, _LATE = 8, 100  # once time or work have ended: movements planned, and chains looked at
 _PLANNED_PER_STOP_BY_W = 32  # the same by W, whose bound says little where segments are not free
 
 
@@ -61,11 +62,18 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
 
     most = count * (3 + (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP))
 
+    late: list[int] = []  # how many movements were planned when time or work had ended
+
     def may_go_on() -> bool:
         return movements.planned < most and not context.work.exhausted
 
+    def must_end() -> bool:
+        if context.work.exhausted:
+            late.append(movements.planned)
+        return bool(late) and (movements.planned - late[0] > count * _LATE_PER_STOP or len(late) > _LATE)
+
     with context.journal.stage("station graph") as notes:
-        graph = StationGraph(edges.hops(), edges.settle, TOLERANCE, may_go_on)
+        graph = StationGraph(edges.hops(), edges.settle, TOLERANCE, may_go_on, must_end)
         chain = graph.solve(lambda best: progress("station graph", 0, count, best))
         unit = "W" if travel else "cost"
         notes.append(

@@ -14,6 +14,8 @@ from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.savings import savings_of
 
+_ENDED = "planning_time or max_iterations ended before the common program was compared"
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -31,7 +33,11 @@ def held_against_common(
     pauses. Where there is none, the sentence why.
     """
     progress("savings", 0, 1, choice.chain.cost)
-    with choice.movements.context.journal.stage("savings") as notes:
+    context = choice.movements.context
+    with context.journal.stage("savings") as notes:
+        if context.work.exhausted:
+            notes.append("none")
+            return f"no savings: {_ENDED}"
         try:
             common = common_program(choice)
             plain = common.steps()
@@ -43,6 +49,9 @@ def held_against_common(
                     words += f", of which the common program waits {waiting[-1].duration:.2f} s at its end"
                 savings = savings_of(waiting, own, _pauses(plain), common)
                 return Comparison(savings, own, words)
+            if context.work.exhausted:
+                notes.append("none")
+                return f"no savings: {_ENDED}"
             steps = timed_choice(choice, seconds, standing, progress).steps
         except (StageError, RequestError) as error:
             notes.append("none")

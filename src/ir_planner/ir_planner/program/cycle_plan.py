@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.status import StatusCode
+from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice, Steps
@@ -20,6 +20,9 @@ from ir_planner.timing import Movement
 
 _ROUNDING = 1e-6  # s: durations are whole nanoseconds, stretched by millionths
 _SAME_CHAIN = 1  # rungs from the request's own value, over which its chain is taken to stay the best
+
+
+_CUT = "no program of {:g} s found within planning_time and max_iterations: more of both may help"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,8 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
         if rung != FASTEST:
             bound = max(bound, best.bound(other.chain, LADDER[rung], seconds))
     if best.timed is None:
+        if choice.movements.context.work.exhausted:
+            raise StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
         shortest = best.values.seconds(FASTEST)
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,

@@ -54,7 +54,11 @@ class CostEdges:
         )
 
     def settle(self, parts: list[Part]) -> list[Settled]:
-        """Coarse solutions of the parts that have none yet; where all have, the movements."""
+        """Coarse solutions of the parts that have none yet; where all have, the movements: those along
+        service lines first.
+        """
+        if self.movements.context.work.exhausted:
+            return self._hurried(parts)
         fresh = [part for part in parts if part not in self._looked_at]
         if not fresh:
             lines = [part for part in parts if part.kind != ACROSS]
@@ -62,6 +66,22 @@ class CostEdges:
             return [found.get(part, Settled(0.0, exact=False)) for part in parts]
         self._looked_at.update(fresh)
         return [self._coarse(part) if part in fresh else Settled(0.0, exact=False) for part in parts]
+
+    def _hurried(self, parts: list[Part]) -> list[Settled]:
+        """Where time or work have ended: a straight segment that isn't free is none; the others are planned
+        when all are free.
+        """
+        route, context = self.movements.route, self.movements.context
+        blocked: list[Part] = []
+        for part in parts:
+            if part.kind == ACROSS:
+                first, second = self.movements.ends(part)
+                space = FreeSpace.of(route.arriving(part.hop), context.safety_distance, context.work)
+                blocked += [] if space.edges_free(first[None], second[None])[0] else [part]
+        if not blocked:
+            return self._planned(parts)
+        self.movements.plan(blocked[:1], self.improvement)  # says what it is that time was too short for
+        return [Settled(np.inf if part in blocked else 0.0, exact=part in blocked) for part in parts]
 
     def _coarse(self, part: Part) -> Settled:
         first, second = self.movements.ends(part)

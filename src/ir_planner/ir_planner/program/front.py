@@ -20,15 +20,19 @@ def front_of(choice: Choice, count: int, standing: float, progress: Progress) ->
     """`count` programs from the shortest cycle time to twice the free one, shortest first; standing: seconds
     of the pauses in the program.
 
-    Energy falls to the cheapest cycle time and rises from there, by what a second of waiting costs.
+    Energy falls to the cheapest cycle time and rises from there, by what a second of waiting costs. There is
+    none where time or work have ended.
     """
-    values = TimeValues(choice.ladder, choice.parts)
+    work, values = choice.movements.context.work, TimeValues(choice.ladder, choice.parts)
+    if work.exhausted:
+        return []
     shortest = values.seconds(FASTEST) * _FULLEST
     longest = max(2.0 * values.own_seconds + standing, shortest)
     times = np.geomspace(shortest, longest, count) if count > 1 else np.array([shortest])
     for k, seconds in enumerate(times.tolist()):
         progress("pareto front", k, count, choice.chain.cost)
-        values.bracket(seconds)
+        if not work.exhausted:
+            values.bracket(seconds)
     front = []
     for seconds in times.tolist():  # every point from all movements that are known by now
         timed = shared_out(values, task_of(choice, seconds, standing))

@@ -130,21 +130,22 @@ class StationGraph:
     """Hops in order. settle(parts): what was found of each, every one a higher bound or exact.
 
     tolerance: share of the cost by which the answer may exceed the best. may_go_on: asked while a settled
-    chain is known.
+    chain is known; must_end: while none is.
     """
 
     hops: list[Hop]
     settle: Callable[[list[Part]], list[Settled]]
     tolerance: float = 0.0
     may_go_on: Callable[[], bool] = lambda: True
+    must_end: Callable[[], bool] = lambda: False
 
     def solve(self, on_cost: Callable[[float], None] = lambda cost: None) -> Chain:
         """The cheapest chain; `on_cost` gets the cost of the best chain known so far."""
         while True:
             chosen, bound = shortest([hop.bounds() for hop in self.hops])
-            if not np.isfinite(bound):
-                return Chain(chosen, np.inf, np.inf, np.inf)
             known, cost = shortest([hop.settled() for hop in self.hops])
+            if not np.isfinite(bound) or (not np.isfinite(cost) and self.must_end()):
+                return Chain(chosen, np.inf, np.inf, np.inf)
             on_cost(cost if np.isfinite(cost) else bound)
             near = bound >= cost * (1.0 - self.tolerance)
             if np.isfinite(cost) and (near or not self.may_go_on()):

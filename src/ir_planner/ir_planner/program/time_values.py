@@ -68,27 +68,28 @@ class TimeValues:
         planned = movements.plan(self.parts, self.ladder.improvement)
         for part, found in zip(self.parts, planned, strict=True):
             if not isinstance(found, Failure):
-                point = Point.of(found)
-                self._points[part].append(point)
-                seconds += point.seconds
+                self._points[part].append(Point.of(found))
+                seconds += self._points[part][-1].seconds
             elif movements is self.ladder.own:
                 raise StageError(found.status)
+            else:  # what is known has to do
+                seconds += min(point.seconds for point in self._points[part])
         return seconds
 
     def bracket(self, seconds: float, first: int | None = None) -> int:
         """Plan at neighbouring rungs between which the movements take `seconds`; the faster of both. first:
         the rung to begin at, None: at the request's own value.
         """
-        slow, fast = -1, FASTEST
+        slow, fast, work = -1, FASTEST, self.ladder.own.context.work
         rung, step = self.ladder.first if first is None else first, 1
         while True:  # in growing steps
             late = self.seconds(rung) > seconds
             slow, fast = (max(slow, rung), fast) if late else (slow, min(fast, rung))
             beyond = rung + step if late else rung - step
-            if not slow < beyond < fast:
+            if not slow < beyond < fast or work.exhausted:
                 break
             rung, step = beyond, 2 * step
-        while fast - slow > 1:
+        while fast - slow > 1 and not work.exhausted:
             middle = (slow + fast) // 2
             slow, fast = (middle, fast) if self.seconds(middle) > seconds else (slow, middle)
         self.seconds(fast)
