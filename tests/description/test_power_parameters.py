@@ -54,6 +54,18 @@ def test_draws_are_possible_robots_and_follow_the_seed(seed: int, widening: floa
     wide.drawn(seed).robot_with(load_robot())  # makes a robot, or raises
 
 
+def test_draws_at_a_bound_keep_their_correlations(sheet: PowerParameters) -> None:
+    a, b = sheet.index("iron.joint_a1"), sheet.index("viscous.joint_a1")
+    covariance = sheet.covariance.copy()
+    covariance[a, b] = covariance[b, a] = -0.95 * sheet.deviation[a] * sheet.deviation[b]
+    draws = replace(sheet, covariance=covariance).draws(4000, 1)
+    moved = (draws - sheet.mean) / sheet.deviation
+    normal = np.random.default_rng(2).multivariate_normal([0.0, 0.0], [[1.0, -0.95], [-0.95, 1.0]], 40_000)
+    allowed = normal[normal[:, 0] >= 0.0]  # of all normal draws those that physics allows
+    np.testing.assert_allclose(moved[:, [a, b]].mean(axis=0), allowed.mean(axis=0), atol=0.05)
+    np.testing.assert_allclose(moved[:, [a, b]].std(axis=0), allowed.std(axis=0), atol=0.05)
+
+
 def test_draws_have_the_covariance_where_no_bound_is_near(sheet: PowerParameters) -> None:
     a, b = sheet.index("viscous.joint_a1"), sheet.index("coulomb.joint_a1")
     covariance = sheet.covariance.copy()

@@ -64,7 +64,7 @@ def test_the_bus_balances_and_differs_from_the_kernels_by_the_hysteresis_alone(w
     assert (own.watts >= 0.0).all()
     assert (own.charge >= 0.0).all()
     assert (own.charge <= link.capacity_energy).all()
-    assert own.watts.sum() >= theirs.mains.sum() - 1e-6  # the chopper's lower voltage keeps less
+    assert own.watts.sum() >= theirs.mains.sum() - 1e-6  # the middle of two voltages keeps less
     flat = replace(link, chopper_off=link.chopper_on)  # without hysteresis both are one
     np.testing.assert_allclose(bus_flow(flat, wanted, step).watts, theirs.mains, atol=1e-6)
 

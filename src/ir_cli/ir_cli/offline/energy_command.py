@@ -6,11 +6,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
+from ir_description import load_cell, load_power_parameters, power_parameters_to_yaml
+from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.agreement import agreement
+from ir_recorder.fit import Source, fit, fit_data, parameter_rows, write_fit_picture
+from ir_recorder.fit import sentences as fit_sentences
+from ir_recorder.report.files import write_output
+from ir_recorder.traces import read_mapping
 
+from .asking import sentences
 from .output import Columns, Row, add_formats, number, print_csv, print_json, print_table, text
 
 COMPARED: Columns = {
@@ -22,6 +30,16 @@ COMPARED: Columns = {
     "from_torques": ("from torques J", number(0)),
     "second_opinion": ("by Pinocchio J", number(0)),
 }
+FITTED: Columns = {
+    "parameter": ("parameter", text),
+    "before": ("before", number(4)),
+    "before_deviation": ("±", number(4)),
+    "value": ("fitted", number(4)),
+    "deviation": ("±", number(4)),
+    "unit": ("", text),
+    "determined": ("determined", lambda own: "yes" if own else "no"),
+}
+PARAMETERS_START = b"format: ir_description/power_parameters/"
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -35,6 +53,19 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     compare.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.mcap)")
     add_formats(compare)
     compare.set_defaults(run=run_compare)
+    fitted = verbs.add_parser("fit", help="power parameters from a meter, with what is left uncertain")
+    fitted.add_argument("motion", type=Path, metavar="RECORDING", help="a recording, or CSV of the joints")
+    fitted.add_argument("--meter", type=Path, metavar="FILE", help="CSV of a power meter beside it")
+    fitted.add_argument("--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean")
+    fitted.add_argument("--meter-mapping", type=Path, metavar="FILE", help="what those of the meter mean")
+    fitted.add_argument("--cell", default="", help="of the robot, where the recording carries none")
+    fitted.add_argument("--load", default="", help='what is held all the time: "gripper+part"')
+    fitted.add_argument("--prior", default="", metavar="FILE", help="parameters to begin with (data sheet)")
+    fitted.add_argument("--name", default="fit", help="of the parameters (fit)")
+    fitted.add_argument("--output", type=Path, default=Path("out/power.yaml"), help="file to write")
+    fitted.add_argument("--picture", type=Path, metavar="PNG", help="picture to write as well")
+    add_formats(fitted, comma=False)
+    fitted.set_defaults(run=run_fit)
 
 
 def run_compare(arguments: argparse.Namespace) -> int:
@@ -65,3 +96,43 @@ def run_compare(arguments: argparse.Namespace) -> int:
         print_table(rows, COMPARED)
         sys.stdout.write(f"{both.sentence}\n")
     return 0 if rows else 1
+
+
+def run_fit(arguments: argparse.Namespace) -> int:
+    """Fit, write the file and the picture, print what was found."""
+    with sentences():
+        prior = load_power_parameters(arguments.prior)
+        cell = load_cell(arguments.cell) if arguments.cell else None
+    motion, meter = arguments.mapping, arguments.meter_mapping
+    source = Source(
+        arguments.motion,
+        arguments.meter,
+        read_mapping(motion) if motion else None,
+        read_mapping(meter) if meter else None,
+        cell,
+        arguments.load,
+    )
+    data = fit_data(source, prior)
+    found = fit(data.samples, data.model, prior, arguments.name)
+    page = power_parameters_to_yaml(found.parameters, f"fit on {arguments.motion.name}")
+    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    written = [write_output(arguments.output, page.encode(), PARAMETERS_START, ANYWHERE)]
+    if arguments.picture:
+        written.append(write_fit_picture(found, prior, arguments.picture))
+    said = (*data.notes, *fit_sentences(found))
+    rows = parameter_rows(found, prior)
+    if arguments.json:
+        listed = [asdict(each) for each in found.movements]
+        print_json(
+            {
+                "parameters": rows,
+                "movements": listed,
+                "sentences": said,
+                "files": [str(path) for path in written],
+            }
+        )
+        return 0
+    print_table(rows, FITTED)
+    sys.stdout.write("".join(f"{sentence}\n" for sentence in said))
+    sys.stdout.write("".join(f"{path}\n" for path in written))
+    return 0

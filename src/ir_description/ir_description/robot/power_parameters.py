@@ -18,6 +18,7 @@ from ir_description.errors import UnknownNameError
 from ir_description.robot.load import Load
 from ir_description.robot.power import PowerData
 from ir_description.robot.robot import RobotModel
+from ir_description.robot.truncated import truncated_normal
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 
@@ -46,7 +47,6 @@ _HIGHEST = {"gear": 0.9, "rectifier_efficiency": 1.0} | dict.fromkeys(SCALARS[:5
 _LOWEST = {"rectifier_efficiency": 0.5, "rotor_inertia": 0.1, "link_mass": 0.1}
 _MOST = 1e9
 _SYMMETRIC = 1e-9  # relative to the variances: rounding of a file's digits
-_REFLECTIONS = 8
 
 
 def parameter_names(joints: Iterable[str], modes: Iterable[str]) -> tuple[str, ...]:
@@ -143,15 +143,10 @@ class PowerParameters:
         return self.mean[self.places(term)]
 
     def draws(self, count: int, seed: int) -> FloatArray:
-        """Vectors (count, P) of the normal distribution, reflected at the physical bounds: a loss that the
-        data sheet has at zero is drawn as a half normal one.
+        """Vectors (count, P) of the normal distribution, cut off at the physical bounds: a loss that the
+        data sheet has at zero is drawn as a half normal one, and correlations hold at the bounds.
         """
-        scale = self.deviation
-        safe = np.where(scale > 0.0, scale, 1.0)
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(safe, safe))
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        normal = np.random.default_rng(seed).standard_normal((count, len(scale)))
-        return reflected(self.mean + normal @ root.T * scale, *physical_bounds(self.names))
+        return truncated_normal(self.mean, self.covariance, *physical_bounds(self.names), count, seed)
 
     def drawn(self, seed: int) -> PowerParameters:
         """One robot of these: a draw as the mean, without uncertainty."""
@@ -201,11 +196,3 @@ class PowerParameters:
         """The controller with these watts."""
         modes = tuple(replace(m, controller_watts=self.value(f"watts.{m.name}")) for m in data.modes)
         return replace(data, modes=modes, drives_and_brake_release=self.value("drives_watts"))
-
-
-def reflected(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Values (..., P) with what lies beyond a bound mirrored back inside."""
-    for _ in range(_REFLECTIONS):
-        values = np.where(values < low, 2.0 * low - values, values)
-        values = np.where(values > high, 2.0 * high - values, values)
-    return np.clip(values, low, high)

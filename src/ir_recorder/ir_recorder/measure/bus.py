@@ -1,7 +1,8 @@
-"""The DC link as a tank of joules: a rectifier that only fills, a chopper with hysteresis that empties.
+"""The DC link as a tank of joules: a rectifier that only fills, a chopper that takes what is too much.
 
-The charge above the rectified mains is what the capacitors hold; at its upper switching voltage the chopper
-empties them down to the lower one. With the watts, their derivatives go through the same steps.
+The charge above the rectified mains is what the capacitors hold. The chopper switches at two voltages,
+between which a braking robot leaves the charge at random; here it is held in their middle, so that powers
+change steadily with the parameters. With the watts, their derivatives go through the same steps.
 """
 
 from __future__ import annotations
@@ -30,8 +31,7 @@ def bus_flow(
 
     slopes (N, P): derivatives of `wanted` by parameters. charge [J]: at the start.
     """
-    top = _joules(link, link.chopper_on)
-    emptied = _joules(link, link.chopper_off)
+    top = 0.5 * (_joules(link, link.chopper_on) + _joules(link, link.chopper_off))
     tangents = np.zeros((len(wanted), 0)) if slopes is None else slopes
     given, given_slopes = np.zeros(len(wanted)), np.zeros_like(tangents)
     held, held_slope = np.empty(len(wanted)), np.zeros(tangents.shape[1])
@@ -43,7 +43,7 @@ def bus_flow(
             given_slopes[k] = tangents[k] - held_slope / step if free else tangents[k]
             free = False
         elif rest > top:
-            charge, free = emptied, False
+            charge, free = top, False
         else:
             charge = rest
             held_slope = (held_slope if free else 0.0) - tangents[k] * step

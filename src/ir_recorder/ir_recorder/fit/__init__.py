@@ -1,0 +1,18 @@
+"""Power parameters fitted to a power meter, with what the data say of each."""
+
+from ir_recorder.fit.data import FitData, Source, fit_data
+from ir_recorder.fit.estimate import Fit, FittedMovement, fit
+from ir_recorder.fit.picture import write_fit_picture
+from ir_recorder.fit.text import parameter_rows, sentences
+
+__all__ = [
+    "Fit",
+    "FitData",
+    "FittedMovement",
+    "Source",
+    "fit",
+    "fit_data",
+    "parameter_rows",
+    "sentences",
+    "write_fit_picture",
+]

@@ -1,0 +1,128 @@
+"""What a fit is made from: a recording, or traces of joints and of a power meter with its own clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ir_description import Cell, Load, PowerParameters, load_power_data
+from ir_msgs_py.arrays import FloatArray
+from ir_recorder.analysis.loads import carried, load_timeline
+from ir_recorder.errors import FitError
+from ir_recorder.fit.cells import attached_cell
+from ir_recorder.measure import PowerModel, Samples, samples_of
+from ir_recorder.measure.on_one_grid import LoadRuns
+from ir_recorder.read.reader import read_recording
+from ir_recorder.traces import Trace, TraceMapping, clock_offset, read_traces
+from ir_recorder.traces.recorded import recorded_traces
+
+
+@dataclass(frozen=True, eq=False)
+class FitData:
+    """Samples with watts, the model of their robot, and sentences on how they were laid together."""
+
+    samples: Samples
+    model: PowerModel
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file of the robot's motion; a file of the meter (None: the same), with the mapping of each; a cell
+    for what no file says of it, and what is held all the time ("" where the recording knows).
+    """
+
+    motion: Path
+    meter: Path | None = None
+    motion_mapping: TraceMapping | None = None
+    meter_mapping: TraceMapping | None = None
+    cell: Cell | None = None
+    load: str = ""
+
+
+def fit_data(source: Source, prior: PowerParameters) -> FitData:
+    """Read all of a source and lay it on one grid; ReadError, TraceError or FitError as a sentence."""
+    recording = read_recording(source.motion) if source.motion.suffix.lower() == ".mcap" else None
+    cell = source.cell or attached_cell(recording)
+    if recording is not None:
+        traces = recorded_traces(recording)
+        runs = _recorded_loads(cell, load_timeline(recording).certain(recording.duration))
+    else:
+        traces = read_traces(source.motion, source.motion_mapping, cell.robot.joint_names)
+        runs = []
+    if source.load or not runs:
+        runs = [(-np.inf, np.inf, carried(cell, source.load))]
+    joints = _with(traces, cell.robot.joint_names)
+    meter = _metered(traces)
+    model = PowerModel(cell.robot, load_power_data(prior.controller).dc_link, cell.base_pose, prior)
+    notes = [problem for trace in traces for problem in trace.problems]
+    if source.meter is not None:
+        mapping = source.meter_mapping or TraceMapping()
+        outer = _metered(read_traces(source.meter, mapping, cell.robot.joint_names))
+        if outer is None:
+            raise FitError(f"{source.meter}: there is neither a column power nor energy")
+        if np.isnan(mapping.clock_offset):
+            outer, note = _aligned(joints, meter, outer, prior, model, runs)
+            notes.append(note)
+        meter = outer
+    if meter is None:
+        raise FitError(f"{source.motion}: there is neither a column power nor energy; name the meter's file")
+    names, modes = cell.robot.joint_names, prior.modes
+    return FitData(samples_of(joints, meter, names, modes, runs), model, tuple(notes))
+
+
+def _recorded_loads(
+    cell: Cell, known: Iterable[tuple[float, float, str]]
+) -> list[tuple[float, float, tuple[Load, ...]]]:
+    """Runs of loads of the cell by what the recording says; one tuple for each different text."""
+    held: dict[str, tuple[Load, ...]] = {}
+    runs = []
+    for start, end, text in known:
+        held.setdefault(text, carried(cell, text))
+        runs.append((start, end, held[text]))
+    return runs
+
+
+def _with(traces: Sequence[Trace], names: Sequence[str]) -> Trace:
+    for trace in traces:
+        if trace.joints(names) is not None:
+            return trace
+    known = ", ".join(traces[0].columns)[:200]
+    raise FitError(f"{traces[0].source}: there is no column {names[0]}, there is: {known}")
+
+
+def _metered(traces: Sequence[Trace]) -> Trace | None:
+    return next((trace for trace in traces if trace.joules() is not None), None)
+
+
+def _aligned(
+    joints: Trace,
+    meter: Trace | None,
+    outer: Trace,
+    prior: PowerParameters,
+    model: PowerModel,
+    runs: LoadRuns,
+) -> tuple[Trace, str]:
+    """The outer meter on the robot's clock: its power against the recorded one, else the predicted one."""
+    if meter is not None:
+        time, watts, what = meter.time, _watts(meter), "the recorded power"
+    else:
+        samples = samples_of(joints, None, prior.joints, prior.modes, runs)
+        time, watts = samples.time, model.watts(prior.mean, model.prepare(samples))
+        what = "the power that the data sheet predicts"
+    offset = clock_offset(time, watts, outer.time, _watts(outer))
+    note = (
+        f"{outer.source}: {offset.seconds:+.3f} s on its clock agrees with {what} by {offset.correlation:.2f}"
+    )
+    return outer.shifted(offset.seconds), note
+
+
+def _watts(meter: Trace) -> FloatArray:
+    """Mean watts (N,) by the meter's count, the first as the second."""
+    joules = meter.joules()
+    assert joules is not None  # only metered traces come here
+    means = np.diff(joules) / np.diff(meter.time)
+    return np.concatenate([means[:1], means])

@@ -1,0 +1,268 @@
+"""Power parameters from a power meter: regularised least squares with physical bounds, by Gauss and Newton.
+
+The prior pulls what the data say little about towards the data sheet. The forward model runs the DC link, so
+its switch and its capacitor are in every step. Residuals of neighbouring instants hang together; they count
+as the fewer independent ones that their autocorrelation leaves, standing and moving apart from each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ir_description import PowerParameters, physical_bounds
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_recorder.errors import FitError
+from ir_recorder.measure import PowerModel, Samples, movements
+
+WINDOW = 5  # samples whose mean is one residual: 50 ms
+DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
+LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
+_ROUNDS = 20
+_DONE = 1e-4  # of a deviation: the largest change of a last step
+_REWEIGHTED = 3  # times that the noise is estimated anew
+_SHORTEST = 100  # residuals that a fit needs
+
+
+@dataclass(frozen=True)
+class FittedMovement:
+    """A movement from `start` on for `seconds` [s]: energy [J] at the mains measured, and predicted by the
+    parameters before and after the fit.
+    """
+
+    start: float
+    seconds: float
+    measured: float
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What was found. parameters: with covariance; determined (P,): which of them the data determine; the
+    others are as before. movements: residuals. time (W,) s, measured, before, after (W,) W: of windows.
+    noise [W]: of a window at rest and in motion, with how many windows one independent residual takes.
+    inflation: what the covariance was multiplied by, so that it explains the residuals of movements.
+    """
+
+    parameters: PowerParameters
+    determined: BoolArray
+    movements: tuple[FittedMovement, ...]
+    time: FloatArray
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+    noise: tuple[float, float]
+    correlated: tuple[float, float]
+    inflation: float
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Names of what the data do not determine."""
+        return tuple(
+            name for name, own in zip(self.parameters.names, self.determined, strict=True) if not own
+        )
+
+
+def fit(samples: Samples, model: PowerModel, prior: PowerParameters, name: str = "fit") -> Fit:
+    """Fit the parameters of `model` to the watts of the samples. FitError where they hold too little."""
+    return _Estimate(samples, model, prior).result(name)
+
+
+class _Estimate:
+    def __init__(self, samples: Samples, model: PowerModel, prior: PowerParameters) -> None:
+        usable = samples.known & np.isfinite(samples.watts)
+        self._windows = np.flatnonzero(_by_window(usable.astype(float)) > 1.0 - 1e-9)
+        if len(self._windows) < _SHORTEST:
+            raise FitError(
+                f"{len(self._windows) * WINDOW * samples.step:.1f} s have watts, motion, mode and load at "
+                f"once, at least {_SHORTEST * WINDOW * samples.step:.1f} s are needed"
+            )
+        self._samples, self._model, self._prior = samples, model, prior
+        self._prepared = model.prepare(samples)
+        self._watts = self._reduced(samples.watts)
+        self._moving = self._reduced(samples.moving.astype(float)) > 0.0
+        self._low, self._high = physical_bounds(prior.names)
+        values, vectors = np.linalg.eigh(_scaled(prior))
+        if values.min() <= 1e-9:
+            raise FitError("the covariance of the prior is singular")
+        self._pull = (vectors / np.sqrt(values)).T / _safe(prior.deviation)  # (P, P): whitens the parameters
+        self._free = prior.deviation > 0.0
+
+    def result(self, name: str) -> Fit:
+        """Both noises and the parameters in turn, then once more with what is not determined as before."""
+        noise, correlated, mean = (50.0, 50.0), (1.0, 1.0), self._prior.mean.copy()
+        for _ in range(_REWEIGHTED):
+            mean, precision = self._solve(mean, noise, correlated, self._free)
+            noise, correlated = self._noise(mean)
+        mean, precision = self._solve(mean, noise, correlated, self._free)
+        covariance = _inverse(precision, self._prior.deviation)
+        left = np.sqrt(np.diag(covariance)) / _safe(self._prior.deviation)
+        determined = self._free & (left < DETERMINED)
+        mean, _ = self._solve(mean, noise, correlated, determined)
+        inflation = self._inflation(mean, covariance, noise[1] ** 2 * correlated[1])
+        covariance = _at_most(covariance * inflation, covariance, self._prior)
+        sources = np.where(determined, "fit", self._prior.sources)
+        found = replace(
+            self._prior,
+            name=name,
+            mean=mean,
+            covariance=0.5 * (covariance + covariance.T),
+            sources=tuple(str(source) for source in sources),
+        )
+        before, after = (self._model.watts(each, self._prepared) for each in (self._prior.mean, mean))
+        return Fit(
+            found,
+            np.asarray(determined),
+            self._movements(before, after),
+            self._reduced(self._samples.time),
+            self._watts,
+            self._reduced(before),
+            self._reduced(after),
+            noise,
+            correlated,
+            inflation,
+        )
+
+    def _reduced(self, values: FloatArray) -> FloatArray:
+        return np.asarray(_by_window(values)[self._windows])
+
+    def _solve(
+        self,
+        start: FloatArray,
+        noise: tuple[float, float],
+        correlated: tuple[float, float],
+        free: BoolArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """The parameters of least cost with those that are not free as in the prior; and the precision
+        (P, P).
+        """
+        mean = np.where(free, start, self._prior.mean)
+        rest, moving = (n * np.sqrt(c) for n, c in zip(noise, correlated, strict=True))
+        weight = 1.0 / np.where(self._moving, moving, rest)
+        cost, residual, slopes = self._at(mean, weight)
+        for _ in range(_ROUNDS):
+            step = self._step(mean, residual, slopes, free)
+            for share in (1.0, 0.5, 0.25, 0.1):
+                trial = np.clip(mean + share * step, self._low, self._high)
+                better = self._at(trial, weight)
+                if better[0] <= cost:
+                    break
+            else:
+                break
+            moved = np.abs((trial - mean) / _safe(self._prior.deviation)).max()
+            mean, (cost, residual, slopes) = trial, better
+            if moved < _DONE:
+                break
+        return mean, slopes.T @ slopes + self._pull.T @ self._pull
+
+    def _at(self, mean: FloatArray, weight: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Cost, weighted residuals (W,) and their slopes (W, P)."""
+        watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
+        residual = weight * (self._watts - self._reduced(watts))
+        weighted = weight[:, None] * _by_window(slopes)[self._windows]
+        pulled = self._pull @ (mean - self._prior.mean)
+        return float(residual @ residual + pulled @ pulled), residual, weighted
+
+    def _step(
+        self, mean: FloatArray, residual: FloatArray, slopes: FloatArray, free: BoolArray
+    ) -> FloatArray:
+        """The step of Gauss and Newton within the bounds; zero for what is not free."""
+        scale = _safe(self._prior.deviation)[free]
+        reduced = np.asarray(np.linalg.qr(np.column_stack([slopes[:, free] * scale, residual]), mode="r"))
+        matrix = np.concatenate([reduced[:, :-1], self._pull[:, free] * scale])
+        target = np.concatenate([reduced[:, -1], self._pull @ (self._prior.mean - mean)])
+        low, high = ((bound - mean)[free] / scale for bound in (self._low, self._high))
+        solved = lsq_linear(matrix, target, (np.minimum(low, -1e-12), np.maximum(high, 1e-12)))
+        step = np.zeros(len(mean))
+        step[free] = solved.x * scale
+        return step
+
+    def _noise(self, mean: FloatArray) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Deviation of a residual [W], and residuals per independent one: at rest, and moving."""
+        residual = self._watts - self._reduced(self._model.watts(mean, self._prepared))
+        noise, correlated = [], []
+        for rows in (~self._moving, self._moving):
+            own = residual[rows]
+            noise.append(max(float(np.sqrt(np.mean(own**2))), LEAST_WATTS) if len(own) else LEAST_WATTS)
+            correlated.append(_correlated(own))
+        return (noise[0], noise[1]), (correlated[0], correlated[1])
+
+    def _movements(self, before: FloatArray, after: FloatArray) -> tuple[FittedMovement, ...]:
+        step, watts = self._samples.step, self._samples.watts
+        return tuple(
+            FittedMovement(
+                float(self._samples.time[first]),
+                (behind - first) * step,
+                *(float(step * each[first:behind].sum()) for each in (watts, before, after)),
+            )
+            for first, behind in movements(self._samples)
+            if np.isfinite(watts[first:behind]).all()
+        )
+
+    def _inflation(self, mean: FloatArray, covariance: FloatArray, variance: float) -> float:
+        """How much larger squared residuals of movements are than covariance and noise explain; at least 1.
+
+        variance [W^2]: of a window, as if windows were independent.
+        """
+        watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
+        missing = self._samples.watts - watts
+        ratios = []
+        for first, behind in movements(self._samples):
+            if np.isfinite(missing[first:behind]).all():
+                slope = slopes[first:behind].sum(axis=0)
+                explained = slope @ covariance @ slope + variance * WINDOW * (behind - first)
+                ratios.append(float(missing[first:behind].sum() ** 2 / explained))
+        return max(1.0, float(np.mean(ratios))) if ratios else 1.0
+
+
+def _by_window(values: FloatArray) -> FloatArray:
+    """Means (M // WINDOW, ...) of consecutive samples (M, ...)."""
+    count = len(values) // WINDOW
+    return np.asarray(values[: count * WINDOW].reshape(count, WINDOW, *values.shape[1:]).mean(axis=1))
+
+
+def _safe(deviation: FloatArray) -> FloatArray:
+    return np.where(deviation > 0.0, deviation, 1.0)
+
+
+def _scaled(prior: PowerParameters) -> FloatArray:
+    """The correlation (P, P) of the prior; 1 on the diagonal for what is certain."""
+    scale = _safe(prior.deviation)
+    matrix = prior.covariance / np.outer(scale, scale)
+    matrix[np.diag_indices_from(matrix)] = 1.0
+    return matrix
+
+
+def _inverse(precision: FloatArray, deviation: FloatArray) -> FloatArray:
+    """The covariance (P, P), inverted where parameters have deviations of one size; 0 for what is certain."""
+    scale = _safe(deviation)
+    inverse = np.linalg.inv(precision * np.outer(scale, scale)) * np.outer(scale, scale)
+    certain = deviation <= 0.0
+    inverse[certain] = 0.0
+    inverse[:, certain] = 0.0
+    return np.asarray(inverse)
+
+
+def _at_most(inflated: FloatArray, covariance: FloatArray, prior: PowerParameters) -> FloatArray:
+    """The inflated covariance with no deviation beyond the prior's or the fitted one's: shrunk from there."""
+    most = np.maximum(prior.deviation, np.sqrt(np.diag(covariance)))
+    shrink = np.minimum(1.0, most / _safe(np.sqrt(np.diag(inflated))))
+    return np.asarray(inflated * np.outer(shrink, shrink))
+
+
+def _correlated(residual: FloatArray) -> float:
+    """Residuals per independent one: 1 + 2 times the sum of the autocorrelations up to the first negative."""
+    own = residual - residual.mean() if len(residual) else residual
+    power = float(own @ own)
+    if len(own) < 3 or power <= 0.0:
+        return 1.0
+    total = 1.0
+    for lag in range(1, min(len(own) // 2, 400)):
+        rho = float(own[:-lag] @ own[lag:]) / power
+        if rho <= 0.0:
+            break
+        total += 2.0 * rho
+    return total

@@ -1,0 +1,156 @@
+"""A fit finds the robot that drew the power, says how sure it is, and what the data do not determine.
+
+The robots here are drawn from the prior and run through the forward model with noise; other plants are
+`benchmarks/truth.py`'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_cli.main import main
+from ir_description import (
+    PowerParameters,
+    data_sheet,
+    load_cell,
+    load_power_data,
+    load_power_parameters,
+    physical_bounds,
+)
+from ir_recorder.errors import FitError
+from ir_recorder.fit import Fit, fit, sentences
+from ir_recorder.measure import PowerModel, Samples, movements
+
+CELL, PRIOR, STEP = load_cell("demo"), data_sheet(), 0.01
+MODEL = PowerModel(CELL.robot, load_power_data().dc_link, CELL.base_pose, PRIOR)
+NOISE = 20.0  # W of a sample
+
+
+def programme(seed: int, count: int, modes: int) -> Samples:
+    """Movements between random postures about home at several speeds, then `modes` modes for 5 s each."""
+    rng, robot = np.random.default_rng(seed), CELL.robot
+    here, parts = np.array(robot.machine_home), []
+    low = np.maximum(robot.position_min, here - 1.2)
+    high = np.minimum(robot.position_max, here + 1.2)
+    for k in range(count):
+        there = np.where(rng.random(6) < 0.6, rng.uniform(low, high), here)
+        travel = there - here
+        seconds = (
+            np.sqrt((np.abs(travel) * 5.8 / robot.acceleration_max).max() + 0.01)
+            + 1.9 * (np.abs(travel) / robot.velocity_max).max()
+        )
+        seconds *= rng.choice([1.0, 1.5, 3.0])
+        x = ((np.arange(int(seconds / STEP)) + 0.5) * STEP / seconds)[:, None]
+        q = here + travel * (10 * x**3 - 15 * x**4 + 6 * x**5)
+        qd = travel * (30 * x**2 - 60 * x**3 + 30 * x**4) / seconds
+        qdd = travel * (60 * x - 180 * x**2 + 120 * x**3) / seconds**2
+        parts.append((np.stack([q, qd, qdd]), 0, int(k >= count // 2)))
+        parts.append((_still(there, 50), 0, int(k >= count // 2)))
+        here = there
+    parts += [(_still(here, 500), mode, 1) for mode in range(modes)]
+    motion = np.concatenate([each for each, _, _ in parts], axis=1)
+    mode, load = (np.concatenate([np.full(p[0].shape[1], p[k]) for p in parts]) for k in (1, 2))
+    time = (np.arange(len(mode)) + 0.5) * STEP
+    loads = ((CELL.tool,), CELL.loads(CELL.parts[0].name))
+    return Samples(STEP, time, *motion, mode, load, mode == 0, np.full(len(mode), np.nan), loads)
+
+
+def _still(q: np.ndarray, count: int) -> np.ndarray:
+    return np.stack([np.tile(q, (count, 1)), np.zeros((count, 6)), np.zeros((count, 6))])
+
+
+def metered(samples: Samples, truth: PowerParameters, seed: int) -> Samples:
+    watts = MODEL.watts(truth.mean, MODEL.prepare(samples))
+    return replace(samples, watts=watts + np.random.default_rng(seed).normal(0.0, NOISE, len(watts)))
+
+
+@dataclass(frozen=True)
+class Case:
+    truth: PowerParameters
+    found: Fit
+
+
+@pytest.fixture(scope="module", params=[1, pytest.param(2, marks=pytest.mark.long)])
+def case(request: pytest.FixtureRequest) -> Case:
+    truth = PRIOR.drawn(request.param)
+    return Case(truth, fit(metered(programme(request.param, 30, 4), truth, 1), MODEL, PRIOR))
+
+
+def test_energies_of_other_movements_are_predicted_and_covered(case: Case) -> None:
+    others = programme(99, 25, 0)
+    prepared = MODEL.prepare(others)
+    truth = MODEL.watts(case.truth.mean, prepared)
+    after = MODEL.watts(case.found.parameters.mean, prepared)
+    drawn = np.array([MODEL.watts(draw, prepared) for draw in case.found.parameters.draws(60, 0)])
+    errors, inside = [], []
+    for first, behind in movements(others):
+        energy = truth[first:behind].sum()
+        errors.append(abs(after[first:behind].sum() / energy - 1.0))
+        low, high = np.percentile(drawn[:, first:behind].sum(axis=1), [5.0, 95.0])
+        inside.append(low <= energy <= high)
+    assert np.median(errors) < 0.002
+    assert max(errors) < 0.01
+    assert np.mean(inside) > 0.4  # of one robot's movements, which share their errors; 0.9 over many robots
+
+
+def test_what_is_fitted_is_physical_and_no_less_certain(case: Case) -> None:
+    low, high = physical_bounds(PRIOR.names)
+    found = case.found.parameters
+    assert (found.mean >= low).all()
+    assert (found.mean <= high).all()
+    assert (found.deviation <= PRIOR.deviation * (1.0 + 1e-6)).all()
+    fitted = case.found.determined
+    off = np.abs(found.mean - case.truth.mean)[fitted] / found.deviation[fitted]
+    assert np.mean(off < 2.5) > 0.8
+
+
+def test_the_noise_is_that_of_the_meter(case: Case) -> None:
+    for noise in case.found.noise:
+        assert noise == pytest.approx(NOISE / np.sqrt(5.0), rel=0.15)
+    for each in case.found.movements:
+        assert each.after == pytest.approx(each.measured, rel=0.02)
+
+
+def test_what_the_data_do_not_show_is_named_and_kept() -> None:
+    samples = metered(programme(3, 12, 1), PRIOR.drawn(3), 3)  # no mode but motors on
+    still = replace(samples, q=samples.q.copy(), qd=samples.qd.copy(), qdd=samples.qdd.copy())
+    for array in (still.q, still.qd, still.qdd):
+        array[:, 3] = 0.0  # A4 never moves
+    found = fit(metered(still, PRIOR.drawn(3), 3), MODEL, PRIOR)
+    kept = {"viscous.joint_a4", "coulomb.joint_a4", "watts.BUS_POWER_OFF", "watts.HIBERNATION"}
+    assert kept <= set(found.kept)
+    for name in found.kept:
+        assert found.parameters.value(name) == PRIOR.value(name)
+    assert "watts.HIBERNATION" in " ".join(sentences(found))
+
+
+def test_too_little_data_are_refused() -> None:
+    samples = programme(1, 1, 0)
+    with pytest.raises(FitError, match=r"at least 5\.0 s are needed"):
+        fit(samples, MODEL, PRIOR)
+
+
+def test_a_meter_with_a_clock_of_its_own_is_fitted_from_csv(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truth = PRIOR.drawn(5)
+    samples = metered(programme(5, 12, 0), truth, 5)
+    samples = replace(samples, load=np.zeros_like(samples.load))
+    samples = metered(samples, truth, 5)
+    names = ",".join(f"{name}_deg" for name in CELL.robot.joint_names)
+    rows = np.column_stack([samples.time, np.degrees(samples.q)])
+    np.savetxt(tmp_path / "joints.csv", rows, "%.6f", ",", header=f"time,{names}", comments="")
+    rows = np.column_stack([1e3 * (samples.time + 100.0 + 0.5 * STEP), samples.watts / 1e3])
+    np.savetxt(tmp_path / "meter.csv", rows, "%.6f", ";", header="time [ms];power_kW", comments="")
+    words = ["energy", "fit", str(tmp_path / "joints.csv"), "--meter", str(tmp_path / "meter.csv")]
+    words += ["--cell", "demo", "--load", CELL.tool.name, "--output", str(tmp_path / "power.yaml")]
+    assert main([*words, "--picture", str(tmp_path / "fit.png")]) == 0
+    printed = capsys.readouterr().out
+    assert "on its clock agrees with the power that the data sheet predicts" in printed
+    found = load_power_parameters(str(tmp_path / "power.yaml"))
+    assert found.value("coulomb.joint_a1") == pytest.approx(truth.value("coulomb.joint_a1"), rel=0.05)
+    assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
