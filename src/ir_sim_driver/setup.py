@@ -13,7 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    install_requires=["setuptools", "numpy", "scipy", "pybullet"],
+    install_requires=["setuptools", "numpy", "scipy", "PyYAML", "pybullet"],
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",

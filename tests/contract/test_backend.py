@@ -75,6 +75,11 @@ def moving(backend: Backend, cell: Cell) -> None:
     drive(backend, motion(home(cell))[: round(1.0 / DT)])
 
 
+def held(backend: Backend) -> np.ndarray:
+    """Torque (n,) [Nm] of the last 0.1 s, in the mean: encoders have steps."""
+    return np.array(backend.work().torque[-round(0.1 / DT) :].mean(axis=0))
+
+
 def test_reset_makes_it_stand_where_it_was_put(backend: Backend, cell: Cell) -> None:
     q = home(cell) + REACH
     backend.reset(q)
@@ -89,7 +94,7 @@ def test_it_holds_its_position_with_the_torque_of_gravity(backend: Backend, cell
     commands = np.tile(home(cell), (round(0.5 / DT), 1))
     assert np.abs(drive(backend, commands) - home(cell)).max() < 1e-6
     assert backend.standing
-    assert np.abs(backend.torque - holding(cell, tool(cell))).max() < TORQUE
+    assert np.abs(held(backend) - holding(cell, tool(cell))).max() < TORQUE
 
 
 def test_it_follows_a_motion_with_the_torque_of_the_equations_of_motion(backend: Backend, cell: Cell) -> None:
@@ -107,7 +112,10 @@ def test_it_follows_a_motion_with_the_torque_of_the_equations_of_motion(backend:
     assert np.abs(work.speed - middle).max() < 0.01
     sliding = np.abs(middle).min(axis=1) > 0.01  # below, each backend smooths friction in its own manner
     assert sliding.sum() > 0.8 * len(commands)
-    assert np.abs(work.torque - expected)[sliding].max() < TORQUE
+    off = work.torque - expected
+    off[~sliding] = 0.0
+    ripple = np.cumsum(off, axis=0)  # encoders have steps: what counts is the mean over 20 ms
+    assert np.abs(ripple[20:] - ripple[:-20]).max() / 20.0 < TORQUE
 
 
 def test_work_is_handed_over_once_with_one_row_per_step(backend: Backend, cell: Cell) -> None:
@@ -188,8 +196,9 @@ def test_a_load_changes_the_torque_and_not_the_state(backend: Backend, cell: Cel
     assert np.array_equal(backend.q, q)
     assert backend.standing
     drive(backend, np.tile(home(cell), (round(0.5 / DT), 1)))
-    assert np.abs(backend.torque - holding(cell, ())).max() < TORQUE
-    assert np.abs(backend.torque - carried).max() > 100.0
+    found = held(backend)
+    assert np.abs(found - holding(cell, ())).max() < TORQUE
+    assert np.abs(found - carried).max() > 100.0
 
 
 def test_a_disturbance_is_taken_and_ends(backend: Backend, cell: Cell) -> None:
@@ -220,7 +229,7 @@ def test_gravity_is_that_of_the_cell(name: str, cell: Cell) -> None:
     backend = make_backend(name, turned, DT, SETTINGS.control)
     backend.reset(home(cell))
     drive(backend, np.tile(home(cell), (round(0.5 / DT), 1)))
-    assert np.abs(backend.torque - holding(turned, ())).max() < TORQUE
+    assert np.abs(held(backend) - holding(turned, ())).max() < TORQUE
 
 
 def test_an_unknown_backend_is_refused_with_the_known_ones(cell: Cell) -> None:

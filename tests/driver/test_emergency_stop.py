@@ -68,7 +68,7 @@ def test_release_alone_does_nothing_and_recover_needs_it(stopped):
     assert "nothing resumes" in stopped.recover()
     stopped.run(2.0)
     assert stopped.modes.mode is Mode.STAND_ON_MOTORS
-    assert np.abs(stopped.backend.q - q).max() < 1e-9
+    assert np.abs(stopped.backend.q - q).max() < 1e-6  # an encoder has steps
     assert not stopped.executor.active
 
 
@@ -164,7 +164,7 @@ def test_physics_that_fail_stop_the_robot_and_recover_starts_them_again(make, pl
     simulation.recover()
     simulation.run(2.0)
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
-    assert np.abs(simulation.backend.q - q).max() < 1e-9
+    assert np.abs(simulation.backend.q - q).max() < 1e-6  # an encoder has steps
 
 
 def test_a_lost_physics_server_comes_back_with_recover(make, plan, start, run_out, home):

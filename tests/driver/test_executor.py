@@ -156,8 +156,9 @@ def test_a_cancel_at_any_instant_stops_on_the_path_within_the_limits(make, plan,
     assert outcomes[0].max_tool_deviation < 0.002
     assert distance_from_path(q[::100], trajectory.sample(np.linspace(0, 2, 4001)).q) < 1e-3
     acceleration = np.diff(q, 2, axis=0) / DT**2
-    assert (np.abs(acceleration) < 1.05 * cell.robot.acceleration_max + 0.05).all()
-    assert np.abs(q[-1] - q[-2]).max() < EXACT
+    ripple = 0.05 if backend == "ideal" else 1.0  # encoders have steps
+    assert (np.abs(acceleration) < 1.05 * cell.robot.acceleration_max + ripple).all()
+    assert np.abs(q[-1] - q[-2]).max() < (EXACT if backend == "ideal" else 1e-7)
     assert not simulation.cancel(goal_id)
 
 
@@ -253,7 +254,7 @@ def test_a_path_tolerance_names_the_joint_and_the_amount(make, plan, start, run_
 
 def test_an_unreached_goal_tolerance_ends_after_the_goal_time(make, plan, start, run_out, home, there):
     simulation = make("pybullet")
-    tight = (JointTolerance("joint_a1", position=1e-7),)
+    tight = [JointTolerance(f"joint_a{i}", position=1e-9) for i in range(1, 7)]  # finer than encoders
     start(simulation, plan(2.0, home, there), goal_tolerance=tight, goal_time=0.3)
     simulation.run(1.9)
     simulation.disturb(np.array([300.0, 0.0, 0.0, 0.0, 0.0, 0.0]))

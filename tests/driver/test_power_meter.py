@@ -8,15 +8,15 @@ import pytest
 from ir_description import load_power_data
 from ir_kernels.power import DcBusParameters, dc_bus
 from ir_msgs_py.modes import Mode
+from ir_sim_driver.plant import BasePower, PowerMeter, nominal_plant
 from ir_sim_driver.plant.backend import Work
-from ir_sim_driver.plant.power_meter import BasePower, PowerMeter
 
 DT = 0.001
 
 
 @pytest.fixture
 def meter(cell):
-    return PowerMeter(cell.robot, load_power_data(), DT)
+    return PowerMeter(nominal_plant(cell.robot, load_power_data()), DT)
 
 
 def test_the_parts_add_up_to_the_mains(make, plan, start, run_out, cell):
@@ -36,7 +36,7 @@ def test_the_parts_add_up_to_the_mains(make, plan, start, run_out, cell):
 def test_batches_of_any_length_read_the_same(meter, cell):
     generator = np.random.default_rng(1)
     speed, torque = generator.normal(0.0, 1.0, (200, 6)), generator.normal(0.0, 500.0, (200, 6))
-    other = PowerMeter(cell.robot, load_power_data(), DT)
+    other = PowerMeter(nominal_plant(cell.robot, load_power_data()), DT)
     for k in range(200):
         meter.add(300.0)
         meter.settle(Work(speed[k : k + 1], torque[k : k + 1]))
@@ -67,8 +67,8 @@ def test_watts_of_the_tool_don_t_grow_with_a_part(make):
     assert simulation.mains.base.of(Mode.STAND_ON_BRAKES) == pytest.approx(325.0)
 
 
-def test_base_power_follows_the_level():
-    base = BasePower(load_power_data())
+def test_base_power_follows_the_level(cell):
+    base = BasePower(nominal_plant(cell.robot, load_power_data()).watts)
     base.set_tool(90.0, 100.0)
     watts = [
         base.of(Mode[mode]) for mode in ("HIBERNATION", "BUS_POWER_OFF", "STAND_ON_BRAKES", "STAND_ON_MOTORS")

@@ -69,6 +69,7 @@ SPEED_SCALING: Final = f"{SIM_DRIVER}/speed_scaling"
 POWER_STATE: Final = f"{SIM_DRIVER}/power_state"
 CONTROLLER_TIMERS: Final = f"{SIM_DRIVER}/controller_timers"
 CARRIED_LOAD: Final = f"{SIM_DRIVER}/carried_load"
+PLANT: Final = f"{SIM_DRIVER}/plant"
 CONTROLLER_STATE: Final = f"{SIM_DRIVER}/controller_state"
 ROBOT_MARKERS: Final = f"{SIM_DRIVER}/robot_markers"
 

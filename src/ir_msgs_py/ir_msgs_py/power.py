@@ -47,13 +47,30 @@ class PowerMode:
             raise InvalidValueError(f"break_even of {self.name} is nan: it must be a number")
 
 
+METER = (
+    "time_to_target",
+    "power",
+    "energy",
+    "base_power",
+    "bus_voltage",
+    "burnt_power",
+    "rectifier_loss",
+    "tool_power",
+)
+"""Numbers of a PowerState."""
+AXES = ("joint_power", "joint_torque", "joint_current", "joint_temperature")
+"""Arrays of a PowerState, one entry per axis."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PowerState:
     """What the mains meter reads; stamp_ns: node clock [ns].
 
     time_to_target [s], 0 when the target mode is reached; power [W]: mean since the last reading; energy
     [J] since the meter started; base_power [W] of controller, drives and tool; bus_voltage [V];
-    burnt_power [W]; joint_power (n,) [W] at the DC bus; joint_torque (n,) [Nm] of the motor at the joint.
+    burnt_power [W]; joint_power (n,) [W] at the DC bus; joint_torque (n,) [Nm] of the motor at the joint;
+    joint_current (n,) [A] of the motors and joint_temperature (n,) [deg C] of the gears, empty where the
+    plant has none; rectifier_loss [W]; tool_power [W], a part of base_power; plant: what is simulated.
     """
 
     stamp_ns: int
@@ -67,11 +84,16 @@ class PowerState:
     burnt_power: float = 0.0
     joint_power: FloatArray = field(default_factory=lambda: np.zeros(0))
     joint_torque: FloatArray = field(default_factory=lambda: np.zeros(0))
+    joint_current: FloatArray = field(default_factory=lambda: np.zeros(0))
+    joint_temperature: FloatArray = field(default_factory=lambda: np.zeros(0))
+    rectifier_loss: float = 0.0
+    tool_power: float = 0.0
+    plant: str = ""
 
     def __post_init__(self) -> None:
         set_field(self, "mode", checked_mode(self.mode))
         set_field(self, "target_mode", checked_mode(self.target_mode))
-        for name in ("time_to_target", "power", "energy", "base_power", "bus_voltage", "burnt_power"):
+        for name in METER:
             set_field(self, name, finite(getattr(self, name), name))
-        set_field(self, "joint_power", read_only(self.joint_power, "joint_power", (None,)))
-        set_field(self, "joint_torque", read_only(self.joint_torque, "joint_torque", (None,)))
+        for name in AXES:
+            set_field(self, name, read_only(getattr(self, name), name, (None,)))

@@ -11,13 +11,12 @@ from ir_msgs.msg import PowerState as PowerStateMsg
 from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py.plc import PlcInputs, PlcOutputs, Signal
-from ir_msgs_py.power import PowerMode, PowerState
+from ir_msgs_py.power import AXES, METER, PowerMode, PowerState
 from ir_msgs_py.program import ProgramState
 from ir_msgs_py.ros.convert_basics import float_array, time_from_msg, time_to_msg
 from ir_msgs_py.ros.convert_report import planned_movement_from_msg, planned_movement_to_msg
 
 _POWER_MODE = tuple(field.name for field in fields(PowerMode))
-_METER = ("time_to_target", "power", "energy", "base_power", "bus_voltage", "burnt_power")
 _INPUTS = tuple(field.name for field in fields(PlcInputs))
 _OUTPUTS = tuple(field.name for field in fields(PlcOutputs) if field.name != "stamp_ns")
 
@@ -38,9 +37,9 @@ def power_state_to_msg(state: PowerState) -> PowerStateMsg:
     msg = PowerStateMsg(
         mode=int(state.mode),
         target_mode=int(state.target_mode),
-        **{name: getattr(state, name) for name in _METER},
-        joint_power=float_array(state.joint_power),
-        joint_torque=float_array(state.joint_torque),
+        plant=state.plant,
+        **{name: getattr(state, name) for name in METER},
+        **{name: float_array(getattr(state, name)) for name in AXES},
     )
     msg.header.stamp = time_to_msg(state.stamp_ns)
     return msg
@@ -52,9 +51,8 @@ def power_state_from_msg(msg: PowerStateMsg) -> PowerState:
         stamp_ns=time_from_msg(msg.header.stamp),
         mode=msg.mode,
         target_mode=msg.target_mode,
-        **{name: getattr(msg, name) for name in _METER},
-        joint_power=msg.joint_power,
-        joint_torque=msg.joint_torque,
+        plant=msg.plant,
+        **{name: getattr(msg, name) for name in (*METER, *AXES)},
     )
 
 

@@ -5,7 +5,15 @@ from __future__ import annotations
 from ir_description import Cell, PowerData, load_cell, load_power_data
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation
-from ir_sim_driver.plant import carried, make_backend
+from ir_sim_driver.plant import (
+    IDEAL,
+    NOMINAL,
+    Plant,
+    carried,
+    ideal_plant,
+    make_backend,
+    plant_named,
+)
 
 CELL_TOOL = "cell"
 """Load text that means the tool of the cell."""
@@ -17,15 +25,21 @@ def make_simulation(
     backend: str = "pybullet",
     settings: SimulationSettings | None = None,
     data: PowerData | None = None,
+    plant: str | Plant = NOMINAL,
 ) -> Simulation:
     """Simulation of a cell (a Cell, the name of a bundled one or a path) with a load text of its loads.
 
-    Raises what ir_description raises for a cell, RequestRefusedError for a load, BackendError.
+    plant: a Plant or a text that names one, see `plant_named`; the ideal backend has none but its own.
+    Raises what ir_description raises for a cell, RequestRefusedError for a load, SettingsError for a plant,
+    BackendError.
     """
     settings = settings or SimulationSettings()
     cell = load_cell(cell) if isinstance(cell, str) else cell
     if load == CELL_TOOL:
         load = "none" if cell.tool is None else cell.tool.name
-    what = carried(cell, load)
-    robot = make_backend(backend, cell, settings.dt, settings.control)
-    return Simulation(cell, data or load_power_data(), robot, what, settings)
+    what, data = carried(cell, load), data or load_power_data()
+    plant = plant_named(plant, cell.robot, data) if isinstance(plant, str) else plant
+    if backend == IDEAL:
+        plant = ideal_plant(cell.robot, data)
+    robot = make_backend(backend, cell, settings.dt, settings.control, plant)
+    return Simulation(cell, data, robot, what, settings, plant)

@@ -37,6 +37,7 @@ def report(simulation: Simulation, worst_lag: float, failure: str = "", lag: flo
         level,
         sentence,
         {
+            "plant": simulation.plant.name,
             "plant time [s]": f"{simulation.time:.3f}",
             "energy [J]": f"{reading.energy:.1f}",
             "load": simulation.load.text,

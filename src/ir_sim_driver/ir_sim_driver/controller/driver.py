@@ -28,7 +28,7 @@ from ir_sim_driver.controller.surroundings import PlannedCell
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
-from ir_sim_driver.plant import Carried
+from ir_sim_driver.plant import Carried, Plant
 from ir_sim_driver.plc import STOP_BIT
 
 
@@ -239,6 +239,11 @@ class Driver:
                 self._simulation.notices.take(),
                 report(self._simulation, worst_lag, self._access.failure, lag),
             )
+
+    @property
+    def plant(self) -> Plant:
+        """What is driven; it never changes."""
+        return self._simulation.plant
 
     @property
     def carried(self) -> Carried:

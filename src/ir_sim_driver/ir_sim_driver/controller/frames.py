@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_msgs_py.power import PowerState
@@ -39,7 +41,7 @@ class Frames:
         self._simulation, self._steps = simulation, steps
         self._outputs: PlcOutputs | None = None
         self._inputs: PlcInputs | None = None
-        self._energy = self._dissipated = self._metered = 0.0
+        self._energy = self._dissipated = self._rectified = self._metered = 0.0
 
     def take(self, stamp_ns: int) -> Frame:
         """The frame of now."""
@@ -66,9 +68,13 @@ class Frames:
         simulation.mains.settle()
         reading, modes = simulation.mains.meter.reading(), simulation.modes
         elapsed = reading.time - self._metered
-        mean = (reading.energy - self._energy) / elapsed if elapsed > 0.0 else 0.0
-        dissipated = (reading.burnt_energy - self._dissipated) / elapsed if elapsed > 0.0 else 0.0
+        per_second = 1.0 / elapsed if elapsed > 0.0 else 0.0
+        mean = (reading.energy - self._energy) * per_second
+        dissipated = (reading.burnt_energy - self._dissipated) * per_second
+        rectifier = (reading.rectifier_energy - self._rectified) * per_second
         self._energy, self._dissipated, self._metered = reading.energy, reading.burnt_energy, reading.time
+        self._rectified = reading.rectifier_energy
+        temperature = simulation.backend.temperature
         return PowerState(
             stamp_ns=stamp_ns,
             mode=modes.mode,
@@ -81,4 +87,9 @@ class Frames:
             burnt_power=dissipated,
             joint_power=reading.joint_power,
             joint_torque=reading.joint_torque,
+            joint_current=reading.joint_current,
+            joint_temperature=np.zeros(0) if temperature is None else temperature,
+            rectifier_loss=rectifier,
+            tool_power=reading.tool_power,
+            plant=simulation.plant.name,
         )

@@ -4,32 +4,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description import PowerData, RobotModel
+from ir_description import PowerData
 from ir_kernels.dynamics import DynamicsModel
 from ir_kernels.power import Regeneration
 from ir_msgs_py.modes import Mode
-from ir_sim_driver.plant import Backend, BasePower, Carried, PowerMeter
+from ir_sim_driver.plant import Backend, BasePower, Carried, Plant, PowerMeter, standing_watts
 
 _SETTLE_STEPS = 250  # at the latest: arrays of many steps cost what arrays of few do
 
 
 class Mains:
-    """Counts what `backend` and the controller take, step by step of dt [s]."""
+    """Counts what the controller and `backend`, a robot of `plant`, take, step by step of dt [s].
+
+    data: what the controller knows of it.
+    """
 
     def __init__(
-        self, robot: RobotModel, data: PowerData, backend: Backend, dt: float, regeneration: Regeneration
+        self, plant: Plant, data: PowerData, backend: Backend, dt: float, regeneration: Regeneration
     ) -> None:
         self._backend = backend
-        self.base = BasePower(data)
-        self.meter = PowerMeter(robot, data, dt, regeneration)
+        self.base, self._known = BasePower(plant.watts), BasePower(standing_watts(data))
+        self.meter = PowerMeter(plant, dt, regeneration)
 
     def set_load(self, load: Carried) -> None:
         """Count a load's own consumption from now on."""
-        self.base.set_tool(load.watts_always, load.watts_drive_bus)
+        for base in (self.base, self._known):
+            base.set_tool(load.watts_always, load.watts_drive_bus)
 
     def step(self, level: Mode) -> None:
         """Count one step at this level: STAND_ON_MOTORS or a rest."""
-        self.meter.add(self.base.of(level))
+        self.meter.add(self.base.of(level), self.base.tool(level), level is Mode.STAND_ON_MOTORS)
         if self.meter.pending() >= _SETTLE_STEPS:
             self.settle()
 
@@ -43,8 +47,8 @@ class Mains:
         return self.meter.reading().energy
 
     def standing_power(self, level: Mode, dynamics: DynamicsModel) -> float:
-        """Watts at the mains when standing in a mode at the present posture."""
-        watts = self.base.of(level)
+        """Watts at the mains that the controller expects of a mode at the present posture."""
+        watts = self._known.of(level)
         if level is Mode.STAND_ON_MOTORS:
             q = self._backend.q[None]
             hold = dynamics.gravity(q) - dynamics.counterbalance(q)

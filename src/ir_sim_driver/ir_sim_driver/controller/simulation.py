@@ -34,14 +34,14 @@ from ir_sim_driver.motion import (
     manual_scaling,
 )
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.plant import Backend, Carried
+from ir_sim_driver.plant import Backend, Carried, Plant, nominal_plant
 from ir_sim_driver.plc import Plc, Watchdog
 
 _HOME = 0.01  # rad off machine home that still count as there
 
 
 class Simulation:
-    """A cell's robot and controller; backend: a robot of the same kind with the same dt.
+    """A cell's robot and controller; backend: a robot of `plant` (default: the nominal one), same dt.
 
     Raises nothing in `step`: a backend that fails is stopped, named in `notices`, and restarted by `recover`.
     """
@@ -53,6 +53,7 @@ class Simulation:
         backend: Backend,
         load: Carried,
         settings: SimulationSettings | None = None,
+        plant: Plant | None = None,
     ) -> None:
         self.settings = settings = settings or SimulationSettings()
         self.cell, self.robot, self.backend = cell, cell.robot, backend
@@ -61,7 +62,8 @@ class Simulation:
         home = np.array(cell.machine_home)
         backend.reset(home)
         self.dynamics = DynamicsModel(self.robot, (), cell.base_pose)
-        self.mains = Mains(cell.robot, data, backend, settings.dt, settings.controller.regeneration_mode)
+        self.plant = plant or nominal_plant(cell.robot, data)
+        self.mains = Mains(self.plant, data, backend, settings.dt, settings.controller.regeneration_mode)
         self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
         pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
         self.control = ModeControl(settings, self.plc, self.standing_power, pe_ids)
@@ -70,11 +72,9 @@ class Simulation:
         self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)
         self.safety = Safety(self.robot, backend, self.executor, self.tool, self.plc, self.notices, settings)
         self._carry(load)
-        self.steps = 0
-        self.speed_scaling = 1.0
-        self._goals = 0
+        self.steps, self.speed_scaling = 0, 1.0
+        self._goals, self._goal_energy = 0, 0.0
         self._outcomes: list[Outcome] = []
-        self._goal_energy = 0.0
 
     @property
     def time(self) -> float:

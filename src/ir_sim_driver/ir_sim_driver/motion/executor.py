@@ -38,6 +38,7 @@ class _Run:
     label: str
     wait: int  # steps until it may start
     quiet: float  # bound of the tool's deviation [m] below which nothing can be broken
+    error: FloatArray  # largest of each joint so far (n,) [rad]
     s: float = 0.0
     ahead: Iterator[tuple[float, FloatArray]] = field(default_factory=lambda: iter(()))  # at an even speed
     settling: int = 0
@@ -168,6 +169,7 @@ class Executor:
             goal.label or goal.trajectory.trajectory_id,
             max(0, round(delay / self._dt)),
             -1.0 if path_tolerance.has_velocity else quiet,
+            self._still,
         )
         # a route from rest starts with speed zero, so path time may start at once; one in motion carries on
         self._speed.value = 1.0 if moving else 0.0
@@ -247,6 +249,8 @@ class Executor:
             return
         if self.deviation > run.deviation:
             run.deviation = self.deviation
+        if bound > 0.0:
+            run.error = np.maximum(run.error, np.abs(error))
         if not run.stopping:
             sentence = "" if bound <= run.quiet else self._broken(run, error, robot)
             if sentence:
@@ -279,7 +283,15 @@ class Executor:
         self._run.outcome = replace(self._run.outcome, code=code, sentence=sentence, canceled=canceled)
 
     def _finish(self) -> None:
-        assert self._run is not None
-        self._outcomes.append(replace(self._run.outcome, max_tool_deviation=self._run.deviation))
+        run = self._run
+        assert run is not None
+        self._outcomes.append(
+            replace(
+                run.outcome,
+                max_tool_deviation=run.deviation,
+                max_tracking_error=tuple(run.error.tolist()),
+                settling_time=run.settling * self._dt,
+            )
+        )
         self._run = None
         self._speed.value = 0.0

@@ -55,7 +55,8 @@ class Outcome:
     """How goal `goal_id` ended.
 
     canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp; energy
-    [J] at the mains while it ran.
+    [J] at the mains while it ran; max_tracking_error: largest error of each joint [rad]; settling_time [s]
+    from the end of the command until the robot was within the goal tolerance.
     """
 
     goal_id: int
@@ -64,3 +65,5 @@ class Outcome:
     canceled: bool = False
     max_tool_deviation: float = 0.0
     energy: float = 0.0
+    max_tracking_error: tuple[float, ...] = ()
+    settling_time: float = 0.0

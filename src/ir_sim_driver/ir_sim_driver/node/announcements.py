@@ -20,7 +20,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.ros.conversions import carried_load_to_msg, controller_timers_to_msg
 from ir_msgs_py.ros.quality import LATCHED
 from ir_sim_driver.controller import Driver, PlannedCell
-from ir_sim_driver.plant import Carried
+from ir_sim_driver.plant import Carried, plant_to_yaml
 
 _LOOK_PERIOD = 0.1  # s: a load that came with a cell is announced a moment later
 
@@ -41,6 +41,8 @@ class Announcements:
         timers = controller_timers_to_msg(driver.timers)
         timers.header.stamp = self._now()
         self._timers.publish(timers)
+        self._plant = node.create_publisher(String, names.PLANT, LATCHED)
+        self._plant.publish(String(data=plant_to_yaml(driver.plant)))
         self.look()
         node.create_timer(_LOOK_PERIOD, self.look)
         node.create_subscription(CellState, names.CELL, self._heard, LATCHED)

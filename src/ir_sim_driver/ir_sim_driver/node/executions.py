@@ -105,6 +105,8 @@ class Executions:
         result.error_code, result.error_string = int(outcome.code), one_line(outcome.sentence)
         if hasattr(result, "max_tool_deviation"):  # ours; FollowJointTrajectory knows neither
             result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
+            result.max_tracking_error = list(outcome.max_tracking_error)
+            result.settling_time, result.plant = outcome.settling_time, self._driver.plant.name
         if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):
             handle.canceled()
         elif outcome.code is ErrorCode.SUCCESSFUL:

@@ -69,7 +69,7 @@ class SimDriver(Node):
         self.add_on_set_parameters_callback(self._keep_time)
         options = configuration.node
         simulation = simulation or make_simulation(
-            options.cell, options.load, options.backend, configuration.simulation
+            options.cell, options.load, options.backend, configuration.simulation, plant=options.plant
         )
         steps = round(1.0 / (options.joint_state_rate * simulation.settings.dt))
         self._driver = Driver(simulation, steps, configuration.wake_hint)

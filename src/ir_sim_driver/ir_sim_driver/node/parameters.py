@@ -29,6 +29,11 @@ class NodeSettings:
         read_only=True,
     )
     backend: str = setting("pybullet", "What simulates the robot.", choices=tuple(BACKENDS), read_only=True)
+    plant: str = setting(
+        "nominal",
+        "Which plant is simulated: nominal, typical, typical:SEED, or the path of a plant file (.yaml).",
+        read_only=True,
+    )
     joint_state_rate: int = setting(
         500,
         "Messages of joint_states per second; must divide 1000.",

@@ -55,8 +55,14 @@ class Backend(Protocol):
     def reset(self, q: FloatArray) -> None:
         """Stand still at q (n,), commanded to stay there."""
 
-    def set_load(self, loads: Sequence[Load]) -> None:
-        """Carry these loads (ir_description Load, in the last link's frame) from now on."""
+    @property
+    def temperature(self) -> FloatArray | None:
+        """Of the gears (n,) [deg C]; None where there are none."""
+
+    def set_load(self, loads: Sequence[Load], declared: Sequence[Load] | None = None) -> None:
+        """Carry these loads (ir_description Load, in the last link's frame) from now on; the controller takes
+        them for the declared ones, where these are given.
+        """
 
     def track(self, q_next: FloatArray) -> None:
         """Make a step of dt: the motors follow the command, which is q_next (n,) at the end of the step."""

@@ -1,59 +1,123 @@
-"""Computed torque with PD: the acceleration that brings the robot back onto the command.
+"""The drives' control: feed-forward from the model of the robot, and feedback; it knows nothing of the plant.
 
-Command and robot are compared on the same grid of steps: speed is the difference of two commands,
-acceleration the difference of two speeds. The command's velocity and acceleration feed forward exactly,
-whatever its path time does, and there is nothing to differentiate by hand.
+Position loop around a speed loop with an integral part, as in drives with a feed-forward of speed:
+
+    u = K_v (e' + K_p e + (1 / T_i) integral of (e' + K_p e)),    torque = model(q_c, q_c', q_c'' + u)
+
+e is the command less what the encoder says, on the same grid of steps: speed is the difference of two
+positions, acceleration the difference of two speeds, so the command feeds forward exactly, whatever its path
+time does; e' is filtered. The model is that of the data with the declared load; its inertia turns u into
+torques.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_description import Load, RobotModel
+from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.settings import check_settings, setting
+from ir_sim_driver.plant.drivetrain import Drivetrain
+from ir_sim_driver.plant.gears import SMOOTHING
+
+_TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
 class ControlSettings:
-    """Gains of the position loop; the frequency is bounded by what a 1 kHz loop can do."""
+    """Gains and encoders of the drives; the gains are bounded by what a 1 kHz loop can do."""
 
-    natural_frequency: float = setting(
-        100.0,
-        "Natural frequency of the position error.",
-        unit="rad/s",
-        minimum=1.0,
-        maximum=300.0,
+    position_gain: float = setting(
+        40.0, "Gain of the position loop.", unit="1/s", minimum=1.0, maximum=100.0, read_only=True
+    )
+    speed_gain: float = setting(
+        150.0, "Gain of the speed loop.", unit="1/s", minimum=10.0, maximum=400.0, read_only=True
+    )
+    integral_time: float = setting(
+        0.04,
+        "Time in which the integral part of the speed loop doubles its answer.",
+        unit="s",
+        minimum=0.005,
+        maximum=10.0,
         read_only=True,
     )
-    damping: float = setting(1.0, "Damping of the position error.", minimum=0.3, maximum=2.0, read_only=True)
+    speed_filter: float = setting(
+        0.003,
+        "Time constant of the filter on the error of speed, which an encoder gives in steps.",
+        unit="s",
+        minimum=0.0,
+        maximum=0.02,
+        read_only=True,
+    )
+    encoder_counts: int = setting(
+        65536,
+        "Steps of an encoder per turn of its motor (an estimate: a resolver of 16 bits).",
+        minimum=1000,
+        maximum=16_777_216,
+        read_only=True,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)
 
 
-class CommandFollower:
-    """Turns commands (n,), one per step of dt [s], into wanted accelerations (n,)."""
+class ServoControl:
+    """Turns commands (n,), one per step of dt [s], into motor torques at the joint (n,) [Nm].
 
-    def __init__(self, dt: float, settings: ControlSettings | None = None) -> None:
-        settings = settings or ControlSettings()
-        self._per_dt = 1.0 / dt
-        self._kp = settings.natural_frequency**2
-        self._kd = 2.0 * settings.damping * settings.natural_frequency
+    robot: the model, an ir_description RobotModel, standing at base_pose (4, 4).
+    """
+
+    def __init__(
+        self, robot: RobotModel, dt: float, base_pose: FloatArray, settings: ControlSettings | None = None
+    ) -> None:
+        s = settings or ControlSettings()
+        self._dt, self._per_dt = dt, 1.0 / dt
+        self._kp, self._kv, self._per_ti = s.position_gain, s.speed_gain, 1.0 / s.integral_time
+        self._share = dt / (s.speed_filter + dt)
+        self._count: FloatArray = _TURN / s.encoder_counts / np.array(robot.gear_ratio)
+        none = np.zeros(len(robot.joint_names))
+        self._bare = replace(robot, friction_viscous=none, friction_coulomb=none)
+        self._viscous, self._coulomb = np.array(robot.friction_viscous), np.array(robot.friction_coulomb)
+        self._base_pose, self._drives = base_pose, Drivetrain(robot)
+        self.declare(())
+
+    def declare(self, loads: Sequence[Load]) -> None:
+        """Take these for what the robot carries."""
+        self._model = DynamicsModel(self._bare, tuple(loads), self._base_pose)
 
     def reset(self, q: FloatArray) -> None:
         """Start over with a command that stands at q."""
         self.command: FloatArray = q.copy()
+        self._seen = self._measured(q)
         self._speed: FloatArray = np.zeros(len(q))
+        self._integral: FloatArray = np.zeros(len(q))
+        self._slow: FloatArray = np.zeros(len(q))
 
-    def acceleration(self, q_next: FloatArray, q: FloatArray, qd: FloatArray) -> FloatArray:
-        """Acceleration (n,) for the step that ends with the command q_next; the robot is at q, qd now."""
+    def torque(self, q_next: FloatArray, q: FloatArray) -> tuple[FloatArray, bool]:
+        """Torque (n,) for the step that ends with the command q_next, the robot being at q now, and whether
+        the envelope has cut it.
+        """
+        seen, dt = self._measured(q), self._dt
+        measured = (seen - self._seen) * self._per_dt  # half a step old, as the commanded speed is
         speed = (q_next - self.command) * self._per_dt
-        wanted: FloatArray = (
-            (speed - self._speed) * self._per_dt
-            + self._kd * (self._speed - qd)
-            + self._kp * (self.command - q)
-        )
-        self.command, self._speed = q_next, speed
-        return wanted
+        change = (speed - self._speed) * self._per_dt
+        self._slow = self._slow + self._share * (self._speed - measured - self._slow)
+        wrong = self._slow + self._kp * (self.command - seen)
+        u = self._kv * (wrong + self._per_ti * self._integral)
+        now = self._speed + (0.5 * dt) * change
+        wanted = self._model.inverse_dynamics(self.command[None], now[None], (change + u)[None])[0]
+        wanted += self._viscous * now + self._coulomb * np.tanh(now * (1.0 / SMOOTHING))
+        torque, cut = self._drives.limited(wanted, measured)
+        if not cut:  # else the integral would wind up
+            self._integral += dt * wrong
+        self._seen, self.command, self._speed = seen, q_next, speed
+        return torque, cut
+
+    def _measured(self, q: FloatArray) -> FloatArray:
+        """What the encoders say (n,) [rad]."""
+        seen: FloatArray = np.rint(q / self._count) * self._count
+        return seen

@@ -1,4 +1,4 @@
-"""What stands between motor and link: rotor inertia, friction, counterbalance and the torque envelope (eq.
+"""What stands between motor and link beside friction: rotor inertia, counterbalance, the torque envelope (eq.
 8).
 
 One robot at a time and in plain floats where that is faster: this runs every millisecond.
@@ -14,10 +14,6 @@ import numpy as np
 from ir_description import RobotModel
 from ir_msgs_py.arrays import FloatArray
 
-FRICTION_SMOOTHING = 1e-3
-"""Speed [rad/s] over which Coulomb friction changes its sign: 1/1000 of working speed, and zero at rest, so
-that it never hides the holding torque."""
-
 
 class Drivetrain:
     """Drives of the n joints of `robot` (an ir_description RobotModel).
@@ -25,11 +21,8 @@ class Drivetrain:
     rotor_inertia (n,) [kg m^2], seen at the joint.
     """
 
-    def __init__(self, robot: RobotModel, smoothing: float = FRICTION_SMOOTHING) -> None:
+    def __init__(self, robot: RobotModel) -> None:
         self.rotor_inertia: FloatArray = np.array(robot.reflected_inertia)
-        self._viscous: FloatArray = np.array(robot.friction_viscous)
-        self._coulomb: FloatArray = np.array(robot.friction_coulomb)
-        self._per_smoothing = 1.0 / smoothing
         c = robot.counterbalance
         self._gas_joint = -1 if c is None else c.joint
         # plain floats: five times faster than numpy's, every millisecond
@@ -53,11 +46,11 @@ class Drivetrain:
         self._torques: list[list[float]] = np.array(robot.envelope_torque).tolist()
         self._least: FloatArray = np.array(robot.envelope_torque)[:, -1]
 
-    def resistance(self, q: FloatArray, qd: FloatArray) -> FloatArray:
-        """Friction less counterbalance (n,) [Nm]: what the motor has to add to H qdd + h."""
-        torque: FloatArray = self._viscous * qd + self._coulomb * np.tanh(qd * self._per_smoothing)
+    def counterbalance(self, q: FloatArray) -> FloatArray:
+        """What the counterbalance does about the positive axes (n,) [Nm]."""
+        torque: FloatArray = np.zeros(len(q))
         if self._gas_spring is not None:
-            torque[self._gas_joint] -= self.counterbalance_torque(float(q[self._gas_joint]))
+            torque[self._gas_joint] = self.counterbalance_torque(float(q[self._gas_joint]))
         return torque
 
     def counterbalance_torque(self, angle: float) -> float:

@@ -42,8 +42,13 @@ class IdealBackend:
         self._earlier: FloatArray = self.q
         self._path = [self.q, self.q]
 
-    def set_load(self, loads: Sequence[Load]) -> None:
-        """Carry these loads."""
+    @property
+    def temperature(self) -> None:
+        """It has no gears."""
+        return None
+
+    def set_load(self, loads: Sequence[Load], declared: Sequence[Load] | None = None) -> None:
+        """Carry these loads; nobody needs to declare them, as nothing has to be controlled."""
         self._settle()
         self._dynamics = DynamicsModel(self._robot, tuple(loads), self._base_pose)
 

@@ -1,87 +1,75 @@
-"""The mains meter: base load by mode, axes through the common DC bus, energy that is the integral of the
-power.
+"""The mains meter: base load by mode, axes through the DC link, energy that is the integral of the power.
 
-P = P_controller(mode) + P_tool(mode) + P_drives + max(0, bus); axis power at the bus is torque times speed
-plus the copper loss (design of the drives: ir_kernels.power).
+mains = base + supplied + rectifier loss, and supplied = axes + brake resistor + change of the capacitor; what
+an axis takes is mechanical work, copper, inverter and iron losses. All of it is the plant's own.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import PowerData, RobotModel
-from ir_kernels.power import DcBusParameters, Regeneration, dc_bus
+from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant.backend import Work
-
-
-class BasePower:
-    """Watts of controller, drives and tool in a mode; `data` is ir_description's PowerData."""
-
-    def __init__(self, data: PowerData) -> None:
-        self._controller: dict[Mode, float] = {Mode[mode.name]: mode.controller_watts for mode in data.modes}
-        self._drives = float(data.drives_and_brake_release)
-        self.set_tool(0.0, 0.0)
-
-    def set_tool(self, always: float, drive_bus: float) -> None:
-        """Take the tool's watts: always, and more while the drive bus is up."""
-        self._watts = {level: watts + always for level, watts in self._controller.items()}
-        for level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
-            self._watts[level] += drive_bus
-        self._watts[Mode.STAND_ON_MOTORS] += self._drives
-
-    def of(self, level: Mode) -> float:
-        """Watts in STAND_ON_MOTORS or a rest, without holding torque."""
-        return self._watts[level]
+from ir_sim_driver.plant.dc_circuit import DcCircuit
+from ir_sim_driver.plant.drive_losses import DriveLosses
+from ir_sim_driver.plant.plant_parameters import Plant
 
 
 @dataclass(frozen=True, eq=False)
 class MeterReading:
-    """Since the meter started, and in the last steps.
+    """Since the meter started, and in the last step.
 
-    time [s], energy [J] at the mains, burnt_energy [J], axis_energy (n,) [J] at the DC bus, base_energy [J];
-    base_power [W], bus_voltage [V], joint_power (n,) [W] and joint_torque (n,) [Nm] of the last step.
+    time [s], energy [J] at the mains: of base_energy (tool_energy is a part of it), axis_energy (n,),
+    burnt_energy, capacitor_energy and rectifier_energy. axis_energy is made of mechanical_energy,
+    copper_energy, inverter_energy and iron_energy, each (n,). base_power, tool_power [W], bus_voltage [V],
+    joint_power (n,) [W], joint_torque (n,) [Nm], joint_current (n,) [A rms] of the last step.
     """
 
     time: float
     energy: float
     burnt_energy: float
     base_energy: float
+    tool_energy: float
+    rectifier_energy: float
     axis_energy: FloatArray
+    mechanical_energy: FloatArray
+    copper_energy: FloatArray
+    inverter_energy: FloatArray
+    iron_energy: FloatArray
     capacitor_energy: float
     base_power: float
+    tool_power: float
     bus_voltage: float
     joint_power: FloatArray
     joint_torque: FloatArray
+    joint_current: FloatArray
 
 
 class PowerMeter:
-    """Counts steps of dt [s] for `robot`; `data` is PowerData."""
+    """Counts steps of dt [s] of `plant`."""
 
-    def __init__(
-        self, robot: RobotModel, data: PowerData, dt: float, regeneration: Regeneration = "shared"
-    ) -> None:
+    def __init__(self, plant: Plant, dt: float, regeneration: Regeneration = "shared") -> None:
         self._dt = dt
-        self._copper: FloatArray = np.array(robot.copper_loss) / np.array(robot.gear_ratio) ** 2
-        self._bus = DcBusParameters(data.dc_link_capacity_energy, regeneration)
-        self._voltage, self._capacitance = data.dc_link.voltage, data.dc_link.capacitance
-        n = len(robot.joint_names)
+        self._losses = DriveLosses(plant.drives, np.array(plant.robot.gear_ratio))
+        self._circuit = DcCircuit(plant.link, dt, regeneration)
         self._base: list[float] = []
+        self._tool: list[float] = []
+        self._powered: list[bool] = []
         self._steps = 0
-        self._stored = 0.0
-        self._energy = self._dissipated = self._base_energy = 0.0
-        self._axes: FloatArray = np.zeros(n)
-        self._power: FloatArray = np.zeros(n)
-        self._torque: FloatArray = np.zeros(n)
-        self._last_base = 0.0
+        self._supplied = self._dissipated = self._rectifier = self._base_energy = self._tool_energy = 0.0
+        n = len(plant.robot.joint_names)
+        self._parts: FloatArray = np.zeros((4, n))  # mechanical, copper, inverter, iron [J]
+        self._power = self._torque = self._current = np.zeros(n)
+        self._last_base = self._last_tool = 0.0
 
-    def add(self, base_power: float) -> None:
-        """Count one step with this base load [W]."""
+    def add(self, base_power: float, tool_power: float = 0.0, powered: bool = True) -> None:
+        """Count one step with this base load [W], the tool's share of it, and whether motors are on."""
         self._base.append(base_power)
+        self._tool.append(tool_power)
+        self._powered.append(powered)
 
     def pending(self) -> int:
         """Steps that are counted but not yet settled."""
@@ -91,29 +79,43 @@ class PowerMeter:
         """Take what the motors did in the steps that were added since the last call, one row per step."""
         if not self._base:
             return
-        base = np.array(self._base)
+        dt = self._dt
+        axes = self._losses.power(work, np.array(self._powered, dtype=np.float64))
+        total = axes.total
+        step = self._circuit.step
+        flows = np.array([step(row) for row in total.tolist()]).sum(axis=0).tolist()
+        self._supplied, self._dissipated = self._supplied + flows[0], self._dissipated + flows[1]
+        self._rectifier += flows[2]
+        self._steps += len(total)
+        self._base_energy += dt * sum(self._base)
+        self._tool_energy += dt * sum(self._tool)
+        self._parts = self._parts + dt * np.array([part.sum(axis=0) for part in axes[:4]])
+        self._power, self._torque, self._current = total[-1], work.torque[-1], axes.current[-1]
+        self._last_base, self._last_tool = self._base[-1], self._tool[-1]
         self._base.clear()
-        axes = work.torque * work.speed + self._copper * work.torque**2
-        bus = dc_bus(axes, self._dt, self._bus, self._stored)
-        self._stored = float(bus.stored[-1])
-        self._steps += len(base)
-        self._energy += self._dt * float((base + bus.mains).sum())
-        self._dissipated += self._dt * float(bus.dissipated.sum())
-        self._base_energy += self._dt * float(base.sum())
-        self._axes = self._axes + self._dt * axes.sum(axis=0)
-        self._power, self._torque, self._last_base = axes[-1], work.torque[-1], float(base[-1])
+        self._tool.clear()
+        self._powered.clear()
 
     def reading(self) -> MeterReading:
         """What the meter shows."""
+        mechanical, copper, inverter, iron = self._parts
         return MeterReading(
-            self._steps * self._dt,
-            self._energy,
-            self._dissipated,
-            self._base_energy,
-            self._axes,
-            self._stored,
-            self._last_base,
-            math.sqrt(self._voltage**2 + 2.0 * self._stored / self._capacitance),
-            self._power,
-            self._torque,
+            time=self._steps * self._dt,
+            energy=self._base_energy + self._supplied + self._rectifier,
+            burnt_energy=self._dissipated,
+            base_energy=self._base_energy,
+            tool_energy=self._tool_energy,
+            rectifier_energy=self._rectifier,
+            axis_energy=self._parts.sum(axis=0),
+            mechanical_energy=mechanical,
+            copper_energy=copper,
+            inverter_energy=inverter,
+            iron_energy=iron,
+            capacitor_energy=self._circuit.stored,
+            base_power=self._last_base,
+            tool_power=self._last_tool,
+            bus_voltage=self._circuit.voltage,
+            joint_power=self._power,
+            joint_torque=self._torque,
+            joint_current=self._current,
         )

@@ -1,0 +1,179 @@
+"""The arm with its loads as rigid bodies in PyBullet. The only file that knows PyBullet."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ir_description import Load, RobotModel
+from ir_msgs_py.arrays import FloatArray
+from ir_sim_driver.errors import BackendError
+from ir_sim_driver.plant.bullet_inertia import ATTEMPTS, nudged, nudged_robot, solid
+
+GRAVITY = 9.80665
+SPEED_GUARD = 50.0
+"""Speed [rad/s] that no joint reaches: beyond it the physics has diverged."""
+
+
+class BulletArm:
+    """Links of `robot` standing at base_pose (4, 4), stepped by dt [s].
+
+    urdf: makes the URDF text of the robot with a tuple of loads.
+    Raises BackendError when PyBullet is missing or has diverged.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        dt: float,
+        urdf: Callable[[RobotModel, tuple[Load, ...]], str],
+        base_pose: FloatArray,
+    ) -> None:
+        # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no base pose
+        self._base = base_pose
+        self._gravity = (base_pose[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
+        self._bullet, self._client = _pybullet(), -1
+        self._robot, self._dt, self._urdf = robot, dt, urdf
+        self._loads: tuple[Load, ...] = ()
+        self._still = [0.0] * len(robot.joint_names)
+
+    def close(self) -> None:
+        """Let go of the physics server."""
+        self._bullet.disconnect(physicsClientId=self._client)
+
+    def connect_again(self) -> None:
+        """Start the physics server again when it is gone."""
+        if not self._bullet.isConnected(self._client):
+            self.carry(self._loads, self._still)
+
+    def carry(self, loads: Sequence[Load], q: Sequence[float]) -> None:
+        """Rebuild the robot with these loads. Raises BackendError where Bullet takes none of their inertia.
+
+        Bullet turns an inertia into the frame of a link, and refuses to compute with it where rounding has
+        left it unsymmetrical by one bit: then it is tried with one that differs by parts in a billion.
+        """
+        bodies = [solid(load) for load in loads]
+        for attempt in range(ATTEMPTS):
+            self._loads = tuple(nudged(load, attempt) for load in bodies)
+            self._build(nudged_robot(self._robot, attempt))
+            try:
+                self.inverse_dynamics(q, self._still, self._still)
+                return
+            except BackendError:
+                continue
+        names = ", ".join(load.name for load in loads)
+        raise BackendError(f"PyBullet cannot compute with the inertia of {names or 'the robot'}")
+
+    def mass_matrix(self, q: Sequence[float]) -> FloatArray:
+        """H (n, n) at q, without rotor inertia."""
+        H = self._call(self._bullet.calculateMassMatrix, self._body, q)
+        return np.array(H, dtype=np.float64)
+
+    def inverse_dynamics(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> FloatArray:
+        """Torque H qdd + h (n,) on the links."""
+        return np.array(self._call(self._bullet.calculateInverseDynamics, self._body, q, qd, qdd))
+
+    def link_com_position(self, link: int) -> FloatArray:
+        """Centre of mass (3,) of link 1..n in the world [m].
+
+        Bullet keeps this frame in double precision, the link frame itself only in single.
+        """
+        state = self._bullet.getLinkState(
+            self._body, self._joints[link - 1], computeForwardKinematics=True, physicsClientId=self._client
+        )
+        position: FloatArray = self._base[:3, :3] @ np.array(state[0]) + self._base[:3, 3]
+        return position
+
+    def write(self, q: Sequence[float], qd: Sequence[float]) -> None:
+        """Be at q, moving at qd."""
+        for joint, position, speed in zip(self._joints, q, qd, strict=True):
+            self._call(self._bullet.resetJointState, self._body, joint, position, speed)
+
+    def advance(self, torque: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+        """Make a step with these torques on the links: position (n,), and speed (n,) over the step."""
+        bullet, call = self._bullet, self._call
+        call(
+            bullet.setJointMotorControlArray,
+            self._body,
+            self._joints,
+            bullet.TORQUE_CONTROL,
+            forces=torque,
+        )
+        call(bullet.stepSimulation)
+        states = call(bullet.getJointStates, self._body, self._joints)
+        speeds = [state[1] for state in states]
+        if not all(-SPEED_GUARD < x < SPEED_GUARD for x in speeds):  # NaN does not pass either
+            raise BackendError(f"the physics has diverged: a joint moves faster than {SPEED_GUARD:g} rad/s")
+        return np.array([state[0] for state in states]), np.array(speeds)
+
+    def _build(self, robot: RobotModel) -> None:
+        """Make a new server: the inverse dynamics of a removed body live on in the old one. Where that is not
+        possible the old one stays.
+        """
+        text, old = self._urdf(robot, self._loads), self._client
+        self._client = _connect(self._bullet, self._dt, self._gravity)
+        try:
+            self._body = self._load(text)
+        except (OSError, BackendError) as error:
+            self._bullet.disconnect(physicsClientId=self._client)
+            self._client = old
+            raise BackendError(f"PyBullet can't be given the robot: {error}") from error
+        if self._bullet.isConnected(old):
+            self._bullet.disconnect(physicsClientId=old)
+        self._prepare()
+
+    def _load(self, text: str) -> int:
+        """The body of a URDF."""
+        file = os.memfd_create("robot.urdf")  # a full or read-only disk is no reason to have no robot
+        try:
+            os.write(file, text.encode())
+            path, flags = f"/proc/self/fd/{file}", self._bullet.URDF_USE_INERTIA_FROM_FILE
+            return int(self._call(self._bullet.loadURDF, path, useFixedBase=True, flags=flags))
+        finally:
+            os.close(file)
+
+    def _prepare(self) -> None:
+        """Take from the body what Bullet adds: damping, collisions, motors."""
+        bullet, client = self._bullet, self._client
+        undamped = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0.0)
+        self._joints = self._movable_joints()
+        for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
+            bullet.changeDynamics(self._body, link, **undamped, physicsClientId=client)
+            bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=client)
+        for joint in self._joints:  # the built-in motors off
+            bullet.setJointMotorControl2(
+                self._body, joint, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client
+            )
+
+    def _movable_joints(self) -> list[int]:
+        by_name = {}
+        for joint in range(self._bullet.getNumJoints(self._body, physicsClientId=self._client)):
+            info = self._bullet.getJointInfo(self._body, joint, physicsClientId=self._client)
+            by_name[info[1].decode()] = joint
+        return [by_name[name] for name in self._robot.joint_names]
+
+    def _call(self, function: Any, *arguments: Any, **more: Any) -> Any:
+        try:
+            return function(*arguments, physicsClientId=self._client, **more)
+        except (self._bullet.error, SystemError, ValueError, TypeError) as error:
+            raise BackendError(f"PyBullet failed: {error}") from error  # it raises whatever C leaves behind
+
+
+def _pybullet() -> Any:
+    try:
+        import pybullet  # a missing PyBullet is reported when it is wanted
+    except ImportError as error:
+        raise BackendError(f"PyBullet is not installed ({error}): use backend ideal") from error
+    return pybullet
+
+
+def _connect(bullet: Any, dt: float, gravity: list[float]) -> int:
+    client = int(bullet.connect(bullet.DIRECT))
+    if client < 0:
+        raise BackendError("PyBullet offers no physics server")
+    bullet.setGravity(*gravity, physicsClientId=client)
+    bullet.setTimeStep(dt, physicsClientId=client)
+    return client
