@@ -70,7 +70,7 @@ def machine(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.Monkey
     yield machine
     machine.ended.set()
     executor.shutdown()
-    spinning.join(5.0)
+    spinning.join(60.0)
     machine.server.destroy()
     machine.node.destroy_node()
 
@@ -96,9 +96,9 @@ def test_another_process_cancels_what_runs(machine: Machine, capsys: pytest.Capt
 
     sender = threading.Thread(target=send)
     sender.start()
-    assert machine.running.wait(30.0)
+    assert machine.running.wait(60.0)
     assert main(["cancel", ACTION]) == 0
-    sender.join(30.0)
+    sender.join(60.0)
     assert codes == [1]
     printed = capsys.readouterr().out
     assert f"1 goal of {ACTION} will end" in printed

@@ -138,7 +138,7 @@ def test_a_speed_scaling_that_means_nothing_is_ignored_with_a_warning(make, fact
     assert "speed scaling" in simulation.notices.last.sentence
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(at=st.floats(0.0, 2.0), backend=st.sampled_from(["ideal", "pybullet"]))
 def test_a_cancel_at_any_instant_stops_on_the_path_within_the_limits(make, plan, start, cell, at, backend):
     home = np.array(cell.machine_home)

@@ -46,7 +46,7 @@ def serve():
     def serve_one(simulation, **limits):
         driver = Driver(simulation)
         server = opened_on(driver, **limits)
-        client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=10)
+        client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=60)
         assert client.connect()
         opened.append((client, server, driver))
         return driver, client, server.port

@@ -60,7 +60,7 @@ def received(link: socket.socket, count: int) -> bytes:
 
 
 def is_served(port: int) -> bool:
-    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as link:
+    with socket.create_connection(("127.0.0.1", port), timeout=60.0) as link:
         link.sendall(frame(READ_ALL_COILS))
         try:
             return len(received(link, 11)) == 11
@@ -69,7 +69,7 @@ def is_served(port: int) -> bool:
 
 
 def connected(port: int) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", port), timeout=10.0)
+    return socket.create_connection(("127.0.0.1", port), timeout=60.0)
 
 
 def test_a_hundred_silent_clients_leave_a_place_and_no_line_in_the_log(
@@ -145,7 +145,7 @@ def test_what_is_no_modbus_ends_its_connection(open_port: Opened, header: tuple[
 def test_several_registers_are_written_together_or_not_at_all(open_port: Opened, driver: Driver) -> None:
     """No step of the plant sees the half: the mode switch at T1 would stop a movement."""
     seen: list[OperatingMode] = []
-    client = ModbusTcpClient("127.0.0.1", port=open_port(), timeout=10)
+    client = ModbusTcpClient("127.0.0.1", port=open_port(), timeout=60)
     assert client.connect()
     ended = threading.Event()
 

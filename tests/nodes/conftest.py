@@ -38,8 +38,8 @@ def planner_node(ros_context: Any, cell_name: str) -> Iterator[PlannerNode]:
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     yield node
-    executor.shutdown(timeout_sec=5.0)
-    thread.join(5.0)
+    executor.shutdown(timeout_sec=60.0)  # a callback that still runs needs the node
+    thread.join(60.0)
     node.destroy_node()
 
 

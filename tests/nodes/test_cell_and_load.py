@@ -39,7 +39,7 @@ def make_driver(ros_context: Any, ros_executor: Any) -> Callable[..., SimDriver]
 
 @pytest.fixture
 def client(ros_context: Any) -> Any:
-    with Client(context=ros_context, timeout=30.0) as opened:
+    with Client(context=ros_context, timeout=60.0) as opened:
         yield opened
 
 
@@ -113,7 +113,7 @@ def test_the_drivers_timers_count_while_there_is_a_driver(
         answer = client.ask(names.PLAN_STANDBY, PlanStandby.Request(pause=60.0))
         assert (answer.timers, answer.controller_timer) == ("driver", 7.0)
         assert answer.alternatives[1].regular_time_to_operate == 1.25
-    wait_for(lambda: planner_node.planner.heard.timers is None, timeout=20.0, what="the driver is forgotten")
+    wait_for(lambda: planner_node.planner.heard.timers is None, what="the driver is forgotten")
     assert client.ask(names.PLAN_STANDBY, PlanStandby.Request(pause=60.0)).timers == "data"
 
 

@@ -61,7 +61,7 @@ def test_a_driver_that_nothing_can_wake_refuses_to_hibernate(
         answer = client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
         assert "HIB is 1 but ignored: nothing could wake the controller" in answer.status.message
         assert str(taken_port) in answer.status.message
-        wait_for(lambda: any("HIB ignored: nothing could wake" in text for text in said), timeout=10.0)
+        wait_for(lambda: any("HIB ignored: nothing could wake" in text for text in said))
         modes = client.ask(names.QUERY_MODES, QueryModes.Request())
         assert modes.current == PowerMode.STAND_ON_MOTORS
         assert PowerMode.HIBERNATION not in {mode.mode for mode in modes.modes}
@@ -92,4 +92,4 @@ def test_diagnostics_say_which_cell_they_are_of(start_driver, ros_node, wait_for
     start_driver("cell_1", 0)
     start_driver(None, 0)
     parts = {"ir_sim_driver: plant", "ir_sim_driver: controller", "ir_sim_driver: executor"}
-    wait_for(lambda: heard == parts | {f"cell_1/{part}" for part in parts}, timeout=10.0)
+    wait_for(lambda: heard == parts | {f"cell_1/{part}" for part in parts})

@@ -32,7 +32,7 @@ def modes(ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any) -> 
             PowerState, "/ir_sim_driver/power_state", lambda msg: heard.append(msg.mode), 100
         )
     )
-    wait_for(lambda: len(heard) > 10, timeout=20.0, what="the driver publishes")
+    wait_for(lambda: len(heard) > 10, what="the driver publishes")
     assert PowerMode.EMERGENCY_STOP not in heard
     return heard
 

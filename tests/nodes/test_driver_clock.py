@@ -91,7 +91,7 @@ def driver(ros_context, ros_executor):
 
 @pytest.fixture
 def client(ros_context, driver):
-    with Client(context=ros_context) as client:
+    with Client(context=ros_context, timeout=60.0) as client:
         yield client
 
 
@@ -107,11 +107,11 @@ def gaps(stamps):
 
 
 def test_before_the_clock_starts_nothing_passes_and_then_the_grid_begins(driver, clock, stamps, wait_for):
-    wait_for(lambda: clock._publisher.get_subscription_count() > 0, timeout=20.0)
+    wait_for(lambda: clock._publisher.get_subscription_count() > 0)
     assert driver._frame is None  # nothing was stepped
     assert not stamps
     clock.start(1_000 * NS)
-    wait_for(lambda: len(stamps) > 300, timeout=20.0)
+    wait_for(lambda: len(stamps) > 300)
     assert stamps[0] >= 1_000 * NS
     assert set(gaps(stamps[:300])) == {PERIOD}
 
@@ -120,17 +120,17 @@ def test_a_frozen_clock_freezes_the_plant_and_nothing_is_skipped_after(
     driver, client, clock, stamps, wait_for
 ):
     clock.start(50 * NS)
-    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    wait_for(lambda: len(stamps) > 100)
     frozen = clock.run_at(0.0)
-    wait_for(lambda: stamps[-1] + PERIOD > frozen, timeout=20.0)
+    wait_for(lambda: stamps[-1] + PERIOD > frozen)
     count = len(stamps)
     for _ in range(20):  # services go on while time stands
         assert client.graph.publishers(names.JOINT_STATES)
     assert len(stamps) == count
     clock.run_at(1.0)
-    wait_for(lambda: len(stamps) > count + 100, timeout=20.0)
+    wait_for(lambda: len(stamps) > count + 100)
     assert set(gaps(stamps)) == {PERIOD}
-    assert client.execute(movement(), timeout=30.0).energy > 0.0
+    assert client.execute(movement(), timeout=120.0).energy > 0.0
 
 
 @pytest.mark.parametrize(("jump", "where"), [(-20, "back"), (100, "ahead")])
@@ -138,7 +138,7 @@ def test_a_jump_aborts_the_goal_with_its_reason_and_the_grid_starts_anew(
     client, clock, stamps, wait_for, jump, where
 ):
     clock.start(100 * NS)
-    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    wait_for(lambda: len(stamps) > 100)
     jumped = []
 
     def leap(feedback):
@@ -147,7 +147,7 @@ def test_a_jump_aborts_the_goal_with_its_reason_and_the_grid_starts_anew(
             clock.leap(jump)
 
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.3, 4.0)))
-    result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=30.0)
+    result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=120.0)
     assert result.error_code == ExecuteTrajectory.Result.INVALID_GOAL
     assert f"the clock jumped {where}" in result.error_string
     assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=60.0).error_code == 0
@@ -165,19 +165,19 @@ def lead_in():
 
 def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(client, clock, stamps, wait_for):
     clock.start(10 * NS)
-    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    wait_for(lambda: len(stamps) > 100)
     clock.run_at(100.0)
     wait_for(lambda: stamps[-1] > 40 * NS, timeout=60.0)
     clock.run_at(1.0)
     wait_for(lambda: clock.now - stamps[-1] < NS, timeout=60.0)
     assert min(gaps(stamps)) >= PERIOD
     assert all(stamp % PERIOD == 0 for stamp in stamps)
-    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=30.0).error_code == 0
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=120.0).error_code == 0
 
 
 def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, stamps, wait_for):
     clock.start(10 * NS)
-    wait_for(lambda: len(stamps) > 100, timeout=20.0)
+    wait_for(lambda: len(stamps) > 100)
     answers = []
 
     def change(feedback):
@@ -185,7 +185,7 @@ def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, s
             answers.append(driver.set_parameters([Parameter("use_sim_time", value=False)])[0])
 
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.1, 1.0)))
-    assert client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=30.0).error_code == 0
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=120.0).error_code == 0
     assert not answers[0].successful
     assert "the robot moves" in answers[0].reason
     assert driver.get_parameter("use_sim_time").value is True
@@ -203,7 +203,7 @@ def test_its_own_clock_is_published_100_to_125_times_a_second(
     values = {"cell": "open", "backend": "ideal", "wake_port": 0, "real_time_factor": factor}
     overrides = [Parameter(name, value=value) for name, value in values.items()]
     ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
-    wait_for(lambda: len(ticks) > 20 and len(states) > 200, timeout=30.0)
+    wait_for(lambda: len(ticks) > 20 and len(states) > 200)
     periods = {b - a for a, b in pairwise(ticks)}
     assert len(periods) == 1
     assert NS / 125 <= periods.pop() / factor <= NS / 100  # of real time

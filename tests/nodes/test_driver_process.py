@@ -62,7 +62,7 @@ def test_signals_end_it_cleanly_also_two(signals, wait_for):
         wait_for(power, timeout=60.0)
         for number in signals:
             process.send_signal(number)
-        assert process.wait(30.0) == 0
+        assert process.wait(60.0) == 0
         assert process.stderr is not None
         assert "Traceback" not in process.stderr.read()
     finally:

@@ -52,7 +52,15 @@ def watcher(monkeypatch):
     context.try_shutdown()
 
 
-@pytest.mark.parametrize("signals", [[INT], [TERM], [INT, INT], [TERM, INT]])
+@pytest.mark.parametrize(
+    "signals",
+    [
+        [INT],
+        [TERM, INT],
+        pytest.param([TERM], marks=pytest.mark.long),
+        pytest.param([INT, INT], marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("name", MODULES)
 def test_a_node_that_is_asked_to_end_ends_well(name, signals, recording, tmp_path, watcher, wait_for):
     file = recording if name == "ir_play" else tmp_path / "new.mcap"
@@ -62,7 +70,7 @@ def test_a_node_that_is_asked_to_end_ends_well(name, signals, recording, tmp_pat
         wait_for(lambda: name in watcher.get_node_names(), timeout=60.0)
         for number in signals:
             process.send_signal(number)
-        assert process.wait(30.0) == 0
+        assert process.wait(60.0) == 0
         assert process.stderr is not None
         assert "Traceback" not in process.stderr.read()
     finally:

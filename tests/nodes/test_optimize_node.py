@@ -28,7 +28,7 @@ LITTLE = PlanOptions(planning_time=60.0, max_iterations=60_000)
 
 @pytest.fixture
 def client(planner_node: PlannerNode, ros_context: Any) -> Iterator[Client]:
-    with Client(context=ros_context, timeout=30.0) as client:
+    with Client(context=ros_context, timeout=60.0) as client:
         yield client
 
 

@@ -84,7 +84,7 @@ def test_the_examples_are_answered_as_they_should(
         return {service for service, _ in ros_node.get_service_names_and_types()}
 
     now = {name: example(name)[0] for name in EXPECTED if name not in LATER}
-    wait_for(lambda: set(now.values()) <= offered(), timeout=20.0, what="the services are offered")
+    wait_for(lambda: set(now.values()) <= offered(), what="the services are offered")
     wrong = []
     for name, (code, word) in EXPECTED.items():
         service, type_text, text = example(name)

@@ -106,7 +106,7 @@ def test_each_node_may_do_what_it_does_and_nothing_else(
     tool: Any, nodes: Any, ros_node: Any, wait_for: Any
 ) -> None:
     look = ros_node
-    wait_for(lambda: set(nodes) <= set(look.get_node_names()), timeout=20.0)
+    wait_for(lambda: set(nodes) <= set(look.get_node_names()))
     for name, rights in tool.rights().items():
         if name == tool.OPERATOR:
             continue

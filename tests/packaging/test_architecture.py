@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Collection, Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,12 @@ CORE_READS_NO_CLOCK = {"ir_kernels", "ir_description", "ir_planner"}
 def modules(package: str) -> list[Path]:
     """All modules of a package."""
     return sorted((SRC / package / package).rglob("*.py"))
+
+
+@cache
+def parsed(module: Path) -> ast.Module:
+    """The syntax of a module; many tests look at each."""
+    return ast.parse(module.read_text(encoding="utf-8"))
 
 
 def imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
@@ -64,7 +71,7 @@ def violations(package: str, forbidden: object) -> list[str]:
     return [
         f"{module.relative_to(SRC)}:{line} {name}"
         for module in modules(package)
-        for name, line in imports(ast.parse(module.read_text(encoding="utf-8")))
+        for name, line in imports(parsed(module))
         if forbidden(module, name)
     ]
 
@@ -92,10 +99,7 @@ def known_modules(package: str) -> dict[str, set[str]]:
         ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path
         for path in modules(package)
     }
-    return {
-        name: known_by(ast.parse(path.read_text(encoding="utf-8")), paths.keys()) - {name}
-        for name, path in paths.items()
-    }
+    return {name: known_by(parsed(path), paths.keys()) - {name} for name, path in paths.items()}
 
 
 def known_by(tree: ast.AST, modules: Collection[str]) -> set[str]:
@@ -168,7 +172,7 @@ def test_nobody_draws_from_the_global_generator(package: str) -> None:
     drawn = [
         f"{module.relative_to(SRC)}:{node.lineno} {ast.unparse(node)}"
         for module in modules(package)
-        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(module))
         if isinstance(node, ast.Attribute)
         and isinstance(node.value, ast.Attribute)
         and ast.unparse(node.value) in ("np.random", "numpy.random")

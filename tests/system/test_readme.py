@@ -38,7 +38,7 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     assert READY in process.stdout.readline()
     yield
     process.send_signal(signal.SIGTERM)
-    assert process.wait(30) == 130
+    assert process.wait(60) == 130
 
 
 def shell(line: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -15,7 +15,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, ParameterEvent
 from rclpy.serialization import deserialize_message
 
-from ir_msgs.srv import StartRecording, StopRecording
+from ir_msgs.msg import Status
+from ir_msgs.srv import CheckState, StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.namespaces import NODES
 from ir_msgs_py.ros.client import Client
@@ -78,6 +79,13 @@ def test_two_cells_in_one_domain_keep_to_themselves(
             client.ask(names.START_RECORDING, request)
         ids = {}
         for cell, client in clients.items():
+            wait_for(
+                lambda client=client: (
+                    client.call(names.CHECK_STATE, CheckState.Request()).status.code == Status.SUCCESS
+                ),
+                timeout=START_SECONDS,
+                what=f"the planner of {cell} hears its robot",
+            )
             plan = client.plan_to(GOALS[cell])
             ids[cell] = plan.trajectory_id
             client.execute(client.get_trajectory(plan.trajectory_id))
@@ -88,7 +96,7 @@ def test_two_cells_in_one_domain_keep_to_themselves(
             client.close()
     for process in processes:
         process.send_signal(signal.SIGINT)
-        said, _ = process.communicate(timeout=30.0)
+        said, _ = process.communicate(timeout=60.0)
         assert process.returncode == 130, said
     assert "is taken" in said, "the second cell has a Wake-on-LAN port of its own"
     assert ids["left"] != ids["right"]

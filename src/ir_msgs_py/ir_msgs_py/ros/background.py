@@ -20,6 +20,7 @@ from ir_msgs_py.ros.running import Spinning
 
 T = TypeVar("T")
 _POLL = 0.005  # s, for conditions that nobody announces, as the discovery of a service
+_LAST_CALLBACK = 60.0  # s that it may take; nodes are not taken apart under it
 
 
 class BackgroundExecutor:
@@ -78,7 +79,7 @@ class BackgroundExecutor:
     def close(self) -> None:
         """Stop spinning and destroy the nodes; raises what a callback raised and nobody has heard of yet."""
         self._spinning.end()  # first, so that nobody spins what is taken apart
-        self._thread.join(5.0)
+        self._thread.join(_LAST_CALLBACK)
         self._executor.shutdown(timeout_sec=5.0)
         for node in self._nodes:
             node.destroy_node()
