@@ -273,6 +273,7 @@ class _Recorder:
         message.bus_voltage = float(np.sqrt(link.voltage**2 + 2.0 * bus.stored[k] / link.capacitance))
         message.burnt_power = float(bus.dissipated[part].mean())
         message.joint_power, message.joint_torque = axis[part].mean(axis=0), tau[k]
+        message.joint_current = tau[k] / 10.0  # rosbags misreads two empty sequences of doubles in a row
         self._put("/ir_sim_driver/power_state", message, ns)
 
     def _plan(self, phase: Phase, mains: Any, axis: Any, bus: Any, base: float) -> None:
