@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import QueryModes, SetPlcInput
-from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
+from ir_msgs_py.ros.quality import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_sim_driver.node import SimDriver
 
 PRESSED = PlcInputs(emergency_stop=True, move_enable=True)
@@ -72,15 +72,18 @@ def test_a_press_by_service_counts_in_a_burst_and_all_are_answered(
     wait_for(lambda: PowerMode.EMERGENCY_STOP in modes, what="the stop is latched")
 
 
-def test_four_hundred_requests_are_answered(
+def test_more_requests_than_may_wait_are_all_answered(
     modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> None:
     client = ros_executor.run(
         lambda: ros_node.create_client(QueryModes, "/ir_sim_driver/query_modes", qos_profile=SERVICE)
     )
     wait_for(client.service_is_ready, what="query_modes is offered")
-    futures = ros_executor.run(lambda: [client.call_async(QueryModes.Request()) for _ in range(400)])
+    sent = range(REQUESTS_WAITING + 200)
+    futures = ros_executor.run(lambda: [client.call_async(QueryModes.Request()) for _ in sent])
     wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+    refusals = {future.result().status.message for future in futures} - {""}
+    assert all("are waiting: send fewer at once" in sentence for sentence in refusals)
 
 
 def test_forty_goals_are_all_answered_with_a_result(

@@ -3,10 +3,13 @@
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 REQUESTS_WAITING = 1000
-"""Requests of a service that wait for their answers at most. ROS keeps 10 by default, and drops the eleventh
-without a word to anybody; a request beyond this one is lost in the same way, so clients keep below it."""
+"""Requests of a service that wait for their answers at most; what comes beyond is refused (serving.py)."""
+BURST = 20_000
+"""Requests that the middleware keeps between two looks of a node. ROS keeps 10 by default, and drops the
+eleventh without a word to anybody; only a client that sends more than these faster than the node looks, which
+is some ten thousand times a second, loses any. What nobody uses takes no memory."""
 
-SERVICE = QoSProfile(depth=REQUESTS_WAITING)
+SERVICE = QoSProfile(depth=BURST)
 ACTION_SERVICES = {
     "goal_service_qos_profile": SERVICE,
     "result_service_qos_profile": SERVICE,

@@ -48,8 +48,9 @@ from ir_msgs_py.ros.conversions import configuration_from_msg, program_savings_t
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
-from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
+from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED
 from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -131,7 +132,7 @@ class PlannerNode(Node):
             (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
         ):
-            self.create_service(kind, name, ask.guarded(handler), qos_profile=SERVICE, callback_group=group)
+            BoundedService(self, kind, name, ask.guarded(handler), group)
         self._action = ActionServer(
             self,
             Plan,

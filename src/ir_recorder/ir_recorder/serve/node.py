@@ -9,8 +9,8 @@ from rclpy.node import Node
 
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.refusals import answered
+from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.errors import NothingRecordedError, RecorderError
 from ir_recorder.write.writer import RecordingSummary
@@ -40,8 +40,8 @@ class Services:
     def __init__(self, node: Node, recorder: Recorder) -> None:
         self._recorder, self._source = recorder, node.get_name()
         self._log = node.get_logger().error
-        node.create_service(StartRecording, "~/start", self._on_start, qos_profile=SERVICE)
-        node.create_service(StopRecording, "~/stop", self._on_stop, qos_profile=SERVICE)
+        BoundedService(node, StartRecording, "~/start", self._on_start)
+        BoundedService(node, StopRecording, "~/stop", self._on_stop)
 
     def _on_start(self, request: Any, response: Any) -> Any:
         def start() -> str:

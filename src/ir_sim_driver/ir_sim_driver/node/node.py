@@ -22,8 +22,9 @@ from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, Sta
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.diagnostics import Diagnostics
-from ir_msgs_py.ros.quality import ACTION_SERVICES, SERVICE
+from ir_msgs_py.ros.quality import ACTION_SERVICES
 from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.serving import BoundedService
 from ir_sim_driver.controller import Driver, Frame, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, PlantStoppedError
 from ir_sim_driver.node.announcements import Announcements
@@ -118,12 +119,12 @@ class SimDriver(Node):
         if FollowJointTrajectory is not None:
             self._actions.append(self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY))
         answers = Services(self._driver, self.get_name(), self._announcements.look)
-        self.create_service(SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input, qos_profile=SERVICE)
-        self.create_service(StartPause, names.START_PAUSE, answers.start_pause, qos_profile=SERVICE)
-        self.create_service(EndPause, names.END_PAUSE, answers.end_pause, qos_profile=SERVICE)
-        self.create_service(QueryModes, names.QUERY_MODES, answers.query_modes, qos_profile=SERVICE)
-        self.create_service(Recover, names.RECOVER, answers.recover, qos_profile=SERVICE)
-        self.create_service(SetLoad, names.SET_LOAD, answers.set_load, qos_profile=SERVICE)
+        BoundedService(self, SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input)
+        BoundedService(self, StartPause, names.START_PAUSE, answers.start_pause)
+        BoundedService(self, EndPause, names.END_PAUSE, answers.end_pause)
+        BoundedService(self, QueryModes, names.QUERY_MODES, answers.query_modes)
+        BoundedService(self, Recover, names.RECOVER, answers.recover)
+        BoundedService(self, SetLoad, names.SET_LOAD, answers.set_load)
 
     def _serve_action(self, action_type: Any, name: str) -> ActionServer:
         executions = Executions(

@@ -1,0 +1,101 @@
+"""Services that answer every request: what comes while too many wait is refused, nothing is dropped.
+
+The middleware keeps only so many requests and drops the oldest without a word. Here each turn of the executor
+takes all that have come into a queue of its own, refuses what exceeds it with a sentence, and answers one.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.waitable import NumberOfEntities, Waitable
+
+from ir_msgs_py.ros.conversions import status_to_msg
+from ir_msgs_py.ros.polled import PolledGroup
+from ir_msgs_py.ros.quality import REQUESTS_WAITING, SERVICE
+from ir_msgs_py.status import Status, StatusCode
+
+Handler = Callable[[Any, Any], Any]
+
+
+class BoundedService(Waitable):
+    """A service of `node` whose responses have a `status`; at most `waiting` requests wait in it.
+
+    handler: from request and response to the response; requests are answered in the order in which they came.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        service_type: Any,
+        name: str,
+        handler: Handler,
+        group: CallbackGroup | None = None,
+        waiting: int = REQUESTS_WAITING,
+    ) -> None:
+        super().__init__(group or node.default_callback_group)
+        self._type, self._handler, self._most = service_type, handler, waiting
+        self._source = node.get_name()
+        untouched = PolledGroup()  # the executor does not take from the service, this does
+        self._service = node.create_service(
+            service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
+        )
+        self._more = node.create_guard_condition(_nothing, callback_group=untouched)
+        self._waiting: deque[tuple[Any, Any]] = deque()
+        self._index = 0
+        node.add_waitable(self)
+
+    def __enter__(self) -> None:
+        self._service.handle.__enter__()
+        self._more.handle.__enter__()
+
+    def __exit__(self, *exception: object) -> None:
+        self._more.handle.__exit__(*exception)
+        self._service.handle.__exit__(*exception)
+
+    def get_num_entities(self) -> NumberOfEntities:
+        """A service, and what ends the wait while requests are in the queue."""
+        return NumberOfEntities(num_services=1, num_gcs=1)
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Wait for a request."""
+        self._index = wait_set.add_service(self._service.handle)
+        wait_set.add_guard_condition(self._more.handle)
+        if self._waiting:
+            self._more.trigger()
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Whether a request has come or waits."""
+        return bool(self._waiting) or bool(wait_set.is_ready("service", self._index))
+
+    def take_data(self) -> tuple[Any, Any] | None:
+        """Take all that have come; the one to be answered now."""
+        while True:
+            with self._service.handle:
+                taken = self._service.handle.service_take_request(self._type.Request)
+            if taken is None or taken[1] is None:
+                return self._waiting.popleft() if self._waiting else None
+            if len(self._waiting) < self._most:
+                self._waiting.append(taken)
+            else:
+                self._refuse(taken[1])
+
+    async def execute(self, taken_data: tuple[Any, Any] | None) -> None:
+        """Answer it."""
+        if taken_data is not None:
+            request, header = taken_data
+            self._service.send_response(self._handler(request, self._type.Response()), header)
+
+    def _refuse(self, header: Any) -> None:
+        sentence = f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
+        response = self._type.Response()
+        response.status = status_to_msg(Status(StatusCode.FAILURE, sentence, self._source))
+        self._service.send_response(response, header)
+
+
+def _nothing() -> None:
+    """What the guard's callback does: ending the wait is all."""

@@ -1,0 +1,57 @@
+"""Law 13 for services: every request is answered, also what comes while too many wait."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import rclpy
+
+from ir_msgs.srv import SetPlcInput
+from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.ros.quality import SERVICE
+from ir_msgs_py.ros.serving import BoundedService
+from ir_msgs_py.status import StatusCode
+
+MOST, SENT = 50, 400
+
+
+def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    """The first request holds the server up until all others have come."""
+    held, go_on = threading.Event(), threading.Event()
+    seen: list[str] = []
+
+    def handler(request: Any, response: Any) -> Any:
+        if request.name == "0":
+            held.set()
+            go_on.wait(60.0)
+        seen.append(request.name)
+        response.status.code = StatusCode.SUCCESS
+        return response
+
+    server = BackgroundExecutor(ros_context)
+    try:
+        node = server.add_node(rclpy.create_node("bounded", context=ros_context))
+        server.run(lambda: BoundedService(node, SetPlcInput, "~/ask", handler, waiting=MOST))
+        client = ros_executor.run(
+            lambda: ros_node.create_client(SetPlcInput, "/bounded/ask", qos_profile=SERVICE)
+        )
+        wait_for(client.service_is_ready, what="the service is offered")
+        futures = [ros_executor.run(lambda: client.call_async(SetPlcInput.Request(name="0")))]
+        wait_for(held.is_set, what="the server is held up")
+        names = [str(k) for k in range(1, SENT)]
+        futures += ros_executor.run(
+            lambda: [client.call_async(SetPlcInput.Request(name=name)) for name in names]
+        )
+        go_on.set()
+        wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+    finally:
+        go_on.set()
+        server.close()
+    served = [future.result().status.code == StatusCode.SUCCESS for future in futures]
+    said = {future.result().status.message for future in futures} - {""}
+    assert seen == [str(k) for k, good in enumerate(served) if good]
+    assert MOST <= sum(served) < SENT
+    assert said == {f"{MOST} requests of /bounded/ask are waiting: send fewer at once"}
