@@ -21,7 +21,9 @@ ROOMS = {
         "errors", "arrays", "poses", "shapes", "robot", "cell", "files", "library", "cell_process",
         "cell_review",
     ),
-    "ir_sim_driver": ("errors", "notices", "plant", "power", "motion", "plc", "controller", "node"),
+    "ir_sim_driver": (
+        "errors", "notices", "plant", "power", "load_check", "motion", "plc", "controller", "node",
+    ),
 }  # fmt: skip
 
 

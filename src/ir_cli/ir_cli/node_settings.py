@@ -16,6 +16,7 @@ from ir_sim_driver import (
     ControlSettings,
     ExecutionSettings,
     IdleTimes,
+    LoadCheckSettings,
     PlcSettings,
 )
 from ir_sim_driver.controller import SupervisionSettings
@@ -34,6 +35,7 @@ NODES: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {
         (f"{FIXED}{PREFIX}", TransitionTimes),
         (PREFIX, IdleTimes),
         ("plc.", PlcSettings),
+        ("load_check.", LoadCheckSettings),
     ),
     "ir_program_runner": (("", ProgramSettings), (PREFIX, TransitionTimes), ("", LinkSettings)),
     "ir_recorder": (("", RecorderSettings),),

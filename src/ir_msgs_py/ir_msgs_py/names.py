@@ -70,6 +70,7 @@ POWER_STATE: Final = f"{SIM_DRIVER}/power_state"
 CONTROLLER_TIMERS: Final = f"{SIM_DRIVER}/controller_timers"
 CARRIED_LOAD: Final = f"{SIM_DRIVER}/carried_load"
 PLANT: Final = f"{SIM_DRIVER}/plant"
+LOAD_CHECK: Final = f"{SIM_DRIVER}/load_check"
 CONTROLLER_STATE: Final = f"{SIM_DRIVER}/controller_state"
 ROBOT_MARKERS: Final = f"{SIM_DRIVER}/robot_markers"
 

@@ -21,6 +21,7 @@ from ir_sim_driver.errors import (
     SettingsError,
     TrajectoryRefusedError,
 )
+from ir_sim_driver.load_check import LoadCheckSettings, LoadFinding
 from ir_sim_driver.motion import ErrorCode, ExecutionSettings, JointTolerance, Outcome, TrajectoryGoal
 from ir_sim_driver.plant import BACKENDS, Backend, Carried, ControlSettings, Work, carried, custom_load
 from ir_sim_driver.plc import LINKS, Link, PlcSettings
@@ -43,6 +44,8 @@ __all__ = [
     "JointTolerance",
     "Link",
     "LinkError",
+    "LoadCheckSettings",
+    "LoadFinding",
     "Outcome",
     "PlcSettings",
     "RequestRefusedError",

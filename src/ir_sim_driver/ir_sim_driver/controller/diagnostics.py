@@ -77,11 +77,14 @@ def _controller(simulation: Simulation) -> Entry:
 
 
 def _executor(simulation: Simulation) -> Entry:
-    executor = simulation.executor
+    executor, load = simulation.executor, simulation.load_checks.last
+    level, sentence = Level.OK, f"executing {executor.label}" if executor.active else "holding"
+    if load is not None and load.noticed:
+        level, sentence = Level.WARN, load.sentence
     return Entry(
         "ir_sim_driver: executor",
-        Level.OK,
-        f"executing {executor.label}" if executor.active else "holding",
+        level,
+        sentence,
         {
             "path time [s]": f"{executor.path_time:.3f}",
             "path speed": f"{executor.path_speed:.3f}",

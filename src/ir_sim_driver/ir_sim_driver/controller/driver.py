@@ -153,6 +153,11 @@ class Driver:
             self._simulation.plc.no_hibernation = reason
 
     @property
+    def stamp_ns(self) -> int:
+        """Stamp [ns] of the present tick."""
+        return self._stamp
+
+    @property
     def failure(self) -> str:
         """Why the simulation is not stepped any more, "" while it is."""
         return self._access.failure

@@ -10,6 +10,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_msgs_py.power import PowerState
 from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import Following
 
 POWER_PERIOD = 10  # steps: 100 Hz
@@ -21,7 +22,7 @@ class Frame:
     """What is published at a stamp [ns]; None: nothing of it now.
 
     q, qd, torque (n,) [rad, rad/s, Nm] are None while the controller is off the network. inputs: the levels
-    that count, when they have changed, whoever set them.
+    that count, when they have changed, whoever set them. load_check: of a movement that has ended.
     """
 
     stamp_ns: int
@@ -32,6 +33,7 @@ class Frame:
     following: Following | None
     outputs: PlcOutputs | None
     inputs: PlcInputs | None = None
+    load_check: LoadFinding | None = None
 
 
 class Frames:
@@ -61,7 +63,9 @@ class Frames:
         levels = simulation.plc.levels
         inputs = None if levels is self._inputs or levels == self._inputs else levels
         self._inputs = inputs or self._inputs
-        return Frame(stamp_ns, backend.q, backend.qd, backend.torque, power, following, outputs, inputs)
+        finding = simulation.load_checks.take()
+        torque = backend.torque
+        return Frame(stamp_ns, backend.q, backend.qd, torque, power, following, outputs, inputs, finding)
 
     def _power(self, stamp_ns: int) -> PowerState:
         simulation = self._simulation

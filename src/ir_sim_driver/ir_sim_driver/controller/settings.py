@@ -11,6 +11,7 @@ from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.controller.supervision import SupervisionSettings
+from ir_sim_driver.load_check import LoadCheckSettings
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import ControlSettings
 from ir_sim_driver.plc import PlcSettings
@@ -70,3 +71,4 @@ class SimulationSettings:
     supervision: SupervisionSettings = field(default_factory=SupervisionSettings)
     idle: IdleTimes = field(default_factory=IdleTimes)
     plc: PlcSettings = field(default_factory=PlcSettings)
+    load_check: LoadCheckSettings = field(default_factory=LoadCheckSettings)

@@ -14,16 +14,18 @@ from ir_description import Cell, PowerData
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import OFF_THE_NETWORK, READY, Mode
-from ir_msgs_py.plc import OperatingMode, PlcOutputs
+from ir_msgs_py.plc import PlcOutputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.controller.speed_scaling import SpeedScaling
 from ir_sim_driver.controller.supervision import PERIOD
 from ir_sim_driver.controller.surroundings import Surroundings
 from ir_sim_driver.controller.vetting import VettedGoal, vet
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
+from ir_sim_driver.load_check import LoadChecks
 from ir_sim_driver.motion import (
     ErrorCode,
     ExecutionSettings,
@@ -31,7 +33,6 @@ from ir_sim_driver.motion import (
     Outcome,
     ToolPoint,
     TrajectoryGoal,
-    manual_scaling,
 )
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend, Carried, Plant, nominal_plant
@@ -71,9 +72,10 @@ class Simulation:
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
         self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)
         self.safety = Safety(self.robot, backend, self.executor, self.tool, self.plc, self.notices, settings)
+        self.load_checks = LoadChecks(cell, settings.load_check, self.notices, PERIOD * settings.dt)
         self._carry(load)
-        self.steps, self.speed_scaling = 0, 1.0
-        self._goals, self._goal_energy = 0, 0.0
+        self.speed_scaling = SpeedScaling(self.executor, self.tool, self.plc, self.notices)
+        self.steps, self._goals, self._goal_energy = 0, 0, 0.0
         self._outcomes: list[Outcome] = []
 
     @property
@@ -121,6 +123,7 @@ class Simulation:
         self.executor.start(self._goals, vetted.goal, route, 0.0 if now.qd.any() else delay)
         self._collect_outcomes()
         self._goal_energy = self.mains.energy()
+        self.load_checks.begin()
         return self._goals
 
     def cancel(self, goal_id: int) -> bool:
@@ -140,12 +143,8 @@ class Simulation:
         return outcomes
 
     def set_speed_scaling(self, factor: float) -> float:
-        """Take the factor into [0, 1] and return it; NaN and negative ones are ignored with a warning."""
-        if not factor >= 0.0:
-            self.notices.add(Level.WARN, f"speed scaling {factor:g} ignored: it must be in [0, 1]")
-        else:
-            self.speed_scaling = min(factor, 1.0)
-        return self.speed_scaling
+        """Scale the speed of every movement, from now on; returns what counts of the factor."""
+        return self.speed_scaling.ask(factor)
 
     def standing_power(self, level: Mode) -> float:
         """Watts at the mains when standing in a mode at the present posture."""
@@ -204,7 +203,7 @@ class Simulation:
         try:
             self._move()
             if self.steps % PERIOD == 0:
-                self.safety.supervise(self.modes.motors_on, self.settings.execution.tube)
+                self._supervise()
         except BackendError as error:
             self.safety.failed(error)
         self.mains.step(self.modes.level)
@@ -240,7 +239,8 @@ class Simulation:
                 self.abort(sentence)
         changed = control.step(
             dt,
-            motion=active and (executor.path_speed > 0.0 or executor.stopping or self._scaling() > 0.0),
+            motion=active
+            and (executor.path_speed > 0.0 or executor.stopping or self.speed_scaling.now() > 0.0),
             standing=self._still(),
             emergency=self.safety.stopped,
         )
@@ -254,18 +254,16 @@ class Simulation:
         if braked or safety.broken:
             safety.brake()
         elif modes.level is Mode.STAND_ON_MOTORS:
-            backend.track(executor.advance(self._scaling(), modes.motors_on))
+            backend.track(executor.advance(self.speed_scaling.now(), modes.motors_on))
             executor.supervise(backend)
         else:
             backend.rest()
 
-    def _scaling(self) -> float:
-        if not self.plc.levels.move_enable:
-            return 0.0
-        path, s = self.executor.path, self.executor.path_parameter
-        if path is None or self.plc.operating_mode is not OperatingMode.T1:
-            return self.speed_scaling
-        return min(self.speed_scaling, manual_scaling(self.tool, path, s, self.settings.execution.stop_time))
+    def _supervise(self) -> None:
+        motors_on = self.modes.motors_on
+        if motors_on and self.executor.active:
+            self.load_checks.look(self.backend)
+        self.safety.supervise(motors_on, self.settings.execution.tube)
 
     def _still(self) -> bool:
         return self.executor.path_speed == 0.0 and self.backend.standing
@@ -287,7 +285,7 @@ class Simulation:
         return self.watch.lost or self.control.refusal()
 
     def _carry(self, load: Carried) -> None:
-        self.backend.set_load(load.loads)
+        self.backend.set_load(self.load_checks.really(load))
         self.load = load
         self.mains.set_load(load)
         self.dynamics = DynamicsModel(self.robot, load.loads, self.cell.base_pose)
@@ -297,4 +295,6 @@ class Simulation:
         if self.executor.ended:
             outcomes = self.executor.take_outcomes()
             energy = self.mains.energy() - self._goal_energy
-            self._outcomes += [replace(outcome, energy=energy) for outcome in outcomes]
+            for outcome in outcomes:
+                finding = self.load_checks.ended(outcome.label)
+                self._outcomes.append(replace(outcome, energy=energy).weighed(finding))

@@ -76,6 +76,7 @@ class Executor:
     ) -> None:
         self._names: tuple[str, ...] = tuple(robot.joint_names)
         self._settings, self._dt, self._tool = settings, dt, tool
+        self.stop_time = settings.stop_time  # s
         self._speed = PathSpeed(dynamics, np.array(robot.acceleration_max), settings.stop_time, dt)
         self._still: FloatArray = np.zeros(len(q))
         self._run: _Run | None = None
@@ -135,7 +136,7 @@ class Executor:
 
     def set_settings(self, settings: ExecutionSettings) -> None:
         """Use other bounds from the next goal on."""
-        self._settings = settings
+        self._settings, self.stop_time = settings, settings.stop_time
         self._speed.set_stop_time(settings.stop_time)
 
     def motion(self) -> Motion:
@@ -160,13 +161,14 @@ class Executor:
         s = self._settings
         path_tolerance = Tolerances.of(self._names, goal.path_tolerance, s.path_tolerance)
         quiet = self._tool.quiet_bound(path_tolerance.position)
+        label = goal.label or goal.trajectory.trajectory_id
         self._run = _Run(
-            Outcome(goal_id, ErrorCode.SUCCESSFUL, ""),
+            Outcome(goal_id, ErrorCode.SUCCESSFUL, "", label=label),
             route,
             path_tolerance,
             Tolerances.of(self._names, goal.goal_tolerance, s.goal_tolerance),
             goal.goal_time or s.goal_time,
-            goal.label or goal.trajectory.trajectory_id,
+            label,
             max(0, round(delay / self._dt)),
             -1.0 if path_tolerance.has_velocity else quiet,
             self._still,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.load_check import LoadFinding
 
 
 class ErrorCode(IntEnum):
@@ -56,7 +57,8 @@ class Outcome:
 
     canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp; energy
     [J] at the mains while it ran; max_tracking_error: largest error of each joint [rad]; settling_time [s]
-    from the end of the command until the robot was within the goal tolerance.
+    from the end of the command until the robot was within the goal tolerance. label: of the goal. load_check:
+    what its torques say of the load, None where nothing.
     """
 
     goal_id: int
@@ -67,3 +69,12 @@ class Outcome:
     energy: float = 0.0
     max_tracking_error: tuple[float, ...] = ()
     settling_time: float = 0.0
+    label: str = ""
+    load_check: LoadFinding | None = None
+
+    def weighed(self, finding: LoadFinding | None) -> Outcome:
+        """With what was found of the load, and its sentence where something was noticed."""
+        if finding is None:
+            return self
+        sentence = "; ".join(text for text in (self.sentence, finding.sentence) if text)
+        return replace(self, sentence=sentence, load_check=finding)

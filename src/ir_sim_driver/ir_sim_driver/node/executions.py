@@ -6,10 +6,12 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
 
+from ir_msgs.msg import LoadCheck
 from ir_msgs_py.checks import one_line
 from ir_sim_driver.controller import Driver
+from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Outcome
-from ir_sim_driver.node.messages import fill_points, goal_from_action
+from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
 
 
 class Executing(Protocol):
@@ -107,6 +109,7 @@ class Executions:
             result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
             result.max_tracking_error = list(outcome.max_tracking_error)
             result.settling_time, result.plant = outcome.settling_time, self._driver.plant.name
+            result.load_check = _load_checks(outcome.load_check, self._driver.stamp_ns)
         if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):
             handle.canceled()
         elif outcome.code is ErrorCode.SUCCESSFUL:
@@ -123,6 +126,14 @@ class Executions:
         feedback.header.stamp = self._node.now_msg()
         fill_points(feedback.desired, feedback.actual, feedback.error, following)
         handle.publish_feedback(feedback)
+
+
+def _load_checks(finding: LoadFinding | None, stamp_ns: int) -> list[LoadCheck]:
+    if finding is None:
+        return []
+    msg = LoadCheck()
+    fill_load_check(msg, stamp_ns, finding)
+    return [msg]
 
 
 def _awaitable(future: Any) -> Awaitable[Outcome]:

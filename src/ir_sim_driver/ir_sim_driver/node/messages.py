@@ -17,6 +17,7 @@ from ir_msgs_py.ros.conversions import (
 from ir_msgs_py.ros.diagnostics import Condition
 from ir_sim_driver.controller import Entry
 from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
@@ -84,6 +85,14 @@ def fill_controller_state(msg: Any, names: Sequence[str], stamp_ns: int, followi
     msg.trajectory_id = following.label
     msg.path_time, msg.speed_scaling = following.path_time, following.path_speed
     msg.tool_deviation = following.deviation
+
+
+def fill_load_check(msg: Any, stamp_ns: int, finding: LoadFinding) -> None:
+    """What a movement's torques say of the load, into a LoadCheck."""
+    msg.header.stamp = time_to_msg(stamp_ns)
+    msg.trajectory_id, msg.load, msg.noticed = finding.trajectory_id, finding.load, finding.noticed
+    msg.joint, msg.expected, msg.found = finding.joint, finding.expected, finding.found
+    msg.deviation, msg.mass, msg.sentence = finding.deviation, finding.mass, finding.sentence
 
 
 def fill_points(desired: Any, actual: Any, error: Any, following: Following) -> None:

@@ -12,6 +12,7 @@ from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_sim_driver.controller import ControllerSettings, SimulationSettings, SupervisionSettings
 from ir_sim_driver.errors import SettingsError
+from ir_sim_driver.load_check import LoadCheckSettings
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import BACKENDS, ControlSettings
 from ir_sim_driver.plc import LINKS, Link, PlcSettings, WakeOnLan
@@ -88,6 +89,7 @@ class DriverParameters:
             supervision=Parameters(node, SupervisionSettings, prefix="supervision.").value,
             idle=Parameters(node, IdleTimes, prefix=PREFIX).value,
             plc=Parameters(node, PlcSettings, prefix="plc.").value,
+            load_check=Parameters(node, LoadCheckSettings, prefix="load_check.").value,
         )
         self._execution = execution
 

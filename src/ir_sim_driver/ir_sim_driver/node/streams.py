@@ -10,7 +10,7 @@ from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from ir_msgs.msg import ControllerState, PlcInputs, PlcOutputs, PowerState
+from ir_msgs.msg import ControllerState, LoadCheck, PlcInputs, PlcOutputs, PowerState
 from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import (
     plc_inputs_to_msg,
@@ -20,7 +20,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.quality import LATCHED
 from ir_sim_driver.controller import Frame
-from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state
+from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state, fill_load_check
 
 _NS = 1_000_000_000
 # Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged yet. What
@@ -39,6 +39,7 @@ class Streams:
         self._joint_states = node.create_publisher(JointState, names.JOINT_STATES, _STREAM)
         self._power_states = node.create_publisher(PowerState, names.POWER_STATE, _STREAM)
         self._controller_states = node.create_publisher(ControllerState, names.CONTROLLER_STATE, _STREAM)
+        self._load_checks = node.create_publisher(LoadCheck, names.LOAD_CHECK, LATCHED)
         self._outputs = node.create_publisher(PlcOutputs, names.PLC_OUTPUTS, LATCHED)
         self._in_force = node.create_publisher(PlcInputs, names.PLC_INPUTS_IN_FORCE, LATCHED)
         self._joint_state = JointState(name=list(joint_names))
@@ -69,5 +70,9 @@ class Streams:
             msg = plc_outputs_to_msg(frame.outputs)
             msg.header.stamp = time_to_msg(stamp_ns)
             self._outputs.publish(msg)
+        if frame.load_check is not None:
+            msg = LoadCheck()
+            fill_load_check(msg, stamp_ns, frame.load_check)
+            self._load_checks.publish(msg)
         if frame.inputs is not None:
             self._in_force.publish(plc_inputs_to_msg(frame.inputs))

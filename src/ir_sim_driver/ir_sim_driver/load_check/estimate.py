@@ -1,0 +1,133 @@
+"""The mass that explains the torques of a movement best: generalised least squares.
+
+found = expected + d m + J p + e: d is the torque per kg at the declared load's centre, p the robot's
+parameters, one standard deviation each, e what no parameter explains. With V = J J' + S, S diagonal,
+m = d' V^-1 (found - expected) / (d' V^-1 d), and its variance is 1 / (d' V^-1 d).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ir_description import Load
+from ir_msgs_py.arrays import FloatArray
+from ir_sim_driver.load_check.uncertainty import Uncertainty
+from ir_sim_driver.plant import Carried
+
+UNEXPLAINED = 0.01
+"""Standard deviation of what no parameter explains, at one instant, as a share of the peak torque."""
+LOAD_MASS, LOAD_CENTRE = 0.01, 0.01
+"""Standard deviations of a declared load: share of its mass, m of its centre in each direction."""
+_STANDS = 0.02  # rad/s below which friction may act either way
+_KG = 1.0
+
+
+class Motion(NamedTuple):
+    """What was found at N instants of a movement, each (N, n): q, qd, qdd [rad, s] and torque [Nm]."""
+
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True)
+class LoadFinding:
+    """What a movement's torques say of the load.
+
+    trajectory_id: what was driven; load: what was declared, as its text names it. noticed: the mass is beyond
+    the threshold. joint: where the difference is largest for its deviation; expected, found, deviation [Nm]:
+    mean torque there in the direction in which more load shows, and a standard deviation of the difference.
+    mass, mass_deviation [kg]: more than declared, and its standard deviation.
+    """
+
+    trajectory_id: str
+    load: str
+    noticed: bool
+    joint: str
+    expected: float
+    found: float
+    deviation: float
+    mass: float
+    mass_deviation: float
+
+    @property
+    def sentence(self) -> str:
+        """Expected and found torque; "" where nothing is noticed."""
+        if not self.noticed:
+            return ""
+        more = "heavier" if self.mass > 0.0 else "lighter"
+        return (
+            f"the load is about {abs(self.mass):.0f} kg {more} than {self.load[:80]!a} declares: "
+            f"{self.joint} expects {self.expected:.0f} Nm in the mean, found are {self.found:.0f} Nm, "
+            f"a standard deviation is {self.deviation:.0f} Nm"
+        )
+
+
+def weighed(motion: Motion, load: Carried, robot: Uncertainty, threshold: float) -> LoadFinding:
+    """Weigh what was carried along a movement against the declared load."""
+    q, qd, qdd, torque = motion
+    expected = robot.torque(load.loads, q, qd, qdd)
+    more = (robot.torque(_heavier(load.loads), q, qd, qdd) - expected) / _KG
+    shifted = [robot.torque(other, q, qd, qdd) - expected for other in _shifted(load.loads)]
+    columns = np.concatenate((robot.columns(q, qd, qdd, expected), np.stack(shifted, axis=2)), axis=2)
+    noise = _noise(robot, qd)
+    inverse = _Covariance(columns, noise)
+    information = float((more * inverse.times(more)).sum())
+    mass = float((more * inverse.times(torque - expected)).sum()) / information
+    deviation = float(np.hypot(information**-0.5, LOAD_MASS * load.mass))
+    j, seen, found, spread = _clearest(more, expected, torque, columns, noise)
+    joint, noticed = robot.model.joint_names[j], abs(mass) > threshold * deviation
+    return LoadFinding("", load.text, noticed, joint, seen, found, spread, mass, deviation)
+
+
+class _Covariance:
+    """V = J J' + S for columns J (N, n, P) and deviations (N, n) of S, never formed."""
+
+    def __init__(self, columns: FloatArray, noise: FloatArray) -> None:
+        self._shape, self._noise = noise.shape, noise.ravel()
+        self._white = columns.reshape(len(self._noise), -1) / self._noise[:, None]
+        self._inner = np.eye(self._white.shape[1]) + self._white.T @ self._white
+
+    def times(self, torque: FloatArray) -> FloatArray:
+        """V^-1 times a torque (N, n)."""
+        white = torque.ravel() / self._noise
+        rest = white - self._white @ np.linalg.solve(self._inner, self._white.T @ white)
+        result: FloatArray = (rest / self._noise).reshape(self._shape)
+        return result
+
+
+def _heavier(loads: Sequence[Load]) -> tuple[Load, ...]:
+    """The loads, one kilogram heavier in proportion."""
+    factor = 1.0 + _KG / sum(load.mass for load in loads)
+    return tuple(replace(load, mass=load.mass * factor, inertia=load.inertia * factor) for load in loads)
+
+
+def _shifted(loads: Sequence[Load]) -> list[tuple[Load, ...]]:
+    """The loads with their centres off by a standard deviation, in each direction."""
+    return [
+        tuple(replace(load, com=load.com + LOAD_CENTRE * direction) for load in loads)
+        for direction in np.eye(3)
+    ]
+
+
+def _noise(robot: Uncertainty, qd: FloatArray) -> FloatArray:
+    """Deviation (N, n) [Nm] of what no parameter explains; at rest, the friction either way."""
+    stuck = robot.model.friction_coulomb / (1.0 + (qd / _STANDS) ** 2)
+    return np.asarray(np.hypot(UNEXPLAINED * robot.model.envelope_torque[:, 0], stuck))
+
+
+def _clearest(
+    more: FloatArray, expected: FloatArray, found: FloatArray, columns: FloatArray, noise: FloatArray
+) -> tuple[int, float, float, float]:
+    """The joint that shows the difference best: its index, mean torques expected and found, deviation."""
+    weight = more / np.maximum(np.abs(more).sum(axis=0), 1e-12)
+    means = (weight * expected).sum(axis=0), (weight * found).sum(axis=0)
+    of_parameters = np.einsum("kj,kjp->jp", weight, columns)
+    spread = np.sqrt((of_parameters**2).sum(axis=1) + ((weight * noise) ** 2).sum(axis=0))
+    j = int((np.abs(means[1] - means[0]) / np.maximum(spread, 1e-9)).argmax())
+    return j, float(means[0][j]), float(means[1][j]), float(spread[j])
