@@ -1,0 +1,200 @@
+"""Is a load noticed that is not the declared one, and never one that is?
+
+Torques of drawn plants come from their own masses and gears, by formulas of this module, in batch; what they
+are weighed with is the driver's check. Movements go from rest to rest, at random speeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from _results import at_least, at_most
+from _truth_section import Asked, Found
+
+from ir_description import Cell, Load, PowerParameters, data_sheet, load_cell, load_power_data, robot_marks
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
+from ir_sim_driver.load_check import LoadFinding, Motion, Uncertainty, weighed
+from ir_sim_driver.plant import Carried, Plant, nominal_plant, typical_plant
+
+TITLE = "a load that is not the declared one"
+PAYLOAD, ERRORS = 155.0, (0.05, 0.2, 0.5)
+PAYLOADS = (25.0, 75.0, 155.0, 200.0)
+INSTANTS = 24
+THRESHOLD = 3.0
+_REFERENCE = 40.0  # deg C to which the friction of the data belongs
+_FIT = 0.2  # of the deviations of friction that a fit leaves
+_KINDS = {"A1": [0], "A2": [1], "A3": [2], "A5": [4], "all axes": [0, 1, 2, 3, 4, 5]}
+
+
+class Movement(NamedTuple):
+    """Instants of a movement, each (N, n)."""
+
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+
+
+def measured(asked: Asked) -> Found:
+    """Count alarms that are false and loads that are missed; the smallest masses that show."""
+    cell, generator = load_cell(asked.cells[0]), np.random.default_rng(20)
+    many, few = (1000, 100) if asked.quick else (10_000, 1000)
+    rows = [false_alarms(cell, generator, many)]
+    plants = {
+        "nominal": [nominal_plant(cell.robot, load_power_data())],
+        "typical": [typical_plant(cell.robot, load_power_data(), seed) for seed in range(asked.seeds)],
+    }
+    for name, drawn in plants.items():
+        for fitted in (False, True):
+            rows += [noticed(cell, generator, few, name, drawn, error, fitted) for error in ERRORS]
+    rows += smallest(cell, generator, few // 4)
+    seen = [row["noticed"] for row in rows if row["case"] == "wrong load" and row["error"] == 0.2]
+    scale = 10_000 / many
+    return Found(
+        rows,
+        [
+            at_most("false alarms in 10,000 movements", rows[0]["alarms"] * scale, "", 1.0),
+            at_least("20 % of 155 kg noticed on A2 and A3", 100.0 * min(seen), "% of movements", 100.0),
+        ],
+    )
+
+
+def false_alarms(cell: Cell, generator: np.random.Generator, count: int) -> dict[str, Any]:
+    """Movements with the declared load, each on a plant of its own."""
+    robot, data, load = _known(cell, data_sheet()), load_power_data(), _payload(cell, PAYLOAD)
+    z = []
+    for seed in range(count):
+        movement = _movement(cell, generator, _KINDS["all axes"] if seed % 2 else _KINDS["A2"])
+        plant = typical_plant(cell.robot, data, seed)
+        found = _weighed(plant, movement, load.loads, load, robot, cell)
+        z.append(found.mass / found.mass_deviation)
+    alarms = int((np.abs(z) > THRESHOLD).sum())
+    worst, rms = float(np.abs(z).max()), float(np.sqrt(np.mean(np.square(z))))
+    return {"case": "declared load", "movements": count, "alarms": alarms, "worst": worst, "rms": rms}
+
+
+def noticed(
+    cell: Cell,
+    generator: np.random.Generator,
+    count: int,
+    name: str,
+    plants: Sequence[Plant],
+    error: float,
+    fitted: bool,
+) -> dict[str, Any]:
+    """Movements of A2 or A3 with more load than declared: the share that is noticed."""
+    declared, carried = _payload(cell, PAYLOAD), _payload(cell, PAYLOAD * (1.0 + error))
+    hits, off = 0, []
+    for k in range(count):
+        plant = plants[k % len(plants)]
+        parameters = _as_a_fit_leaves_it(plant) if fitted else data_sheet()
+        movement = _movement(cell, generator, _KINDS["A2" if k % 2 else "A3"])
+        found = _weighed(plant, movement, carried.loads, declared, _known(cell, parameters), cell)
+        hits += abs(found.mass) > THRESHOLD * found.mass_deviation
+        off.append(found.mass - PAYLOAD * error)
+    return {
+        "case": "wrong load",
+        "plant": name,
+        "known as": "a fit leaves it" if fitted else "data sheet",
+        "error": error,
+        "noticed": hits / count,
+        "mass_error_kg": float(np.sqrt(np.mean(np.square(off)))),
+    }
+
+
+def smallest(cell: Cell, generator: np.random.Generator, count: int) -> list[dict[str, Any]]:
+    """Three standard deviations of the mass: the smallest that shows, by movement and payload."""
+    robot, plant = _known(cell, data_sheet()), nominal_plant(cell.robot, load_power_data())
+    rows = []
+    for kind, axes in _KINDS.items():
+        for payload in PAYLOADS:
+            load = _payload(cell, payload)
+            found = [
+                _weighed(plant, _movement(cell, generator, axes), load.loads, load, robot, cell)
+                for _ in range(count)
+            ]
+            masses = [THRESHOLD * each.mass_deviation for each in found]
+            row = {"case": "smallest mass", "movement": kind, "payload_kg": payload}
+            share = {"median_kg": 50.0, "p95_kg": 95.0}
+            rows.append(row | {key: float(np.percentile(masses, q)) for key, q in share.items()})
+    return rows
+
+
+_ROBOTS: dict[tuple[str, str], Uncertainty] = {}
+
+
+def _known(cell: Cell, parameters: PowerParameters) -> Uncertainty:
+    key = cell.name, parameters.name
+    if key not in _ROBOTS:
+        _ROBOTS[key] = Uncertainty(cell.robot, parameters, robot_marks(), cell.base_pose)
+    return _ROBOTS[key]
+
+
+def _payload(cell: Cell, mass: float) -> Carried:
+    """A load of so many kg 0.24 m in front of the flange, 0.28 m in size."""
+    axis = np.abs(np.array(cell.robot.joint_axis[-1]))
+    load = Load("payload", "tool", mass, 0.24 * axis, 0.013 * mass * np.eye(3))
+    return Carried("payload", (load,))
+
+
+def _movement(cell: Cell, generator: np.random.Generator, axes: Sequence[int]) -> Movement:
+    """From rest to rest, of these axes, between anywhere and anywhere, at up to full speed."""
+    robot = cell.robot
+    low, high = 0.9 * robot.position_min, 0.9 * robot.position_max
+    start, delta = generator.uniform(low, high), np.zeros(robot.n)
+    for axis in axes:
+        least = 0.15 * (high[axis] - low[axis])
+        while abs(delta[axis]) < least:
+            delta[axis] = generator.uniform(low[axis], high[axis]) - start[axis]
+    size = np.abs(delta)
+    T = max((1.9 * size / robot.velocity_max).max(), np.sqrt(6.0 * size / robot.acceleration_max).max())
+    T *= generator.uniform(1.0, 4.0)
+    s = ((np.arange(INSTANTS) + 0.5) / INSTANTS)[:, None]
+    return Movement(
+        start + (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5) * delta,
+        (30.0 * s**2 - 60.0 * s**3 + 30.0 * s**4) * delta / T,
+        (60.0 * s - 180.0 * s**2 + 120.0 * s**3) * delta / T**2,
+    )
+
+
+def _weighed(
+    plant: Plant,
+    movement: Movement,
+    carried: Sequence[Load],
+    declared: Carried,
+    robot: Uncertainty,
+    cell: Cell,
+) -> LoadFinding:
+    torque = _torque(plant, movement, carried, cell)
+    return weighed(Motion(*movement, torque), declared, robot, THRESHOLD)
+
+
+def _viscous(plant: Plant) -> FloatArray:
+    gears = plant.gears
+    return np.asarray(gears.viscous * np.exp(-gears.viscous_per_kelvin * (gears.start - _REFERENCE)))
+
+
+def _torque(plant: Plant, movement: Movement, loads: Sequence[Load], cell: Cell) -> FloatArray:
+    """Motor torque (N, n) [Nm] of a plant: its masses, and the friction of its gears."""
+    q, qd, qdd = movement
+    none = np.zeros(plant.robot.n)
+    smooth = replace(plant.robot, friction_viscous=none, friction_coulomb=none)
+    drive = DynamicsModel(smooth, tuple(loads), cell.base_pose).inverse_dynamics(q, qd, qdd)
+    through, gears = drive - plant.robot.reflected_inertia * qdd, plant.gears
+    share = np.where(through * qd >= 0.0, gears.load_driven, gears.load_back)
+    near_rest = gears.stribeck * np.exp(-((qd / gears.stribeck_speed) ** 2))
+    dry = (gears.coulomb + share * np.abs(through) + near_rest) * np.tanh(qd / 1e-3)
+    return np.asarray(drive + _viscous(plant) * qd + dry)
+
+
+def _as_a_fit_leaves_it(plant: Plant) -> PowerParameters:
+    """The plant's own friction, a fifth as uncertain as before; the masses as the data have them."""
+    known = data_sheet()
+    mean, factor = known.mean.copy(), np.ones(len(known.mean))
+    for term, values in (("viscous", _viscous(plant)), ("coulomb", plant.gears.coulomb)):
+        mean[known.places(term)], factor[known.places(term)] = values, _FIT
+    covariance = known.covariance * np.outer(factor, factor)
+    return replace(known, name=f"fit of {plant.name}", mean=mean, covariance=covariance)
