@@ -1,0 +1,61 @@
+"""Typical plants with what the cells' movements carry: are they driven within the tube, and at what energy?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from _driven_movements import Driven, all_predicted
+from _results import at_least, at_most
+from _truth_section import Asked, Found
+
+TITLE = "typical plants: tracking, tube, and predicted against simulated energy before any fit"
+QUICK = ("open",)
+OBJECTIVES, QUICK_OBJECTIVES = ("time", "time_and_energy"), ("time",)
+
+
+def measured(asked: Asked) -> Found:
+    """A row for each plant and objective, over all movements of the cells."""
+    rows: list[dict[str, Any]] = []
+    cells = QUICK if asked.quick else asked.cells
+    for objective in QUICK_OBJECTIVES if asked.quick else OBJECTIVES:
+        every = all_predicted(cells, objective)
+        for seed in range(asked.seeds):
+            rows.append({"plant": f"typical:{seed}", "objective": objective, **_driven(every, seed)})
+    kept = sum(row["movements"] - row["failed"] for row in rows) / sum(row["movements"] for row in rows)
+    return Found(
+        rows,
+        [
+            at_least(f"{asked.seeds} typical plants: share of movements driven in the tube", kept, "", 1.0),
+            at_most("their largest tool deviation", max(row["tool_mm"] for row in rows), "mm", 5.0),
+        ],
+    )
+
+
+def _driven(every: Sequence[Any], seed: int) -> dict[str, Any]:
+    """What a plant makes of all movements; energies of those that ended successful."""
+    plants: dict[str, Driven] = {}
+    off, tool, error, settling, failed = [], [0.0], [0.0], [0.0], 0
+    for each in every:
+        movement = each.movement
+        plant = plants.setdefault(movement.cell.name, Driven(movement.cell, f"typical:{seed}"))
+        outcome = plant.drive(movement)
+        tool.append(outcome.max_tool_deviation)
+        error.append(max(outcome.max_tracking_error))
+        settling.append(outcome.settling_time)
+        if outcome.code.name == "SUCCESSFUL":
+            off.append(100.0 * (outcome.energy / each.energy - 1.0))
+        else:
+            failed += 1
+    shares = np.array(off)
+    return {
+        "movements": len(every),
+        "failed": failed,
+        "tool_mm": 1e3 * max(tool),
+        "tracking_mrad": 1e3 * max(error),
+        "settling_s": max(settling),
+        "energy_off_median_percent": float(np.median(shares)),
+        "energy_off_least_percent": float(shares.min()),
+        "energy_off_most_percent": float(shares.max()),
+    }
