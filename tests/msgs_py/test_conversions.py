@@ -228,7 +228,7 @@ program_states = st.builds(
     note=texts,
 )
 
-saved = st.builds(Saving, numbers, numbers, lengths)
+saved = st.builds(Saving, numbers, numbers, lengths, numbers, numbers)
 program_savings = st.builds(
     ProgramSavings,
     st.booleans(),
@@ -238,6 +238,8 @@ program_savings = st.builds(
     st.integers(0, 500),
     texts,
     texts,
+    numbers,
+    numbers,
 )
 
 ROUND_TRIPS = {

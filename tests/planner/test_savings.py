@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, replace
 from typing import cast
 
 import numpy as np
 import pytest
 
 from ir_description import Cell, PowerData
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
-from ir_msgs_py.savings import Saving
 from ir_planner import Planner
+from ir_planner.checks import ROBOTS
 from ir_planner.program.chain import layers_of
 from ir_planner.program.choice import Choice
 from ir_planner.program.common_program import CommonProgram, common_program, nearest_chain
@@ -158,14 +159,26 @@ def test_the_three_figures_are_kept_apart() -> None:
         step(pause, 0.5, 300.0),  # the wait at the end belongs to the movements' time
     )
     program = CommonProgram(cast(Choice, None), {}, 1)
-    savings = savings_of(common, planned, 1, program)
-    assert savings.movements == Saving(4000.0, 3000.0, 3.0)
+    share = np.random.default_rng(0).normal(0.0, 0.1, ROBOTS)  # of every step's joules: all are wrong alike
+
+    def added(steps: Sequence[PlannedMovement]) -> list[FloatArray]:
+        return [step.report.energy * share for step in steps]
+
+    savings = savings_of(common, planned, 1, program, added)
+    low, high = np.quantile(share, (0.05, 0.95))
+
+    def saving(common: float, planned: float, seconds: float) -> tuple[float, ...]:
+        saved = common - planned
+        return common, planned, seconds, saved * (1.0 + low), saved * (1.0 + high)
+
+    assert astuple(savings.movements) == pytest.approx(saving(4000.0, 3000.0, 3.0))
     assert savings.movements.share == pytest.approx(0.25)
-    assert savings.pauses == Saving(28_000.0, 20_000.0, 60.0)
-    assert savings.total == Saving(32_000.0, 23_000.0, 63.0)
+    assert savings.movements.certain
+    assert astuple(savings.pauses) == pytest.approx(saving(28_000.0, 20_000.0, 60.0))
+    assert astuple(savings.total) == pytest.approx(saving(32_000.0, 23_000.0, 63.0))
     assert (savings.across, savings.around) == (0, 1)
-    longer = savings_of((*common, step(pause, 10.0, 5000.0)), planned, 1, program)  # both wait
-    assert longer.movements == Saving(9000.0, 3000.0, 13.0)
+    longer = savings_of((*common, step(pause, 10.0, 5000.0)), planned, 1, program, added)  # both wait
+    assert (longer.movements.common, longer.movements.planned, longer.movements.seconds) == (9e3, 3e3, 13.0)
     assert longer.pauses == savings.pauses
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
 from ir_kernels.arguments import finite, same_length, shaped
-from ir_kernels.dynamics_data import STANDARD_GRAVITY, dynamics_data
+from ir_kernels.dynamics_data import FURTHER_LOSSES, STANDARD_GRAVITY, dynamics_data
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
 from ir_kernels.power_bounds import PowerBounds, power_bounds
@@ -57,6 +57,7 @@ class DynamicsModel:
         pose = np.eye(4) if base_pose is None else base_pose
         self.data = dynamics_data(robot, loads, pose, gravity)
         self.n = self.data.n
+        self.lossy = any(getattr(self.data, name).any() for name in FURTHER_LOSSES)
         self._core = None if core is None or not hasattr(core, "Dynamics") else core.Dynamics(self.data)
 
     def _run(self, function: str, **values: ArrayLike) -> Any:
@@ -111,10 +112,17 @@ class DynamicsModel:
         return np.asarray(self._run("torque_limit", qd=qd))
 
     def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Power (N, n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2; negative while
-        braking.
+        """Power (N, n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2, with the losses of
+        iron, inverter and gear that the robot has; negative while braking.
         """
-        return np.asarray(self._run("axis_power", qd=qd, tau=tau))
+        power = np.asarray(self._run("axis_power", qd=qd, tau=tau))
+        return power + self.further_losses(qd, tau) if self.lossy else power
+
+    def further_losses(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
+        """Losses (N, n) W that most data have at zero: k_fe qd^2 + k_i |tau / ratio| + k_g |tau qd|."""
+        speed, torque, d = np.asarray(qd, float), np.abs(np.asarray(tau, float)), self.data
+        inverter = d.inverter_loss / np.abs(d.gear_ratio)
+        return np.asarray(d.iron_loss * speed**2 + torque * (inverter + d.gear_loss * np.abs(speed)))
 
     def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
         """Power (N, n) W each axis takes from the DC bus along a motion: `axis_power` of

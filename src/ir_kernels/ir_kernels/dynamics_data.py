@@ -14,6 +14,7 @@ from ir_kernels.robot_like import CounterbalanceLike, LoadLike, RobotLike
 from ir_msgs_py.arrays import FloatArray
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
+FURTHER_LOSSES = ("iron_loss", "inverter_loss", "gear_loss")  # a robot without them has none
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,8 @@ class DynamicsData:
     origin (n, 4, 4), axis (n, 3): the joints, each in the frame of the link before. mass (n,), com (n, 3),
     inertia (n, 3, 3) about the centre of mass: the moving links 1..n with the loads in the last one. gravity
     (3,): the acceleration of free fall in the frame of link 0. rotor_inertia, viscous, coulomb,
-    gear_ratio, copper_loss (n,): the drives. envelope_speed (n, K), envelope_torque (n, K + 1): torque
-    available, a step down at the first speed.
+    gear_ratio, copper_loss, iron_loss, inverter_loss, gear_loss (n,): the drives. envelope_speed (n, K),
+    envelope_torque (n, K + 1): torque available, a step down at the first speed.
     """
 
     origin: FloatArray
@@ -56,6 +57,9 @@ class DynamicsData:
     coulomb: FloatArray
     gear_ratio: FloatArray
     copper_loss: FloatArray
+    iron_loss: FloatArray
+    inverter_loss: FloatArray
+    gear_loss: FloatArray
     envelope_speed: FloatArray
     envelope_torque: FloatArray
     counterbalance: CounterbalanceData | None
@@ -124,6 +128,10 @@ def _counterbalance(data: CounterbalanceLike | None) -> CounterbalanceData | Non
     return packed
 
 
+def _further_losses(robot: RobotLike, n: int) -> dict[str, FloatArray]:
+    return {k: _frozen(f"robot.{k}", getattr(robot, k, np.zeros(n)), (n,)) for k in FURTHER_LOSSES}
+
+
 def dynamics_data(
     robot: RobotLike, loads: Sequence[LoadLike], base_pose: ArrayLike, gravity: float
 ) -> DynamicsData:
@@ -152,6 +160,7 @@ def dynamics_data(
         coulomb=_frozen("robot.friction_coulomb", robot.friction_coulomb, (n,)),
         gear_ratio=_frozen("robot.gear_ratio", robot.gear_ratio, (n,)),
         copper_loss=_frozen("robot.copper_loss", robot.copper_loss, (n,)),
+        **_further_losses(robot, n),
         envelope_speed=_frozen("robot.envelope_speed", robot.envelope_speed, (n, knots)),
         envelope_torque=_frozen("robot.envelope_torque", robot.envelope_torque, (n, knots + 1)),
         counterbalance=_counterbalance(robot.counterbalance),

@@ -7,25 +7,38 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Saving:
-    """Joules at the mains of the common program and of the planned one, over the same seconds."""
+    """Joules at the mains of the common program and of the planned one, over the same seconds.
+
+    saved_low, saved_high: 90 % interval of common - planned, from the uncertainty of the power parameters.
+    """
 
     common: float = 0.0
     planned: float = 0.0
     seconds: float = 0.0
+    saved_low: float = 0.0
+    saved_high: float = 0.0
+
+    @property
+    def saved(self) -> float:
+        """Joules less than those of the common program."""
+        return self.common - self.planned
+
+    @property
+    def certain(self) -> bool:
+        """Whether the interval leaves zero out: else it is open whether anything is saved."""
+        return self.saved_low > 0.0 or self.saved_high < 0.0
 
     @property
     def share(self) -> float:
         """Saved share of the common program's energy."""
         return 1.0 - self.planned / self.common if self.common > 0.0 else 0.0
 
-    def __add__(self, other: Saving) -> Saving:
-        return Saving(self.common + other.common, self.planned + other.planned, self.seconds + other.seconds)
-
 
 @dataclass(frozen=True)
 class ProgramSavings:
     """Savings of the program `program_id`; `around` of the `across` regional movements of the common program
-    run around bodies. sentence: all figures with their baselines, or why there are none (not available).
+    run around bodies. total_low, total_high: the interval of the total, which is not that of its parts'
+    sum. sentence: all figures with their baselines, or why there are none (not available).
     """
 
     available: bool = False
@@ -35,11 +48,15 @@ class ProgramSavings:
     around: int = 0
     program_id: str = ""
     sentence: str = ""
+    total_low: float = 0.0
+    total_high: float = 0.0
 
     @property
     def total(self) -> Saving:
         """Movements and pauses."""
-        return self.movements + self.pauses
+        a, b = self.movements, self.pauses
+        sums = (a.common + b.common, a.planned + b.planned, a.seconds + b.seconds)
+        return Saving(*sums, self.total_low, self.total_high)
 
 
 @dataclass(frozen=True)

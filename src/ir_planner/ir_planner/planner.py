@@ -30,6 +30,7 @@ from ir_planner.program import (
     ProgramPlan,
     ProgramRequest,
     Progress,
+    Spreads,
     Standby,
     best_posture,
     lengths_of,
@@ -158,7 +159,7 @@ class Planner:
         if station:
             scene.station(station)
         found = evaluate_trajectory(examinable(trajectory), scene, margin, station)
-        return replace(found, report=in_scene(scene)(found.report))
+        return replace(found, report=in_scene(scene)(found.report, trajectory))
 
     def standby(
         self, pause: float | Lengths, q: FloatArray | None, load: str, postures: tuple[str, ...] = ()
@@ -247,7 +248,7 @@ class Planner:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
-        return optimization_in(replace(plan, info=noted(plan.info, note)), in_scene(scene))
+        return optimization_in(replace(plan, info=noted(plan.info, note)), original, in_scene(scene))
 
     def plan_program(
         self,
@@ -271,7 +272,7 @@ class Planner:
         request = ProgramRequest(cell, data, stations, start, options, cycle, settings, savings, front_points)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._work(options, cancelled, stops), progress)
-        plan = program_in(plan, self._current.hash_of(cell), self.heard.source)
+        plan = program_in(plan, self._current.hash_of(cell), self.heard.source, Spreads(request))
         for program in (*plan.front, plan.compared, plan):
             if program is not None and program.status.ok:
                 self._remember(program)

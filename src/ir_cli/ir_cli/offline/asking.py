@@ -15,7 +15,7 @@ from ir_description import DescriptionError, UnknownNameError, load_cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import OBJECTIVES, PlanOptions
-from ir_planner import Goal, Planner, RequestError, parse_goal
+from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
 
 from ..errors import CommandError, InputError
 from ..suggestions import nearest, unknown_name
@@ -33,9 +33,9 @@ def sentences() -> Iterator[None]:
         raise InputError(str(error)) from error
 
 
-def planner_of(cell: str) -> Planner:
-    """A planner with a cell: the name of a bundled one, or a file."""
-    planner = Planner(time.monotonic)
+def planner_of(cell: str, power_parameters: str = "") -> Planner:
+    """A planner with a cell: the name of a bundled one, or a file; power_parameters: a file, or ""."""
+    planner = Planner(time.monotonic, PlannerSettings(power_parameters=power_parameters))
     try:
         load_cell(cell)
     except UnknownNameError as error:
@@ -83,6 +83,12 @@ def configuration_of(text: str, planner: Planner, margin: float, load: str = "")
 def add_cell(parser: argparse.ArgumentParser) -> None:
     """The first argument of every command here."""
     parser.add_argument("cell", metavar="CELL", help="a cell file, or the name of a bundled cell: demo")
+
+
+def add_parameters(parser: argparse.ArgumentParser) -> None:
+    """What joules follow from."""
+    words = "power parameters that joules follow from, as a fit writes them (the data sheet)"
+    parser.add_argument("--power-parameters", default="", metavar="FILE", help=words)
 
 
 def add_margin(parser: argparse.ArgumentParser) -> None:

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from .asking import FAILED, add_cell, add_margin, planner_of, sentences
+from .asking import FAILED, add_cell, add_margin, add_parameters, planner_of, sentences
 from .move_command import figures_of, sentence_of
 from .output import add_formats, print_json
 from .trace_file import read_trace
@@ -23,6 +23,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     evaluate.add_argument("--station", default="", help="whose allowed contacts hold in its zone")
     add_margin(evaluate)
+    add_parameters(evaluate)
     add_formats(evaluate, comma=False)
     evaluate.set_defaults(run=run_evaluate)
 
@@ -30,7 +31,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluate and print; exit code 1 where a limit or the clearance is violated."""
     with sentences():
-        planner = planner_of(arguments.cell)
+        planner = planner_of(arguments.cell, arguments.power_parameters)
         trajectory = read_trace(arguments.trace, planner.cell.robot.joint_names)
         margin, load, station = arguments.safety_distance, arguments.load, arguments.station
         found = planner.evaluate(trajectory, margin, load, station)

@@ -11,6 +11,7 @@ from ir_msgs_py.report import TrajectoryReport
 from .asking import (
     add_cell,
     add_options,
+    add_parameters,
     configuration_of,
     failed,
     goal_of,
@@ -32,6 +33,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     move.add_argument("--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)")
     move.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
     add_options(move)
+    add_parameters(move)
     add_formats(move, comma=False)
     move.set_defaults(run=run_move)
 
@@ -39,7 +41,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run_move(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
     with sentences():
-        planner = planner_of(arguments.cell)
+        planner = planner_of(arguments.cell, arguments.power_parameters)
         start = configuration_of(arguments.start, planner, arguments.safety_distance, arguments.load)
         goal = goal_of(arguments.goal, planner)
         plan = planner.plan_regional(start, goal, options_of(arguments, arguments.duration))
@@ -60,6 +62,10 @@ def figures_of(report: TrajectoryReport) -> Row:
     return {
         "seconds": report.duration,
         "joules": report.energy,
+        "joules_low": report.energy_low,
+        "joules_high": report.energy_high,
+        "power_parameters": report.power_parameters,
+        "torque_reserve": report.torque_reserve,
         "base_joules": report.base_energy,
         "dissipated_joules": report.burnt_energy,
         "joint_joules": report.joint_energy,
@@ -72,6 +78,13 @@ def figures_of(report: TrajectoryReport) -> Row:
         "jerk_share": report.jerk_ratio,
         "torque_share": report.torque_ratio,
     }
+
+
+def predicted(report: TrajectoryReport) -> str:
+    """The interval of an energy, and what it follows from."""
+    low, high = report.energy_low, report.energy_high
+    within = f"{low:.0f} to {high:.0f} J" if high < 1e5 else f"{low / 1e3:.1f} to {high / 1e3:.1f} kJ"
+    return f"90 % interval {within} by {report.power_parameters}"
 
 
 def sentence_of(report: TrajectoryReport) -> str:
@@ -88,7 +101,7 @@ def sentence_of(report: TrajectoryReport) -> str:
         )
     )
     return (
-        f"{report.duration:.3f} s, {report.energy:.0f} J from the mains, "
+        f"{report.duration:.3f} s, {report.energy:.0f} J from the mains, predicted ({predicted(report)}), "
         f"at most {report.peak_power / 1e3:.1f} kW\n"
         f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a limit; "
         f"{'certified' if report.certified else 'NOT certified'}"

@@ -13,6 +13,7 @@ from ir_planner import ProgramPlan
 from .asking import (
     add_cell,
     add_options,
+    add_parameters,
     check_stations,
     configuration_of,
     failed,
@@ -20,6 +21,7 @@ from .asking import (
     planner_of,
     sentences,
 )
+from .move_command import predicted
 from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
 
 J_PER_KWH = 3.6e6
@@ -31,6 +33,8 @@ COLUMNS: Columns = {
     "to": ("to", text),
     "seconds": ("s", number(2)),
     "joules": ("J", number(0)),
+    "joules_low": ("from", number(0)),
+    "joules_high": ("to", number(0)),
     "clearance": ("clearance mm", number(1, 1e3)),
     "load": ("load", text),
     "power_mode": ("mode", text),
@@ -48,6 +52,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--saving", action="store_true", help="hold it against a common program in equal time as well"
     )
     add_options(plan)
+    add_parameters(plan)
     add_formats(plan)
     plan.set_defaults(run=run_plan)
 
@@ -55,7 +60,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run_plan(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
     with sentences(), ProgressLine() as line:
-        planner, stations = planner_of(arguments.cell), tuple(arguments.stations)
+        planner, stations = planner_of(arguments.cell, arguments.power_parameters), tuple(arguments.stations)
         check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         options = options_of(arguments)
@@ -86,6 +91,8 @@ def rows_of(movements: Sequence[PlannedMovement]) -> list[Row]:
             "to": step.to_station,
             "seconds": step.duration,
             "joules": step.report.energy,
+            "joules_low": step.report.energy_low,
+            "joules_high": step.report.energy_high,
             "clearance": None if step.is_pause else step.report.min_clearance,
             "certified": None if step.is_pause else step.report.certified,
             "load": step.load,
@@ -103,6 +110,10 @@ def totals_of(plan: ProgramPlan) -> Row:
         "program_id": plan.program_id,
         "seconds": plan.report.duration,
         "joules": plan.report.energy,
+        "joules_low": plan.report.energy_low,
+        "joules_high": plan.report.energy_high,
+        "power_parameters": plan.report.power_parameters,
+        "torque_reserve": plan.report.torque_reserve,
         "moving_seconds": plan.report.duration - standing[0],
         "moving_joules": plan.report.energy - standing[1],
         "clearance": plan.report.min_clearance,
@@ -121,7 +132,8 @@ def sentences_of(plan: ProgramPlan) -> list[str]:
     lines = [
         f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
         f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
-        f"cycle {totals['seconds']:.2f} s, {totals['joules'] / J_PER_KWH:.4f} kWh from the mains; "
+        f"cycle {totals['seconds']:.2f} s, {totals['joules'] / J_PER_KWH:.4f} kWh from the mains, predicted: "
+        f"{predicted(plan.report)}; "
         f"{proof if totals['certified'] else 'NOT certified'}",
     ]
     if totals["truncated"]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from .asking import add_cell, configuration_of, planner_of, sentences
+from .asking import add_cell, add_parameters, configuration_of, planner_of, sentences
 from .output import Row, add_formats, number, print_csv, print_json, print_table, text
 
 COLUMNS = {
@@ -24,6 +24,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     standby.add_argument("--pause", type=float, required=True, metavar="S", help="s from stop to next start")
     standby.add_argument("--state", default="home", help="where the robot stands (home)")
     standby.add_argument("--load", default="", help='what is held: "gripper+part", "none" (the tool)')
+    add_parameters(standby)
     add_formats(standby)
     standby.set_defaults(run=run_standby)
 
@@ -31,7 +32,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run_standby(arguments: argparse.Namespace) -> int:
     """Print the modes, shallow to deep, and the one to choose."""
     with sentences():
-        planner = planner_of(arguments.cell)
+        planner = planner_of(arguments.cell, arguments.power_parameters)
         q = configuration_of(arguments.state, planner, 0.0, arguments.load)
         found = planner.standby(arguments.pause, q, arguments.load)
     rows: list[Row] = [
@@ -47,8 +48,9 @@ def run_standby(arguments: argparse.Namespace) -> int:
     if arguments.json:
         chosen = {"chosen": found.chosen.name, "wake_at": found.wake_at, "joules": found.energy}
         asked = zip(found.modes, found.switch_times, strict=True)
+        within = {"saving_low": found.saving_low, "saving_high": found.saving_high}
         modes = [{"mode": mode, "seconds": seconds} for mode, seconds in asked]
-        print_json({**chosen, "modes": modes, "saving": found.saving, "alternatives": rows})
+        print_json({**chosen, "modes": modes, "saving": found.saving, **within, "alternatives": rows})
     elif arguments.csv:
         print_csv(rows)
     else:

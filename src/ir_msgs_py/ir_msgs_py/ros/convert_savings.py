@@ -10,7 +10,14 @@ from ir_msgs_py.savings import ProgramPoint, ProgramSavings, Saving
 
 def saving_to_msg(saving: Saving) -> SavingMsg:
     """Common and planned joules with their share."""
-    return SavingMsg(common=saving.common, planned=saving.planned, seconds=saving.seconds, share=saving.share)
+    return SavingMsg(
+        common=saving.common,
+        planned=saving.planned,
+        seconds=saving.seconds,
+        share=saving.share,
+        saved_low=saving.saved_low,
+        saved_high=saving.saved_high,
+    )
 
 
 def program_savings_to_msg(savings: ProgramSavings) -> ProgramSavingsMsg:
@@ -33,6 +40,8 @@ def program_savings_from_msg(msg: ProgramSavingsMsg) -> ProgramSavings:
         available=msg.available,
         movements=_saving(msg.movements),
         pauses=_saving(msg.pauses),
+        total_low=msg.total.saved_low,
+        total_high=msg.total.saved_high,
         across=msg.across,
         around=msg.around,
         program_id=msg.program_id,
@@ -51,4 +60,4 @@ def program_point_from_msg(msg: ProgramPointMsg) -> ProgramPoint:
 
 
 def _saving(msg: SavingMsg) -> Saving:
-    return Saving(msg.common, msg.planned, msg.seconds)
+    return Saving(msg.common, msg.planned, msg.seconds, msg.saved_low, msg.saved_high)

@@ -3,8 +3,10 @@
 from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
 from ir_planner.checks.clearance_checks import clearance_violation
 from ir_planner.checks.energy import MovementEnergy, carried, holding_watts, movement_energy
+from ir_planner.checks.energy_slopes import holding_slope, movement_slope, standing_slope
 from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
 from ir_planner.checks.free_space import FreeSpace
+from ir_planner.checks.intervals import ROBOTS, Interval, interval, movement_spread, spread
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.peak_power import peak_power
 from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
@@ -15,11 +17,13 @@ __all__ = [
     "AT_REST",
     "CLOSEST",
     "PATH",
+    "ROBOTS",
     "SLACK",
     "ZONES",
     "Colour",
     "Evaluation",
     "FreeSpace",
+    "Interval",
     "MovementEnergy",
     "Shape",
     "StateCheck",
@@ -31,14 +35,20 @@ __all__ = [
     "clearance_violation",
     "end_in_collision",
     "evaluate_trajectory",
+    "holding_slope",
     "holding_watts",
+    "interval",
     "measured",
     "movement_energy",
     "movement_shapes",
+    "movement_slope",
+    "movement_spread",
     "nearest_pair",
     "nearest_pairs",
     "pair_value",
     "peak_power",
+    "spread",
+    "standing_slope",
     "state_check",
     "too_near",
     "too_near_sentence",

@@ -1,6 +1,7 @@
 """Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is always drawn.
 
-Energy = base + sum of the axes (signed) + dissipated + change of the capacitor. The power is taken at the
+Energy = base + sum of the axes (signed) + dissipated + change of the capacitor, and what the rectifier loses
+where its efficiency is below 1. The power is taken at the
 middles of steps of at most 1 ms. Alone, a movement starts with an empty capacitor; what is left in it at the
 end is not credited, but given to the next movement of a program (`carried`).
 """
@@ -55,7 +56,7 @@ def movement_energy(
     bus = dc_bus(axes, dt, scene.dc_bus)
     shares = scene.dc_bus.regeneration != "none"
     taken = axes.sum(axis=1) if shares else np.zeros(0)
-    return _on_bus(bus, dt, scene.base_watts, axes.sum(axis=0) * dt, times, taken)
+    return _on_bus(bus, dt, scene, axes.sum(axis=0) * dt, times, taken)
 
 
 def carried(energy: MovementEnergy, charge: float, scene: PlanningScene) -> MovementEnergy:
@@ -63,13 +64,14 @@ def carried(energy: MovementEnergy, charge: float, scene: PlanningScene) -> Move
     if charge <= 0.0 or not len(energy.axes):
         return energy
     bus = dc_bus(energy.axes[:, None], energy.dt, scene.dc_bus, charge)
-    return _on_bus(bus, energy.dt, scene.base_watts, energy.joints, energy.times, energy.axes)
+    return _on_bus(bus, energy.dt, scene, energy.joints, energy.times, energy.axes)
 
 
 def _on_bus(
-    bus: DcBus, dt: float, base: float, joints: FloatArray, times: FloatArray, axes: FloatArray
+    bus: DcBus, dt: float, scene: PlanningScene, joints: FloatArray, times: FloatArray, axes: FloatArray
 ) -> MovementEnergy:
-    watts = bus.mains + base
+    base, efficiency = scene.base_watts, scene.drives.rectifier_efficiency
+    watts = np.where(bus.mains > 0.0, bus.mains / efficiency, bus.mains * efficiency) + base
     return MovementEnergy(
         total=float(watts.sum() * dt),
         base=base * dt * len(times),
@@ -94,4 +96,5 @@ def holding_watts(q: FloatArray, scene: PlanningScene) -> float:
     """Mains power [W] while the motors hold the arm still at q (n,): base load and copper losses."""
     rest = np.zeros((1, len(q)))
     torque = scene.dynamics.inverse_dynamics(q[None], rest, rest)
-    return scene.base_watts + float(scene.dynamics.axis_power(rest, torque).sum())
+    holding = float(scene.dynamics.axis_power(rest, torque).sum())
+    return scene.base_watts + holding / scene.drives.rectifier_efficiency

@@ -156,5 +156,6 @@ def fill_standby(response: Any, standby: Standby, timers: str) -> None:
     response.clairvoyant = standby.clairvoyant
     response.posture, response.posture_energies = standby.posture, list(standby.posture_energies)
     response.saving = standby.saving
+    response.saving_low, response.saving_high = standby.saving_low, standby.saving_high
     response.alternatives = [power_mode_to_msg(mode) for mode in standby.alternatives]
     response.alternative_energies = [float(energy) for energy in standby.energies]

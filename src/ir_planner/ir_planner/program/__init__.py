@@ -3,6 +3,7 @@
 from ir_planner.program.pause_lengths import Lengths, lengths_of
 from ir_planner.program.program import plan_program
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, nobody
+from ir_planner.program.spreads import Spreads, with_intervals
 from ir_planner.program.standby import Standby
 from ir_planner.program.waiting import Trip, best_posture
 
@@ -11,10 +12,12 @@ __all__ = [
     "ProgramPlan",
     "ProgramRequest",
     "Progress",
+    "Spreads",
     "Standby",
     "Trip",
     "best_posture",
     "lengths_of",
     "nobody",
     "plan_program",
+    "with_intervals",
 ]

@@ -13,6 +13,7 @@ from ir_planner.program.common_program import common_program
 from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.savings import savings_of
+from ir_planner.program.spreads import Spreads
 
 _ENDED = "planning_time or max_iterations ended before the common program was compared"
 
@@ -38,6 +39,7 @@ def held_against_common(
         if context.work.exhausted:
             notes.append("none")
             return f"no savings: {_ENDED}"
+        added = Spreads(choice.request).of
         try:
             common = common_program(choice)
             plain = common.steps()
@@ -47,7 +49,7 @@ def held_against_common(
                 words = f"both in the cycle time of {cycle_time:g} s"
                 if len(waiting) > len(plain):
                     words += f", of which the common program waits {waiting[-1].duration:.2f} s at its end"
-                savings = savings_of(waiting, own, _pauses(plain), common)
+                savings = savings_of(waiting, own, _pauses(plain), common, added)
                 return Comparison(savings, own, words)
             if context.work.exhausted:
                 notes.append("none")
@@ -58,7 +60,7 @@ def held_against_common(
             return f"no savings: {error}"
         words = f"both in the common program's {seconds:.2f} s"
         words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
-        return Comparison(savings_of(plain, steps, _pauses(plain), common), steps, words)
+        return Comparison(savings_of(plain, steps, _pauses(plain), common, added), steps, words)
 
 
 def _pauses(steps: Steps) -> int:

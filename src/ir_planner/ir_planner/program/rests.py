@@ -148,9 +148,7 @@ def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
     """
     if name == MOTORS:
         return holding_watts(q, scene)
-    always = sum(load.watts_always for load in scene.loads)
-    bus = sum(load.watts_drive_bus for load in scene.loads) if name == BRAKES else 0.0
-    return scene.power.mode(name).controller_watts + always + bus
+    return scene.power.mode(name).controller_watts + scene.tool_watts(drive_bus=name == BRAKES)
 
 
 def rests_at(q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Rests:

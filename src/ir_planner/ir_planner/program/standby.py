@@ -14,7 +14,9 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.transitions import TransitionTimes
+from ir_planner.checks import Interval, interval, spread
 from ir_planner.program.pause_lengths import Lengths, lengths_of
+from ir_planner.program.pause_slopes import pause_slope, same_steps
 from ir_planner.program.rests import BRAKES, MOTORS, Rests, Step, Steps, mode_watts, rests_at
 from ir_planner.program.timeouts import Timeouts
 from ir_planner.scene import PlanningScene
@@ -26,9 +28,10 @@ class Standby:
 
     chosen: the deepest mode that is asked for. wake_at [s] from the start of the pause, inf: its end wakes
     the robot. saving [J]: against what the controller does by itself (`timer` s on motors, then on brakes);
-    saving_on_motors [J]: against standing on motors all the time. alternatives: all modes, shallow to deep,
-    each alone and at once, and their energies [J] (inf: the pause is too short); on motors with what the
-    controller does by itself. modes: the sequence, each asked for at its switch time [s]. expected, worst,
+    saving_low, saving_high [J]: its 90 % interval. saving_on_motors [J]: against standing on motors all the
+    time. alternatives: all modes, shallow to deep, each alone and at once, and their energies [J] (inf: the
+    pause is too short); on motors with what the controller does by itself. modes: the sequence, each asked
+    for at its switch time [s]. expected, worst,
     clairvoyant [J]: mean and largest energy, and the mean with each length known at the start. late, latest
     [s]: mean and largest time from the end of the pause until the robot is ready. posture: where to wait, "":
     where the robot stands; posture_energies [J]: at each of the postures; trips: what moving there takes, in
@@ -52,6 +55,8 @@ class Standby:
     latest: float = 0.0
     posture: str = ""
     posture_energies: tuple[float, ...] = ()
+    saving_low: float = 0.0
+    saving_high: float = 0.0
     trips: tuple[str, ...] = ()
 
     @property
@@ -61,8 +66,9 @@ class Standby:
             f"{mode} at {at:g} s" for mode, at in zip(self.modes, self.switch_times, strict=True)
         )
         parts = [
-            f"{steps}: saves {self.saving:.0f} J against the controller's own timer (brakes after "
-            f"{self.timer:g} s on motors), {self.saving_on_motors:.0f} J against standing on motors"
+            f"{steps}: saves {self.saving:.0f} J (predicted, 90 % interval {self._within}) against the "
+            f"controller's own timer (brakes after {self.timer:g} s on motors), "
+            f"{self.saving_on_motors:.0f} J against standing on motors"
         ]
         if np.isinf(self.wake_at):
             parts.append(
@@ -71,6 +77,12 @@ class Standby:
                 f"{self.late:.1f} s after it, at worst {self.latest:.1f} s"
             )
         return "; ".join((*parts, *self.trips))
+
+    @property
+    def _within(self) -> str:
+        within = f"{self.saving_low:.0f} to {self.saving_high:.0f} J"
+        doubtful = self.saving_low <= 0.0 <= self.saving_high and self.saving != 0.0
+        return f"{within}, zero lies in it: it is open whether anything is saved" if doubtful else within
 
 
 def pause_energy(
@@ -103,11 +115,15 @@ def advice(lengths: Lengths, q: FloatArray, scene: PlanningScene, times: Transit
     by_itself = _mean(rests, (), lengths)
     modes, switches = _shown(rests, steps, pause)
     chosen = steps[-1].rest.name if steps else MOTORS
+    saving = by_itself - cost.expected
+    within = _saved_within(saving, steps, lengths, rests, q, scene)
     return Standby(
         chosen=_mode(chosen, q, scene, times),
         wake_at=pause - times.leave(chosen) if lengths.known else float("inf"),
         energy=cost.expected,
-        saving=by_itself - cost.expected,
+        saving=saving,
+        saving_low=within.low,
+        saving_high=within.high,
         saving_on_motors=rests.motors * float(lengths.likely.mean()) - cost.expected,
         timer=rests.timer,
         alternatives=tuple(_mode(name, q, scene, times) for name in REST_MODES),
@@ -116,6 +132,22 @@ def advice(lengths: Lengths, q: FloatArray, scene: PlanningScene, times: Transit
         switch_times=switches,
         **cost._asdict(),
     )
+
+
+def _saved_within(
+    saving: float, steps: Steps, lengths: Lengths, rests: Rests, q: FloatArray, scene: PlanningScene
+) -> Interval:
+    """The 90 % interval of what the steps save against what the controller does by itself."""
+
+    def saved(of: Rests) -> float:
+        own = same_steps(steps, of)
+        if lengths.known and own:
+            spent = of.in_time([step.rest for step in own], lengths.most)
+        else:
+            spent = _mean(of, own, lengths)
+        return _mean(of, (), lengths) - spent
+
+    return interval(saving, spread(pause_slope(q, scene, rests, saved), scene.parameters))
 
 
 class _Cost(NamedTuple):

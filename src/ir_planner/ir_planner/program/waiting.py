@@ -73,6 +73,8 @@ def _after(
         worst=there.worst + trip.joules,
         clairvoyant=there.clairvoyant + trip.joules,
         saving=here.saving + here.energy - energy,
+        saving_low=there.saving_low + here.saving + here.energy - energy - there.saving,
+        saving_high=there.saving_high + here.saving + here.energy - energy - there.saving,
         saving_on_motors=here.saving_on_motors + here.energy - energy,
         wake_at=there.wake_at + trip.there[0],
         switch_times=tuple(at + trip.there[0] for at in there.switch_times),

@@ -3,11 +3,19 @@
 from ir_planner.scene.drives import Drives
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, torque_use
 from ir_planner.scene.movement_cost import movement_cost, path_cost
-from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with, with_parts
+from ir_planner.scene.planning_scene import (
+    PROOF_TOLERANCE,
+    RUNNING,
+    PlanningScene,
+    load_text,
+    scene_with,
+    with_parts,
+)
 from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_inside
 
 __all__ = [
     "PROOF_TOLERANCE",
+    "RUNNING",
     "STILL",
     "Drives",
     "Dynamics",

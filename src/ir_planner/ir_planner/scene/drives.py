@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from ir_description import Load, PowerData, PowerParameters, RobotModel
 from ir_kernels.power import Regeneration
+from ir_msgs_py.status import StatusCode
+from ir_planner.errors import RequestError
 
 
 @dataclass(frozen=True)
@@ -19,9 +21,24 @@ class Drives:
     torque_reserve: float = 0.0
     parameters: PowerParameters | None = None
 
+    @property
+    def rectifier_efficiency(self) -> float:
+        """Share of the mains power that reaches the bus."""
+        return 1.0 if self.parameters is None else self.parameters.value("rectifier_efficiency")
+
     def robot(self, robot: RobotModel) -> RobotModel:
-        """The robot with the friction, losses and masses of the parameters."""
-        return robot if self.parameters is None else self.parameters.robot_with(robot)
+        """The robot with the friction, losses and masses of the parameters. Raises RequestError for those of
+        another robot.
+        """
+        own = self.parameters
+        if own is None:
+            return robot
+        if (own.robot, own.joints) != (robot.name, robot.joint_names):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"power parameters {own.name!r} are of robot {own.robot!r}: the cell has {robot.name!r}",
+            )
+        return own.robot_with(robot)
 
     def loads(self, loads: Iterable[Load]) -> tuple[Load, ...]:
         """Loads with the masses and watts of the parameters."""

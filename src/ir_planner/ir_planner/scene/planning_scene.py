@@ -10,7 +10,17 @@ from functools import cached_property
 
 import numpy as np
 
-from ir_description import AllowedContact, Cell, Load, PartPlaces, PowerData, Station, Zone
+from ir_description import (
+    AllowedContact,
+    Cell,
+    Load,
+    PartPlaces,
+    PowerData,
+    PowerParameters,
+    Station,
+    Zone,
+    data_sheet,
+)
 from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
@@ -100,9 +110,24 @@ class PlanningScene:
     @property
     def base_watts(self) -> float:
         """Mains power [W] of controller, drives and tool while the motors are on, without the axes."""
-        loads = self.drives.loads(self.loads)
-        tool = sum(load.watts_always + load.watts_drive_bus for load in loads)
+        tool = self.tool_watts(drive_bus=True)
         return self.power.mode(RUNNING).controller_watts + self.power.drives_and_brake_release + tool
+
+    def tool_watts(self, *, drive_bus: bool) -> float:
+        """Watts of what is attached, with its share of the drive bus where that is up."""
+        loads = self.drives.loads(self.loads)
+        bus = sum(load.watts_drive_bus for load in loads) if drive_bus else 0.0
+        return sum(load.watts_always for load in loads) + bus
+
+    @cached_property
+    def parameters(self) -> PowerParameters:
+        """What the joules follow from."""
+        return self.drives.parameters or data_sheet(self.cell.robot.name, self.power.name)
+
+    @cached_property
+    def unloaded(self) -> DynamicsModel:
+        """Dynamics without what is attached."""
+        return DynamicsModel(self.drives.robot(self.cell.robot), (), self.cell.base_pose)
 
     @property
     def dc_bus(self) -> DcBusParameters:

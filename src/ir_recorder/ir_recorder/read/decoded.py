@@ -33,6 +33,7 @@ def movement_from(message: Any) -> PlannedMovement:
 
 def savings_from(message: Any) -> ProgramSavings:
     """ProgramSavings of its decoded message."""
+    low, high = _interval(message.total)
     return ProgramSavings(
         available=bool(message.available),
         movements=_saving_from(message.movements),
@@ -41,16 +42,26 @@ def savings_from(message: Any) -> ProgramSavings:
         around=int(message.around),
         program_id=message.program_id,
         sentence=message.sentence,
+        total_low=low,
+        total_high=high,
     )
 
 
 def _saving_from(message: Any) -> Saving:
-    return Saving(float(message.common), float(message.planned), float(message.seconds))
+    low, high = _interval(message)
+    return Saving(float(message.common), float(message.planned), float(message.seconds), low, high)
+
+
+def _interval(message: Any) -> tuple[float, float]:
+    """Of a saving; recordings of before intervals have none."""
+    return float(getattr(message, "saved_low", 0.0)), float(getattr(message, "saved_high", 0.0))
 
 
 def report_from(message: Any) -> TrajectoryReport:
-    """A TrajectoryReport of its decoded message."""
+    """A TrajectoryReport of its decoded message; what recordings of before don't have keeps its default."""
+    later = ("energy_low", "energy_high", "power_parameters", "torque_reserve")
     return TrajectoryReport(
+        **{name: getattr(message, name) for name in later if hasattr(message, name)},
         duration=message.duration,
         movement_cost=message.movement_cost,
         energy=message.energy,

@@ -1,0 +1,154 @@
+"""How the energy of a movement changes with each power parameter: its derivative at the scene's parameters.
+
+Mains energy is piecewise linear in powers. What a joule more from the bus costs at the mains is 1 while the
+mains feed it, 0 while the surplus is dissipated, and what the next such time says while the capacitor does
+both. So one pass over the samples of a movement gives its slope, and the energies of many robots are one
+product with it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_description import AXIS_UNITS
+from ir_kernels import DcBus, dc_bus
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_planner.scene import RUNNING, PlanningScene
+
+STEP_S = 8e-3  # intervals need no finer samples than these
+_MOST = 20_000  # samples: what lasts longer is sampled more coarsely
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A motion at the middles of N steps of dt s, and how long it takes [s]."""
+
+    motion: Samples
+    dt: float
+    span: float
+
+    @staticmethod
+    def of(trajectory: JointTrajectory) -> "Sampled":
+        """Of a trajectory; no samples where nothing lasts."""
+        begin = float(trajectory.times[0])
+        span = trajectory.duration - begin
+        count = int(np.clip(np.ceil(span / STEP_S), 1, _MOST)) if span > 0.0 else 0
+        dt = span / max(count, 1)
+        return Sampled(trajectory.sample(begin + (np.arange(count) + 0.5) * dt), dt, span)
+
+
+def sampled_energy(at: Sampled, scene: PlanningScene) -> float:
+    """Energy [J] at the mains of a sampled motion, with the loads of the scene."""
+    if at.span <= 0.0:
+        return 0.0
+    _, _, bus = _powers(at, scene)
+    return _drawn(bus, at.dt) / scene.drives.rectifier_efficiency + scene.base_watts * at.span
+
+
+def movement_slope(at: Sampled, scene: PlanningScene) -> FloatArray:
+    """d energy / d parameter (P,) of a sampled motion with the loads of the scene, J per unit."""
+    if at.span <= 0.0:
+        return np.zeros(len(scene.parameters.names))
+    torque, power, bus = _powers(at, scene)
+    efficiency = scene.drives.rectifier_efficiency
+    price = _price(power, bus, scene) * (at.dt / efficiency)
+    slope = _axis_slope(_States(at.motion, torque, price), scene)
+    slope[scene.parameters.index("rectifier_efficiency")] = -_drawn(bus, at.dt) / efficiency**2
+    return slope + standing_slope(at.span, scene)
+
+
+def _powers(at: Sampled, scene: PlanningScene) -> tuple[FloatArray, FloatArray, DcBus]:
+    """Torque (N, n) Nm, power of the axes (N, n) W, and what the bus makes of it."""
+    motion = at.motion
+    torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
+    power = scene.dynamics.axis_power(motion.qd, torque)
+    return torque, power, dc_bus(power, at.dt, scene.dc_bus)
+
+
+def _drawn(bus: DcBus, dt: float) -> float:
+    """Joules that the bus takes from the rectifier, less those that go back."""
+    return float(bus.mains.sum()) * dt
+
+
+def holding_slope(q: FloatArray, scene: PlanningScene) -> FloatArray:
+    """d watts / d parameter (P,) of motors that hold the arm still at q (n,), W per unit."""
+    rest = np.zeros((1, len(q)))
+    motion = Samples(q[None], rest, rest, rest)
+    torque = scene.dynamics.inverse_dynamics(q[None], rest, rest)
+    efficiency = scene.drives.rectifier_efficiency
+    slope = _axis_slope(_States(motion, torque, np.full((1, len(q)), 1.0 / efficiency)), scene)
+    drawn = float(scene.dynamics.axis_power(rest, torque).sum())
+    slope[scene.parameters.index("rectifier_efficiency")] = -drawn / efficiency**2
+    return slope + standing_slope(1.0, scene)
+
+
+def standing_slope(
+    seconds: float, scene: PlanningScene, mode: str = RUNNING, *, drive_bus: bool = True
+) -> FloatArray:
+    """d energy / d parameter (P,) of controller, drives and tool over some seconds in a mode."""
+    parameters = scene.parameters
+    slope = np.zeros(len(parameters.names))
+    slope[parameters.index(f"watts.{mode}")] = seconds
+    slope[parameters.index("drives_watts")] = seconds if mode == RUNNING else 0.0
+    share = max(parameters.value("tool_watts"), 1e-9)
+    slope[parameters.index("tool_watts")] = scene.tool_watts(drive_bus=drive_bus) * seconds / share
+    return slope
+
+
+@dataclass(frozen=True, eq=False)
+class _States:
+    """motion, torque (N, n) Nm, and price (N, n): mains joules per watt of an axis in a sample."""
+
+    motion: Samples
+    torque: FloatArray
+    price: FloatArray
+
+
+def _price(power: FloatArray, bus: DcBus, scene: PlanningScene) -> FloatArray:
+    """What a joule more of each axis costs at the mains (N, n), before the rectifier."""
+    if scene.dc_bus.regeneration == "none":
+        return np.asarray(power > 0.0, dtype=np.float64)
+    decided = (bus.mains != 0.0) | (bus.dissipated > 0.0)
+    places = np.where(decided, np.arange(len(decided)), len(decided))
+    following = np.minimum.accumulate(places[::-1])[::-1]  # what is left at the end is not credited
+    known = np.append((bus.mains != 0.0).astype(np.float64), 0.0)
+    return np.repeat(known[following][:, None], power.shape[1], axis=1)
+
+
+def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
+    """The part of friction, losses and masses; rectifier and constant watts are zero."""
+    parameters, model, d = scene.parameters, scene.dynamics, scene.dynamics.data
+    q, qd, qdd, _ = at.motion
+    speed, size = np.abs(qd), np.abs(at.torque)
+    ratio = np.abs(d.gear_ratio)
+    sign = np.sign(at.torque)
+    losses = d.inverter_loss / ratio + d.gear_loss * speed
+    of_torque = at.price * (qd + 2.0 * d.copper_loss / ratio**2 * at.torque + sign * losses)
+    direction = np.sign(qd)
+    slope = np.zeros(len(parameters.names))
+    axes = {
+        "viscous": of_torque * qd,
+        "coulomb": of_torque * direction,
+        "copper": at.price * (size / ratio) ** 2,
+        "iron": at.price * speed**2,
+        "inverter": at.price * size / ratio,
+        "gear": at.price * size * speed,
+    }
+    for term in AXIS_UNITS:
+        slope[parameters.places(term)] = axes[term].sum(axis=0)
+    rotor, balance = d.rotor_inertia * qdd, model.counterbalance(q)
+    body = at.torque - rotor - d.viscous * qd - d.coulomb * direction + balance
+    carried = _carried(at, scene)
+    scaled = {"rotor_inertia": rotor, "counterbalance": -balance, "load_mass": carried}
+    for name, torque in (*scaled.items(), ("link_mass", body - carried)):
+        value = max(parameters.value(name), 1e-9)
+        slope[parameters.index(name)] = float((of_torque * torque).sum()) / value
+    return slope
+
+
+def _carried(at: _States, scene: PlanningScene) -> FloatArray:
+    """The part of the torque (N, n) that is due to what is attached."""
+    if not scene.loads:
+        return np.zeros_like(at.torque)
+    return at.torque - scene.unloaded.inverse_dynamics(*at.motion[:3])
