@@ -1,4 +1,4 @@
-"""Typical plants with what the cells' movements carry: are they driven within the tube, and at what energy?"""
+"""Typical plants that drive the movements of the cells: do they stay within the tube, at what energy?"""
 
 from __future__ import annotations
 
@@ -21,8 +21,10 @@ def measured(asked: Asked) -> Found:
     cells = QUICK if asked.quick else asked.cells
     for objective in QUICK_OBJECTIVES if asked.quick else OBJECTIVES:
         every = all_predicted(cells, objective)
-        for seed in range(asked.seeds):
-            rows.append({"plant": f"typical:{seed}", "objective": objective, **_driven(every, seed)})
+        rows += [
+            {"plant": f"typical:{seed}", "objective": objective, **_driven(every, seed)}
+            for seed in range(asked.seeds)
+        ]
     kept = sum(row["movements"] - row["failed"] for row in rows) / sum(row["movements"] for row in rows)
     return Found(
         rows,

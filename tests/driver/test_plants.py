@@ -1,0 +1,165 @@
+"""Plants: drawn by seed, read from files, named everywhere; and their energies add up."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from ir_description import load_power_data
+from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.diagnostics import report
+from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.errors import SettingsError
+from ir_sim_driver.plant import (
+    PlantFileError,
+    nominal_plant,
+    plant_from_yaml,
+    plant_named,
+    plant_to_yaml,
+    typical_plant,
+)
+from ir_sim_driver.plant.gears import Gears
+from ir_sim_driver.plant.typical import CUT, SPREAD
+
+HEAD = "format: ir_sim_driver/plant/1\nname: mine\nrobot: kr210_r2700_extra\n"
+
+
+@pytest.fixture(scope="module")
+def data():
+    return load_power_data()
+
+
+def figures_of(plant):
+    """Every number of a plant, by section and name."""
+    robot = plant.robot
+    found = {
+        name: getattr(robot, name) for name in ("link_mass", "link_com", "link_inertia", "reflected_inertia")
+    }
+    for section in (plant.drives, plant.gears, plant.link):
+        found |= {f.name: getattr(section, f.name) for f in fields(section)}
+    watts = [plant.watts.drives, plant.watts.tool, *plant.watts.controller.values()]
+    return {**found, "watts": watts, "pressure": robot.counterbalance.charge_pressure}
+
+
+def test_a_seed_draws_the_same_plant_again_and_another_one_another(cell, data):
+    first, again, other = (typical_plant(cell.robot, data, seed) for seed in (3, 3, 4))
+    for name, value in figures_of(first).items():
+        assert np.array_equal(value, figures_of(again)[name]), name
+    differs = [not np.array_equal(v, figures_of(other)[name]) for name, v in figures_of(first).items()]
+    assert np.mean(differs) > 0.9
+    assert first.name == "typical:3"
+
+
+def test_typical_figures_stay_as_near_to_the_data_as_their_marks_say(cell, data):
+    nominal, drawn = cell.robot, [typical_plant(cell.robot, data, seed) for seed in range(40)]
+    masses = np.array([plant.robot.link_mass / nominal.link_mass - 1.0 for plant in drawn])
+    assert np.abs(masses[:, :4]).max() <= CUT * SPREAD["H"] * (1.0 + 1e-9)
+    assert masses[:, 1].std() == pytest.approx(SPREAD["H"], rel=0.4)
+    friction = np.array([plant.gears.coulomb / nominal.friction_coulomb - 1.0 for plant in drawn])
+    assert friction.std() == pytest.approx(SPREAD["M"], rel=0.2)
+    assert abs(friction.mean()) < 0.02
+
+
+@pytest.mark.parametrize("text", ["nominal", "typical", "typical:12"])
+def test_a_plant_comes_back_from_its_file_as_it_was(cell, data, text):
+    plant = plant_named(text, cell.robot, data)
+    again = plant_from_yaml(plant_to_yaml(plant), cell.robot, data)
+    assert again.name == plant.name
+    for name, value in figures_of(plant).items():
+        assert np.array_equal(value, figures_of(again)[name]), name
+
+
+def test_what_a_file_leaves_out_is_nominal(cell, data, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(HEAD + "dc_link: {mains_v: 540}\nwatts: {controller_w: {HIBERNATION: 20}}\n")
+    plant, nominal = plant_named(str(file), cell.robot, data), nominal_plant(cell.robot, data)
+    assert plant.link.mains == 540.0
+    assert plant.link.capacitance == nominal.link.capacitance
+    assert sorted(plant.watts.controller.values()) == [20.0, 115.0, 135.0, 135.0]
+    assert np.array_equal(plant.gears.viscous, nominal.gears.viscous)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "gears: {start_deg_c: [5, 5, 5, 5, 5, 900]}",
+            "start_deg_c[5] is 900 deg C, must be in [0, 150] deg C",
+        ),
+        ("gears: {friction: 1}", "unknown key 'friction'"),
+        ("links: [{name: link_2, mass_kg: -1}]", "links[0].mass_kg is -1 kg, must be in (0, 100000] kg"),
+        ("dc_link: {mains_v: 700}", "above the mains, 700 V"),
+        ("drives: {switching_w: [1, 2]}", "has 2 entries, must have 6"),
+    ],
+)
+def test_a_file_without_sense_is_refused_with_its_place(cell, data, tmp_path, text, said):
+    file = tmp_path / "wrong.yaml"
+    file.write_text(HEAD + text + "\n")
+    with pytest.raises(PlantFileError) as refused:
+        plant_named(str(file), cell.robot, data)
+    assert said in str(refused.value)
+    assert str(file) in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["clay", "typical:x", "typical:-1", ""])
+def test_an_unknown_plant_is_refused_with_the_known_ones(cell, data, text):
+    with pytest.raises(SettingsError, match="known are nominal, typical, typical:SEED"):
+        plant_named(text, cell.robot, data)
+
+
+def test_the_parts_of_a_typical_plant_add_up_at_every_instant(plan, start, cell):
+    simulation = make_simulation(cell, plant="typical:5")
+    home = np.array(cell.machine_home)
+    start(simulation, plan(1.6, home, home + np.array([0.6, 0.2, -0.2, 0.3, 0.2, 0.2])))
+    for _ in range(170):
+        simulation.run(0.01)
+        simulation.mains.settle()
+        r = simulation.mains.meter.reading()
+        axes = r.mechanical_energy + r.copper_energy + r.inverter_energy + r.iron_energy
+        assert r.axis_energy == pytest.approx(axes, rel=1e-12)
+        parts = r.base_energy + axes.sum() + r.burnt_energy + r.capacitor_energy + r.rectifier_energy
+        assert r.energy == pytest.approx(parts, rel=1e-12)
+    losses = (r.copper_energy, r.inverter_energy, r.iron_energy)
+    assert all((loss > 0.0).all() for loss in losses)
+    assert r.rectifier_energy > 0.0
+    assert 0.0 < r.tool_energy < r.base_energy
+
+
+def test_meter_results_and_diagnostics_name_the_plant(cell):
+    simulation = make_simulation(cell, plant="typical:5")
+    frames = [Driver(simulation).tick(k * 2_000_000) for k in range(1, 10)]
+    power = next(frame.power for frame in frames if frame.power is not None)
+    assert power.plant == "typical:5"
+    assert power.joint_temperature.shape == power.joint_current.shape == (6,)
+    assert report(simulation, 0.0)[0].values["plant"] == "typical:5"
+    assert make_simulation(cell, backend="ideal", plant="typical:5").plant.name == "ideal"
+
+
+def test_a_load_that_was_not_declared_is_carried_in_the_tube(plan, start, run_out, cell):
+    simulation = make_simulation(cell, plant="typical:1")
+    simulation.backend.set_load(simulation.load.loads, declared=())
+    home = np.array(cell.machine_home)
+    start(simulation, plan(2.5, home, home + 0.3))
+    outcome = run_out(simulation)
+    assert outcome.code == 0
+    assert 1e-5 < max(outcome.max_tracking_error) < 1e-3
+    assert outcome.max_tool_deviation < 0.005
+
+
+def test_gears_warm_up_by_their_friction_and_turn_more_easily(cell, data):
+    gears = Gears(typical_plant(cell.robot, data, 0).gears, 1.0)
+    speed = np.full(6, 0.5)
+    dry = gears.dry(speed.tolist(), [0.0] * 6)
+    cold, _ = gears.friction(speed.tolist(), dry)
+    before, heat = gears.temperature, np.zeros(6)
+    for _ in range(3600):
+        friction, _ = gears.friction(speed.tolist(), dry)
+        gears.heat(friction, speed)
+        heat += friction * speed
+    warm, _ = gears.friction(speed.tolist(), dry)
+    assert (gears.temperature > before + 1.0).all()
+    assert (warm < cold).all()
+    figures = typical_plant(cell.robot, data, 0).gears
+    assert (gears.temperature - before < heat / figures.capacity).all()  # some of it has gone
