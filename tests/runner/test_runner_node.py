@@ -285,7 +285,7 @@ def test_diagnostics_say_what_runs_how_it_ended_and_whether_the_driver_is_heard(
 
 
 def test_pauses_switch_the_bits_and_wake_by_a_packet(cell):
-    result = cell.run([pause(0.3, "BUS_POWER_OFF"), pause(0.3, "HIBERNATION"), move()])
+    result = cell.run([pause(1.0, "BUS_POWER_OFF"), pause(1.0, "HIBERNATION"), move()])
     assert result.status.code == StatusCode.SUCCESS, result.status.message
     assert cell.driver.log == [
         "ab=0",
@@ -463,7 +463,7 @@ def test_a_packet_that_cannot_be_sent_is_named(ros_context, ros_executor):
 
     cell = Cell(ros_context, ros_executor)
     cell.runner._send = unplugged
-    result = cell.run([pause(0.1, "HIBERNATION")])
+    result = cell.run([pause(1.0, "HIBERNATION")])
     assert (
         "no Wake-on-LAN packet could be sent to 127.0.0.1 port 9009: Network is unreachable"
         in result.status.message
