@@ -57,6 +57,7 @@ DRIVER = Rights(
         *(names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC, "/clock"),
         *(names.POWER_STATE, names.CONTROLLER_STATE, names.CONTROLLER_TIMERS, names.CARRIED_LOAD),
         *(names.PLC_OUTPUTS, names.PLC_INPUTS_IN_FORCE, names.ROBOT_MARKERS),
+        *(names.PLANT, names.LOAD_CHECK),
     ),
     subscribe=(names.COMMANDED_TRAJECTORY, names.PLC_INPUTS, names.SPEED_SCALING, names.CELL),
     reply=(
