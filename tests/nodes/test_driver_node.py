@@ -264,7 +264,7 @@ def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_cli
     stopped = np.array(states[-1].position)
     wait_for(lambda: cell_client.call(names.RECOVER, Recover.Request()).status.code == 1)
     wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS, timeout=60.0)
-    assert np.allclose(states[-1].position, stopped, atol=1e-9)
+    assert np.allclose(states[-1].position, stopped, atol=1e-4)  # the loops take the load over
 
 
 def test_a_plc_reaches_the_node_by_modbus(make_driver, listen, wait_for):

@@ -37,7 +37,7 @@ class Run:
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Run the demonstration once, as `make demo` does."""
     folder = tmp_path_factory.mktemp("demo")
-    command = [sys.executable, "-m", "ir_cli.main", "demo", "--out", str(folder)]
+    command = [sys.executable, "-m", "ir_cli.main", "demo", "--plant", "nominal", "--out", str(folder)]
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=400, env=dict(os.environ), check=False
     )

@@ -16,6 +16,11 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     demo.add_argument("--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)")
     demo.add_argument("--out", type=Path, default=Path("out"), help="folder for recording and report (out)")
     demo.add_argument("--seed", type=int, default=0, help="seed of the planner (0)")
+    demo.add_argument(
+        "--plant",
+        default="nominal",
+        help="the simulated plant: nominal (default; the watts of the data), typical:SEED, or a file",
+    )
     demo.set_defaults(run=run)
 
 
@@ -24,6 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     apply(own_domain())
     from .story import Demonstration
 
-    outcome = Demonstration(arguments.cell, arguments.out, arguments.seed, Progress()).run()
+    words = (arguments.cell, arguments.out, arguments.seed, arguments.plant)
+    outcome = Demonstration(*words, Progress()).run()
     sys.stdout.write(outcome.text() + "\n")
     return 0 if outcome.ok else 1

@@ -54,8 +54,8 @@ START_SECONDS = 30.0
 class Demonstration:
     """One run: `run` returns what came out of it, or raises an error with a sentence."""
 
-    def __init__(self, cell: str, out: Path, seed: int, progress: Progress) -> None:
-        self._out, self._progress = out, progress
+    def __init__(self, cell: str, out: Path, seed: int, plant: str, progress: Progress) -> None:
+        self._out, self._plant, self._progress = out, plant, progress
         full = load_cell(cell)
         self._full_pauses = [step.dwell for step in full.program if step.kind == "PAUSE"]
         self._cell = with_short_pauses(full, LONGEST_PAUSE)
@@ -69,7 +69,8 @@ class Demonstration:
         recording, cell_file = self._out / "demo.mcap", self._out / "demo_cell.yaml"
         cell_file.write_text(cell_to_yaml(self._cell))
         progress = self._progress
-        progress.say(f"Demonstration of cell {self._cell.name}: real nodes over DDS, real time")
+        what = f"cell {self._cell.name}, simulated plant {self._plant}"
+        progress.say(f"Demonstration of {what}: real nodes over DDS, real time")
         nodes = NodeProcesses(self._out / "log", {})
         transitions = {f"transitions.{name}": seconds for name, seconds in TRANSITIONS.items()}
         with nodes, Client(timeout=START_SECONDS, node_name="ir_demo") as client:
@@ -78,7 +79,7 @@ class Demonstration:
                 cell_nodes(
                     str(cell_file.resolve()),
                     planner=transitions,
-                    driver={**transitions, "wake_port": self._link.wake_port},
+                    driver={**transitions, "wake_port": self._link.wake_port, "plant": self._plant},
                     runner={"wake_port": self._link.wake_port},
                     recorder={"facts": self._facts(), "roots": [str(self._out.resolve())]},
                 )
@@ -102,6 +103,7 @@ class Demonstration:
         facts = {
             "shortened": "pauses and the transitions of the power modes; the clock is not scaled",
             "seed": str(self._options.seed),
+            "plant": self._plant,
             contents.SAFETY_DISTANCE: f"{self._options.safety_distance:g} m",
             **{name: f"{seconds:g} s" for name, seconds in TRANSITIONS.items()},
         }

@@ -14,7 +14,7 @@ from ir_sim_driver.controller import ControllerSettings, SimulationSettings, Sup
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.load_check import LoadCheckSettings
 from ir_sim_driver.motion import ExecutionSettings
-from ir_sim_driver.plant import BACKENDS, ControlSettings
+from ir_sim_driver.plant import BACKENDS, TYPICAL, ControlSettings
 from ir_sim_driver.plc import LINKS, Link, PlcSettings, WakeOnLan
 from ir_sim_driver.power import IdleTimes
 
@@ -31,7 +31,7 @@ class NodeSettings:
     )
     backend: str = setting("pybullet", "What simulates the robot.", choices=tuple(BACKENDS), read_only=True)
     plant: str = setting(
-        "nominal",
+        TYPICAL,
         "Which plant is simulated: nominal, typical, typical:SEED, or the path of a plant file (.yaml).",
         read_only=True,
     )
