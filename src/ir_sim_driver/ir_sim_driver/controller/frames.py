@@ -12,6 +12,7 @@ from ir_msgs_py.power import PowerState
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import Following
+from ir_sim_driver.plant import Carried
 
 POWER_PERIOD = 10  # steps: 100 Hz
 CONTROLLER_PERIOD = 20  # steps: 50 Hz
@@ -21,7 +22,8 @@ CONTROLLER_PERIOD = 20  # steps: 50 Hz
 class Frame:
     """What is published at a stamp [ns]; None: nothing of it now.
 
-    q, qd, torque (n,) [rad, rad/s, Nm] are None while the controller is off the network. inputs: the levels
+    q, qd, torque (n,) [rad, rad/s, Nm] are None while the controller is off the network. load: what is
+    carried. inputs: the levels
     that count, when they have changed, whoever set them. load_check: of a movement that has ended.
     """
 
@@ -29,6 +31,7 @@ class Frame:
     q: FloatArray | None
     qd: FloatArray | None
     torque: FloatArray | None
+    load: Carried
     power: PowerState | None
     following: Following | None
     outputs: PlcOutputs | None
@@ -57,15 +60,15 @@ class Frames:
             if present != self._outputs:
                 self._outputs = outputs = present
         if not online:
-            return Frame(stamp_ns, None, None, None, power, None, outputs)
+            return Frame(stamp_ns, None, None, None, simulation.load, power, None, outputs)
         if simulation.steps % CONTROLLER_PERIOD < self._steps:
             following = simulation.executor.following(backend.q, backend.qd)
         levels = simulation.plc.levels
         inputs = None if levels is self._inputs or levels == self._inputs else levels
         self._inputs = inputs or self._inputs
-        finding = simulation.load_checks.take()
-        torque = backend.torque
-        return Frame(stamp_ns, backend.q, backend.qd, torque, power, following, outputs, inputs, finding)
+        finding, load = simulation.load_checks.take(), simulation.load
+        q, qd, torque = backend.q, backend.qd, backend.torque
+        return Frame(stamp_ns, q, qd, torque, load, power, following, outputs, inputs, finding)
 
     def _power(self, stamp_ns: int) -> PowerState:
         simulation = self._simulation

@@ -22,8 +22,6 @@ from ir_msgs_py.ros.quality import LATCHED
 from ir_sim_driver.controller import Driver, PlannedCell
 from ir_sim_driver.plant import Carried, plant_to_yaml
 
-_LOOK_PERIOD = 0.1  # s: a load that came with a cell is announced a moment later
-
 
 class Announcements:
     """Of `driver`, by `node`; load_changed: called when the robot carries another load, and at the start.
@@ -44,12 +42,19 @@ class Announcements:
         self._plant = node.create_publisher(String, names.PLANT, LATCHED)
         self._plant.publish(String(data=plant_to_yaml(driver.plant)))
         self.look()
-        node.create_timer(_LOOK_PERIOD, self.look)
+        self._changed = node.create_guard_condition(self.look)
         node.create_subscription(CellState, names.CELL, self._heard, LATCHED)
 
     def close(self) -> None:
         """Read no more cells."""
         self._cells.shutdown(wait=True, cancel_futures=True)
+
+    def watch(self, load: Carried) -> None:
+        """Let the node look soon when this load, which is carried now, has not been announced; any thread may
+        call it.
+        """
+        if load is not self._load:
+            self._changed.trigger()
 
     def look(self) -> None:
         """Announce the load, and the robot with it, when it has changed."""
