@@ -67,6 +67,22 @@ def test_a_contradiction_is_ignored_with_a_warning(plc, bits):
     assert any("only one of AB, HIB and KS" in sentence for sentence in warnings(plc))
 
 
+def test_a_deeper_rest_may_be_asked_for_before_the_one_in_force_is_taken_back(plc):
+    """As a program does between the two modes of a pause: no warning, unless both bits stay."""
+    plc.set_bit("ab", True)
+    run(plc, 0.05)
+    plc.set_bit("hib", True)
+    run(plc, 0.3)
+    assert plc.rest is Mode.BUS_POWER_OFF
+    plc.set_bit("ab", False)
+    run(plc, 1.0)
+    assert plc.rest is Mode.HIBERNATION
+    assert not warnings(plc)
+    plc.set_bit("ab", True)
+    run(plc, 1.0)
+    assert any("only one of AB, HIB and KS" in sentence for sentence in warnings(plc))
+
+
 def test_a_contradiction_leaves_what_was_accepted(plc):
     plc.set_bit("ab", True)
     run(plc, 0.05)

@@ -53,6 +53,16 @@ def test_many_chunks_end_at_the_bound_of_the_whole(tmp_path: Path) -> None:
     assert len(channel.messages) == 3
 
 
+def test_what_a_small_file_claims_is_bounded_before_it_is_decompressed(tmp_path: Path) -> None:
+    """Chunks within their own bound: at most `free` and `ratio` times the file are opened."""
+    path = bomb(tmp_path / "a.mcap", 10, MIB)
+    raw = read_raw(path, limits=ReadLimits(free=2 * MIB, ratio=10))
+    assert any("10 times as much as compressed are read" in problem for problem in raw.problems)
+    channel = raw.channel("/text")
+    assert channel is not None
+    assert 0 < len(channel.messages) < 10
+
+
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_a_chunk_that_holds_more_than_it_claims_is_not_opened(compression: str) -> None:
     pack = zstandard.compress if compression == "zstd" else lz4.frame.compress

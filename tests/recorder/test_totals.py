@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from ir_recorder import Analysis, analyse
+from ir_recorder.analysis.totals import unshortened_cycle
 
 MOTORS, BUS_OFF = 735.0, 205.0  # W with the 155 kg gripper, Table II at machine home
 BRAKES = 325.0  # W
@@ -50,3 +53,22 @@ def test_a_run_that_does_not_match_has_no_computed_cycle(analysis: Analysis) -> 
 def test_without_the_fact_nothing_is_shortened(analysis: Analysis) -> None:
     assert analysis.program is not None
     assert analysis.program.unshortened is None
+
+
+def test_a_pause_of_several_modes_lasts_longer_in_its_last_one() -> None:
+    """200 s through the brakes to the bus' rest took 60 kJ; 500 s more are spent there, at 205 W."""
+    movement = SimpleNamespace(is_pause=True, power_mode="STAND_ON_BRAKES>BUS_POWER_OFF")
+    step = SimpleNamespace(movement=movement, start=0.0, end=200.0)
+    pause = SimpleNamespace(step=step, seconds=200.0, energy=60_000.0)
+    meter = SimpleNamespace(energy=lambda start, end: 60_000.0)
+    watts = {"STAND_ON_MOTORS": MOTORS, "STAND_ON_BRAKES": BRAKES, "BUS_POWER_OFF": BUS_OFF}
+    full = unshortened_cycle(
+        cast(Any, [pause]),
+        "700 s",
+        lambda mode: CHANGE,
+        TIMER,
+        lambda mode, result: watts[mode],
+        cast(Any, meter),
+    )
+    assert full is not None
+    assert full.energy == pytest.approx(60_000.0 + 500.0 * BUS_OFF)

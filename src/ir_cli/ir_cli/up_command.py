@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
-from ir_description import load_cell
+from ir_description import Cell, load_cell
 from ir_msgs_py.namespaces import NODES
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.network import DOMAIN, MOST_DOMAIN
@@ -21,9 +22,12 @@ from .errors import CommandError
 from .node_parameters import given_parameters
 from .node_settings import parameters_of
 from .nodes import cell_nodes
+from .only_one import claim
 from .ports import TCP, UDP, free_port, is_free
 from .processes import NodeProcesses
 
+Given = dict[str, dict[str, Any]]
+"""Parameters of the nodes by node and name."""
 LOOK_SECONDS = 0.5
 """Between two looks at the processes: a node that ended is reported within this."""
 DISCOVERY_SECONDS = 1.0
@@ -57,6 +61,15 @@ def run_up(arguments: argparse.Namespace) -> int:
     cell = load_cell(arguments.cell)
     if arguments.domain is not None:
         apply({DOMAIN: str(arguments.domain)})
+    held = claim(os.environ.get(DOMAIN, ""), namespace)
+    try:
+        return _run(arguments, namespace, cell, parameters)
+    finally:
+        if held is not None:
+            held.close()
+
+
+def _run(arguments: argparse.Namespace, namespace: str, cell: Cell, parameters: Given) -> int:
     _refuse_beside(namespace)
     for line in choose_ports(parameters):
         sys.stdout.write(f"{line}\n")

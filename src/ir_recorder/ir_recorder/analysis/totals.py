@@ -55,9 +55,11 @@ def unshortened_cycle(
         return Unshortened(NAN, NAN, sum(r.seconds for r in pauses), sum(lengths))
     energy, seconds = meter.energy(start, end), end - start
     for result, length in zip(pauses, lengths, strict=True):
-        mode = deepest(result.step.movement.power_mode)
-        motors = watts(MOTORS, result)
-        if mode == MOTORS or length < change(mode):
+        sequence = result.step.movement.power_mode
+        mode, motors = deepest(sequence), watts(MOTORS, result)
+        if mode != sequence and length >= result.seconds:  # one after the other: the last one lasts longer
+            full = result.energy + (length - result.seconds) * watts(mode, result)
+        elif mode == MOTORS or length < change(mode):
             full = left_alone_joules(motors, watts(BRAKES, result), length, timer, change(BRAKES))
         else:
             full = pause_joules(watts(mode, result), motors, length, change(mode))

@@ -24,11 +24,14 @@ class ReadLimits:
     """Most bytes of memory for one chunk and for a whole recording.
 
     chunk: writers close chunks at 0.25 to 4 MB, a single large message may exceed that. total: five hours
-    of a cell.
+    of a cell. free, ratio: beyond `free` bytes a recording may be `ratio` times as large as in its file, as
+    time to decompress is spent on what a file holds; a robot that rests all day compresses to a fiftieth.
     """
 
     chunk: int = 64 * 2**20
     total: int = 2 * 2**30
+    free: int = 128 * 2**20
+    ratio: int = 400
 
 
 class ChunkReader:
@@ -36,13 +39,21 @@ class ChunkReader:
 
     def __init__(self, limits: ReadLimits) -> None:
         self._limits = limits
-        self._used = 0
+        self._used = self._given = self._claimed = 0
 
     def records(self, chunk: Chunk) -> list[McapRecord]:
         """What is in the chunk; its check sum is compared."""
         if chunk.uncompressed_size > self._limits.chunk:
             claimed, most = _mib(chunk.uncompressed_size), _mib(self._limits.chunk)
             raise ReadError(f"it claims {claimed} uncompressed, at most {most} are read")
+        self._given += len(chunk.data)
+        self._claimed += chunk.uncompressed_size
+        free, times = self._limits.free, self._limits.ratio
+        if self._claimed > free + times * self._given:
+            raise TooLargeError(
+                f"{_mib(self._claimed)} uncompressed from {_mib(self._given)}: at most {_mib(free)} and "
+                f"{times} times as much as compressed are read, the rest is left out"
+            )
         data = _decompressed(chunk)
         self.count(len(data))
         _check_number(data)

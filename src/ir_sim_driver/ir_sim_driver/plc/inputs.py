@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import inf
 
 from ir_msgs_py.modes import REST_OF_BIT, ROW, Mode
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
@@ -21,6 +22,8 @@ from ir_sim_driver.plc.port import STOP_BIT
 
 OWNERS = ("any", *WRITERS)
 RESTART_BIT = "ks"
+_ONLY_ONE = "only one of AB, HIB and KS may be 1"
+_HANDOVER = 0.5  # s in which a program may set the bit of a deeper rest and clear the one before
 HIBERNATION_BIT = ROW[Mode.HIBERNATION].bit
 POWER_BITS = (*REST_OF_BIT, RESTART_BIT)
 BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
@@ -81,6 +84,7 @@ class Plc:
         self._ages: dict[str, float] = {}
         self._stuck: frozenset[str] = frozenset()
         self._uptime = 0.0
+        self._warning, self._warn_at = "", inf
         self._greeted = False
         self._judged: tuple[object, bool] = (None, False)
 
@@ -165,6 +169,9 @@ class Plc:
     def step(self, dt: float, pause_active: bool = False) -> bool:
         """Let dt [s] pass; pause_active: a PROFIenergy pause is on. Returns whether anything is new."""
         self._uptime += dt
+        if self._uptime >= self._warn_at:
+            self._warn_at = inf
+            self._notices.add(Level.WARN, self._warning)
         self.drives_on = self.confirm = self.restart = False
         if self._ages:
             self._debounce(dt)
@@ -221,12 +228,17 @@ class Plc:
         on = [bit for bit in POWER_BITS if getattr(self.levels, bit)]
         names = " and ".join(bit.upper() for bit in on)
         refusal = self._refusal(on, pause_active)
+        self._warn_at = inf
         if not refusal:
             self.rest = REST_OF_BIT.get(on[0]) if on else None
             return
         self.restart = False
         if on:
-            self._notices.add(Level.WARN, f"PLC bit {names} ignored: {refusal}")
+            warning = f"PLC bit {names} ignored: {refusal}"
+            if refusal == _ONLY_ONE and self.rest is not None and on == [ROW[self.rest].bit, HIBERNATION_BIT]:
+                self._warning, self._warn_at = warning, self._uptime + _HANDOVER
+            else:
+                self._notices.add(Level.WARN, warning)
         if (
             self.operating_mode is OperatingMode.EXT
             and self.rest is not None
@@ -242,4 +254,4 @@ class Plc:
             return "a PROFIenergy pause is on, end it first"
         if self.no_hibernation and HIBERNATION_BIT in on:
             return self.no_hibernation
-        return "only one of AB, HIB and KS may be 1" if len(on) > 1 else ""
+        return _ONLY_ONE if len(on) > 1 else ""

@@ -1,0 +1,34 @@
+"""Only one process of this host at a time may start the nodes of a domain and namespace.
+
+Discovery takes tenths of a second, so two that start together do not see each other in the graph. A socket
+with a name of the kernel's own name space is taken by one of them, needs no file, and ends with its process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import socket
+import sys
+
+from .errors import CommandError
+
+
+def claim(domain: str, namespace: str) -> socket.socket | None:
+    """The claim, which lasts until it is closed; None where the system has no such sockets.
+
+    Raises CommandError when another process has it.
+    """
+    if not sys.platform.startswith("linux"):
+        return None
+    what = hashlib.sha256(f"{domain or '0'}\0{namespace}".encode()).hexdigest()[:32]
+    held = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        held.bind(f"\0ir_up.{what}")
+    except OSError as error:
+        held.close()
+        where = f"in {namespace}" if namespace else "without a namespace"
+        raise CommandError(
+            f"another `ir up` starts or runs the nodes {where} of domain {domain or '0'}: end it, or choose "
+            "another --namespace or --domain"
+        ) from error
+    return held

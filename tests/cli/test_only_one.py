@@ -1,0 +1,24 @@
+"""Two that start the same nodes at the same time: one does, the other says why not."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from ir_cli.errors import CommandError
+from ir_cli.only_one import claim
+
+
+def test_a_claim_is_refused_while_another_holds_it_and_free_after() -> None:
+    namespace = f"/claimed_{os.getpid()}"
+    first = claim("77", namespace)
+    assert first is not None
+    with pytest.raises(CommandError, match=f"another `ir up` .* in {namespace} of domain 77"):
+        claim("77", namespace)
+    others = [claim("78", namespace), claim("77", f"{namespace}_b")]
+    first.close()
+    again = claim("77", namespace)
+    for held in (*others, again):
+        assert held is not None
+        held.close()
