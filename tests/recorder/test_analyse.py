@@ -10,6 +10,7 @@ import pytest
 
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.analysis.agreement import LEVEL, agreement, mean_of
+from ir_recorder.analysis.steps import executed_steps
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 
@@ -69,3 +70,20 @@ def test_a_recording_without_power_or_cell_gives_what_is_left(demo_file: Path) -
     assert any("attached cell can't be read" in problem for problem in broken.problems)
     empty = analyse(replace(recording, power=None, joints=None, events=(), loads=()))
     assert not any(check.ok for check in findings(empty))
+
+
+def test_a_movement_that_no_state_shows_lasts_as_planned_however_late_its_events_are(
+    analysis: Analysis,
+) -> None:
+    """And a longer one, of which no state is recorded, as its events say."""
+    recording = analysis.recording
+    started, ended = recording.events[0], recording.events[1]
+    for planned, lasts in ((0.004, 0.004), (1.0, 2.0)):
+        report = replace(started.movement.report, duration=planned)
+        movement = replace(started.movement, trajectory_id="unseen", report=report)
+        events = tuple(
+            replace(event, movement=movement, time=time)
+            for event, time in ((started, started.time), (ended, started.time + 2.0))
+        )
+        (step,) = executed_steps(replace(recording, events=events))
+        assert step.end - step.start == pytest.approx(lasts)

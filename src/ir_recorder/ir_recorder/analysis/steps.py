@@ -13,13 +13,15 @@ from ir_recorder.read.recording import ControllerSeries, ProgramEvent, Recording
 STARTED = "started"
 OPEN = "open"  # no end was recorded
 _FEWEST = 3  # states of the executor: fewer give no speed to extrapolate its start and end with
+_UNSEEN = 0.06  # s: a shorter movement has fewer states, at 50 Hz
 
 
 @dataclass(frozen=True, eq=False)
 class ExecutedStep:
     """Step `index` of the `total` of a program.
 
-    start, end [s]: from the executor's path time where it moved, else from the events.
+    start, end [s]: from the executor's path time where it moved, else from the events; a movement that is too
+    short for its states lasts as long as planned.
 
     outcome: "ended", "failed", "canceled", or "open" where the recording ends before.
     """
@@ -72,6 +74,9 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
                 pause = steps[-1]
                 steps[-1] = replace(pause, end=max(pause.start, min(pause.end, ran[0])))
         start, stop = ran or (event.time - late, last - late)
+        planned = event.movement.report.duration
+        if ran is None and 0.0 < planned < _UNSEEN:  # its events are as far apart as the nodes' answers
+            stop = min(stop, start + planned)
         steps.append(
             ExecutedStep(
                 event.index,
