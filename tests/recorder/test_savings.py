@@ -26,7 +26,9 @@ def test_the_savings_of_the_recording_stand_on_the_page(analysis: Analysis, page
 
 def test_lines_for_terminal_and_picture_name_the_baseline(analysis: Analysis, tmp_path: Path) -> None:
     movements, pauses, total = savings_lines(analysis)
-    assert movements.startswith("movements: 25.0 % saved by plan, 3 000 J instead of 4 000 J in 4.50 s")
+    assert movements.startswith(
+        "movements: 25.0 % saved by plan (predicted), 3 000 J instead of 4 000 J in 4.50 s"
+    )
     assert "S-curve PTP at 100 %" in movements
     assert "own timers" in pauses
     assert total.startswith("total: 24.0 %")
@@ -55,3 +57,14 @@ def test_a_recording_without_savings_has_no_section(analysis: Analysis, case: st
     assert bare.savings is None
     assert savings_section(bare) == ""
     assert savings_lines(bare) == []
+
+
+def test_a_saving_that_may_be_none_says_so(analysis: Analysis) -> None:
+    known = analysis.recording.savings[0].savings
+    doubtful = replace(known.movements, saved_low=-100.0, saved_high=2100.0)
+    clear = replace(known.movements, saved_low=400.0, saved_high=1600.0)
+    for saving, said in ((doubtful, True), (clear, False)):
+        event = replace(analysis.recording.savings[0], savings=replace(known, movements=saving))
+        line = savings_lines(replace(analysis, recording=replace(analysis.recording, savings=(event,))))[0]
+        assert "90 % interval" in line
+        assert ("zero lies in it" in line) is said

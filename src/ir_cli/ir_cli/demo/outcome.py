@@ -42,7 +42,7 @@ class Outcome:
         program = self.analysis.program
         if program is None:
             return "no program was executed"
-        source = "simulated" if "simulated" in self.analysis.recording.hardware else "measured"
+        source = self.analysis.recording.origin
         lines = [f"this run ({source}): {_total(program.whole.energy, program.whole.seconds)}"]
         if program.unshortened is not None:
             full = program.unshortened
@@ -55,7 +55,8 @@ class Outcome:
         return "\n".join(savings_lines(self.analysis))
 
     def _movements(self) -> str:
-        header = ["step", "s", "J planned", "J net", "cost W", "clearance mm", "tool deviation mm"]
+        joules = ["J predicted", "90 %", f"J {self.analysis.recording.origin}"]
+        header = ["step", "s", *joules, "cost W", "clearance mm", "tool deviation mm"]
         rows = []
         for result in self.analysis.steps:
             planned = result.step.movement.report
@@ -65,6 +66,7 @@ class Outcome:
                     f"{result.step.index + 1} {result.step.label}",
                     f"{result.seconds:.2f}",
                     f"{planned.energy:.0f}",
+                    f"{planned.energy_low:.0f} to {planned.energy_high:.0f}",
                     f"{result.energy:.0f}",
                     f"{planned.movement_cost:.0f}",
                     f"{clearance * 1000.0:.1f}",

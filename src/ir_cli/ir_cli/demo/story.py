@@ -124,7 +124,9 @@ class Demonstration:
         report = plan.report
         proof = "certified" if report.certified else "NOT certified"
         self._progress.end(
-            f"{len(plan.movements)} steps, {report.duration:.1f} s, {report.energy / 1000.0:.1f} kJ, "
+            f"{len(plan.movements)} steps, {report.duration:.1f} s, "
+            f"predicted {report.energy / 1000.0:.1f} kJ "
+            f"(90 %: {report.energy_low / 1000.0:.1f} to {report.energy_high / 1000.0:.1f} kJ), "
             f"clearance {report.min_clearance * 1000.0:.0f} mm, "
             f"{proof} ({plan.info.planning_time:.2f} s of planning)"
         )
@@ -143,7 +145,9 @@ class Demonstration:
                 f"{at.movement + 1}/{at.total} {at.phase}, {at.remaining:.0f} s left"
             ),
         )
-        self._progress.end(f"{run.executed} steps, {run.duration:.1f} s, {run.energy / 1000.0:.1f} kJ")
+        self._progress.end(
+            f"{run.executed} steps, {run.duration:.1f} s, {run.energy / 1000.0:.1f} kJ simulated"
+        )
 
     def _wake(self) -> None:
         """Send the Wake-on-LAN packet that the program runner would send."""

@@ -157,6 +157,13 @@ class Recording:
     facts: tuple[tuple[str, str], ...]
     problems: tuple[str, ...]
 
+    @property
+    def origin(self) -> str:
+        """The word for its watts: "simulated", "measured", "recorded" where the plant is not named."""
+        if not self.hardware:
+            return "recorded"
+        return "simulated" if "simulated" in self.hardware else "measured"
+
     def fact(self, key: str) -> str:
         """A fact of the file, "" where it is missing."""
         return next((value for name, value in reversed(self.facts) if name == key), "")

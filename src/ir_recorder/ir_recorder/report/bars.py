@@ -66,9 +66,9 @@ def _row(result: StepResult, own: Sequence[_Piece], scale: _Scale) -> str:
     plan = result.step.movement.report.energy
     track = [_drawn(piece, start, scale) for piece, start in _stacked(own)]
     track.append(_mark("zero", 0.0, "zero", scale))
-    track.append(_mark("plan", plan, f"planned {joules(plan)}", scale))
+    track.append(_mark("plan", plan, f"predicted {joules(plan)}", scale))
     if np.isfinite(result.energy):
-        track.append(_mark("net", result.energy, f"measured at the mains {joules(result.energy)}", scale))
+        track.append(_mark("net", result.energy, f"at the mains {joules(result.energy)}", scale))
     sides = f"{joules(_taken(own))} taken, {joules(-_given(own))} returned" if own else ""
     return (
         f'<div class="row"><span class="label">{text(label)}</span>'

@@ -28,7 +28,7 @@ Chart = Callable[[Analysis], str]
 CHARTS: Mapping[str, Chart] = {
     "problems": lambda analysis: problem_list(analysis.problems),
     "bars": lambda analysis: joule_bars(analysis.movements),
-    "steps": lambda analysis: step_table(analysis.steps),
+    "steps": step_table,
     "savings": savings_section,
     "stations": station_table,
     "modes": mode_table,

@@ -44,9 +44,8 @@ def source(analysis: Analysis) -> str:
     hardware = analysis.recording.hardware
     if not hardware:
         return '<p class="source open">plant not recorded</p>'
-    simulated = "simulated" in hardware
-    kind = "Simulated, not measured" if simulated else "Measured"
-    style = "simulated" if simulated else "measured"
+    style = analysis.recording.origin
+    kind = "Simulated, not measured" if style == "simulated" else "Measured"
     return f'<p class="source {style}"><b>{kind}</b> {text(hardware.removesuffix(", simulated"))}</p>'
 
 
@@ -70,7 +69,7 @@ def tiles(analysis: Analysis) -> str:
     """The figures; those of the program where one was executed."""
     program = analysis.program
     shown = (
-        [_whole(program), _unshortened(program), *_parts(program)]
+        [_whole(analysis, program), _unshortened(program), *_parts(program, analysis.recording.origin)]
         if program is not None
         else [Tile("program", "none executed", ("figures of the whole recording only",)), _recorded(analysis)]
     )
@@ -83,7 +82,7 @@ def _recorded(analysis: Analysis) -> Tile:
     return Tile("energy at the mains", joules(analysis.energy), (note,))
 
 
-def _whole(program: ProgramTotals) -> Tile:
+def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
     whole, shortened = program.whole, program.unshortened is not None
     planned = program.planned_movements.energy + program.planned_pauses.energy
     return Tile(
@@ -91,9 +90,19 @@ def _whole(program: ProgramTotals) -> Tile:
         joules(whole.energy),
         (
             f"{number(whole.energy / 3600.0, 'Wh')} in {seconds(whole.seconds)}",
-            f"planned {joules(planned)}, {_against(whole.energy, planned)}",
+            f"predicted {joules(planned)}{_within(analysis)}, "
+            f"{_against(whole.energy, planned, analysis.recording.origin)}",
         ),
     )
+
+
+def _within(analysis: Analysis) -> str:
+    """The interval of what was predicted: the sum of the steps', as what is unsure is so in all alike."""
+    reports = [result.step.movement.report for result in analysis.steps]
+    high = sum(report.energy_high for report in reports)
+    if high <= 0.0:
+        return ""
+    return f" (90 % interval {joules(sum(report.energy_low for report in reports))} to {joules(high)})"
 
 
 def _unshortened(program: ProgramTotals) -> Tile | None:
@@ -109,10 +118,10 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
     )
 
 
-def _parts(program: ProgramTotals) -> list[Tile]:
+def _parts(program: ProgramTotals, origin: str) -> list[Tile]:
     parts = [
-        _part("movements", program.movements, program.planned_movements, program.whole),
-        _part("pauses", program.pauses, program.planned_pauses, program.whole),
+        _part("movements", program.movements, program.planned_movements, program.whole, origin),
+        _part("pauses", program.pauses, program.planned_pauses, program.whole, origin),
     ]
     waiting = program.waiting
     of_run = share(waiting.energy, program.whole.energy)
@@ -120,14 +129,14 @@ def _parts(program: ProgramTotals) -> list[Tile]:
     return [*parts, Tile("waiting between steps", joules(waiting.energy), lines)]
 
 
-def _part(name: str, measured: Share, planned: Share, whole: Share) -> Tile:
-    of_run = share(measured.energy, whole.energy)
-    against = f"planned {joules(planned.energy)}, {_against(measured.energy, planned.energy)}"
-    return Tile(name, joules(measured.energy), (f"{seconds(measured.seconds)}, {of_run} of the run", against))
+def _part(name: str, found: Share, planned: Share, whole: Share, origin: str) -> Tile:
+    of_run = share(found.energy, whole.energy)
+    against = f"predicted {joules(planned.energy)}, {_against(found.energy, planned.energy, origin)}"
+    return Tile(name, joules(found.energy), (f"{seconds(found.seconds)}, {of_run} of the run", against))
 
 
-def _against(measured: float, planned: float) -> str:
-    return f"measured {percent(measured / planned - 1.0)}" if planned > 0.0 else f"measured {DASH}"
+def _against(found: float, planned: float, origin: str) -> str:
+    return f"{origin} {percent(found / planned - 1.0)}" if planned > 0.0 else f"{origin} {DASH}"
 
 
 def _clearance(analysis: Analysis) -> Tile:

@@ -90,10 +90,10 @@ def _mode_bands(axes: Axes, power: PowerSeries) -> None:
 def _joules(axes: Axes, analysis: Analysis) -> None:
     moved = analysis.movements
     rows = np.arange(len(moved))
-    measured = [result.energy for result in moved]
+    found = [result.energy for result in moved]
     planned = [result.step.movement.report.energy for result in moved]
-    axes.barh(rows - 0.18, measured, height=0.36, color="#e8590c", label="measured")
-    axes.barh(rows + 0.18, planned, height=0.36, color="#a9b4c0", label="planned")
+    axes.barh(rows - 0.18, found, height=0.36, color="#e8590c", label=analysis.recording.origin)
+    axes.barh(rows + 0.18, planned, height=0.36, color="#a9b4c0", label="predicted")
     axes.set_yticks(rows, [f"{r.step.index + 1} {r.step.label}" for r in moved], fontsize=8)
     axes.invert_yaxis()
     axes.set(xlabel="energy at the mains [J]", title="Joules per movement")

@@ -21,7 +21,7 @@ def savings_section(analysis: Analysis) -> str:
             text(name),
             joules(saving.common),
             joules(saving.planned),
-            f"<b>{_share(saving)}</b>",
+            f"<b>{_share(saving)}</b>{_within(saving)}",
             seconds(saving.seconds),
             text(baseline),
         )
@@ -30,7 +30,8 @@ def savings_section(analysis: Analysis) -> str:
     heads = ("", ">baseline", ">planned", ">saved", ">time", "held against")
     return (
         '<section id="savings"><h2>What the program saves</h2>'
-        '<p class="hint">Planned energies at the mains, over the same seconds; nothing here is measured.</p>'
+        '<p class="hint">Predicted energies at the mains, over the same seconds, with the 90 % interval of '
+        "what is saved; nothing here is simulated or measured.</p>"
         f"{table(heads, cells)}"
         f'<p class="hint">{text(savings.sentence)}; program {text(savings.program_id)}.</p></section>'
     )
@@ -42,8 +43,8 @@ def savings_lines(analysis: Analysis) -> list[str]:
     if savings is None:
         return []
     return [
-        f"{name}: {_share(saving)} saved by plan, {joules(saving.planned)} instead of "
-        f"{joules(saving.common)} in {seconds(saving.seconds)}, against {baseline}"
+        f"{name}: {_share(saving)} saved by plan (predicted), {joules(saving.planned)} instead of "
+        f"{joules(saving.common)} in {seconds(saving.seconds)}{_sure(saving)}, against {baseline}"
         for name, saving, baseline in _rows(analysis, savings)
     ]
 
@@ -59,6 +60,19 @@ def _rows(analysis: Analysis, savings: ProgramSavings) -> list[Row]:
     if savings.pauses.seconds > 0.0:
         rows.append(("pauses", savings.pauses, f"the controller's own timers{shortened}"))
     return [*rows, ("total", savings.total, f"both{shortened}")]
+
+
+def _within(saving: Saving) -> str:
+    words = _sure(saving).removeprefix(", ")
+    return f"<small>{text(words)}</small>" if words else ""
+
+
+def _sure(saving: Saving) -> str:
+    """The interval of what is saved; "" where the recording has none."""
+    if saving.saved_low == saving.saved_high:
+        return ""
+    within = f", 90 % interval {joules(saving.saved_low)} to {joules(saving.saved_high)}"
+    return within if saving.certain else f"{within}: zero lies in it, so it is open whether anything is saved"
 
 
 def _share(saving: Saving) -> str:

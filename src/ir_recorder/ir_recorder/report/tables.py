@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from ir_msgs_py.report import TrajectoryReport
 from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.agreement import Agreement
 from ir_recorder.analysis.findings import row_name
@@ -36,10 +37,11 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -
     return f'<div class="scroll"><table class="{kind}">{head}<tbody>{body}</tbody></table></div>'
 
 
-def step_table(results: Sequence[StepResult]) -> str:
-    """Every step: planned against measured."""
-    heads = ("#", "step", "load", ">time", ">planned", ">measured", ">deviation", ">mean power", ">clearance")
-    return table((*heads, ">tool deviation"), (_step(result) for result in results))
+def step_table(analysis: Analysis) -> str:
+    """Every step: predicted, with its 90 % interval, against simulated or measured."""
+    found = f">{analysis.recording.origin}"
+    heads = ("#", "step", "load", ">time", ">predicted", found, ">deviation", ">mean power", ">clearance")
+    return table((*heads, ">tool deviation"), (_step(result) for result in analysis.steps))
 
 
 def _step(result: StepResult) -> tuple[str, ...]:
@@ -53,13 +55,20 @@ def _step(result: StepResult) -> tuple[str, ...]:
         label,
         text(step.movement.load or DASH),
         f"{result.seconds:.2f} s",
-        joules(plan) if plan else DASH,
+        joules(plan) + _predicted(step.movement.report) if plan else DASH,
         joules(result.energy) + _small("from positions", joules(result.indirect_energy)),
         percent(result.energy / plan - 1.0) if plan else DASH,
         watts(result.mean_power) + _small("peak", watts(result.peak_power)),
         f"{millimetres(near.least)}<small>{text(near.least_pair)}</small>" if near else DASH,
         millimetres(result.tool_deviation),
     )
+
+
+def _predicted(report: TrajectoryReport) -> str:
+    """The interval of what was predicted, where the recording has one."""
+    if report.energy_high <= 0.0:
+        return ""
+    return f"<small>{joules(report.energy_low)} to {joules(report.energy_high)}</small>"
 
 
 def measurement_table(both: Agreement) -> str:
@@ -132,7 +141,8 @@ def resting_table(analysis: Analysis) -> str:
         )
         for row in analysis.plateaus
     ]
-    heads = ("mode and load at machine home", ">by the data", ">measured", ">deviation", ">Table II", ">over")
+    found = f">{analysis.recording.origin}"
+    heads = ("mode and load at machine home", ">by the data", found, ">deviation", ">Table II", ">over")
     return table(heads, rows)
 
 
@@ -141,7 +151,7 @@ def check_table(findings: Sequence[Finding]) -> str:
     shown = [f for f in findings if not f.ok]
     held = [f for f in findings if f.ok]
     rows = [_check(f) for f in sorted(shown, key=lambda f: f.verdict is not Verdict.FAILS)]
-    heads = ("", "check", ">measured", ">allowed", ">expected", "reason of the bound", "note")
+    heads = ("", "check", ">found", ">allowed", ">expected", "reason of the bound", "note")
     top = table(heads, rows, "checks") if rows else ""
     if not held:
         return top or '<p class="empty">Nothing was checked.</p>'
