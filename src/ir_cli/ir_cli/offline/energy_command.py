@@ -18,7 +18,8 @@ from ir_recorder.fit import sentences as fit_sentences
 from ir_recorder.report.files import write_output
 from ir_recorder.traces import read_mapping
 
-from .asking import sentences
+from ..errors import InputError
+from .asking import add_cell, planner_of, sentences
 from .output import Columns, Row, add_formats, number, print_csv, print_json, print_table, text
 
 COMPARED: Columns = {
@@ -66,6 +67,17 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     fitted.add_argument("--picture", type=Path, metavar="PNG", help="picture to write as well")
     add_formats(fitted, comma=False)
     fitted.set_defaults(run=run_fit)
+    excite = verbs.add_parser("excite", help="plan movements that identify power parameters")
+    add_cell(excite)
+    excite.add_argument("--seconds", type=float, default=180.0, help="s of excursions, at most (180)")
+    excite.add_argument("--postures", type=int, default=3, help="to start from, home among them (3)")
+    excite.add_argument("--hibernate", action="store_true", help="hibernate too; takes minutes")
+    excite.add_argument("--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)")
+    excite.add_argument("--prior", default="", metavar="FILE", help="what is known already (data sheet)")
+    excite.add_argument("--seed", type=int, default=0)
+    excite.add_argument("--output", type=Path, default=Path("out/excitation"), help="folder to write")
+    add_formats(excite, comma=False)
+    excite.set_defaults(run=run_excite)
 
 
 def run_compare(arguments: argparse.Namespace) -> int:
@@ -135,4 +147,38 @@ def run_fit(arguments: argparse.Namespace) -> int:
     print_table(rows, FITTED)
     sys.stdout.write("".join(f"{sentence}\n" for sentence in said))
     sys.stdout.write("".join(f"{path}\n" for path in written))
+    return 0
+
+
+def run_excite(arguments: argparse.Namespace) -> int:
+    """Plan the programme, write its folder, print what it identifies and what it does not."""
+    from ..excitation.programme import Asked, advice, plan_programme, write_programme
+
+    if not 1 <= arguments.postures <= 20 or not 0.0 < arguments.seconds <= 3600.0:
+        raise InputError("--postures must be 1 to 20 and --seconds above 0, at most 3600")
+    with sentences():
+        planner, prior = planner_of(arguments.cell), load_power_parameters(arguments.prior)
+        asked = Asked(
+            arguments.seconds,
+            arguments.postures,
+            arguments.safety_distance,
+            arguments.hibernate,
+            arguments.seed,
+        )
+        programme = plan_programme(planner, prior, asked)
+    path = write_programme(programme, arguments.output, arguments.cell)
+    known, said = programme.identified, advice(programme.identified.missing)
+    moved = sum(step.trajectory is not None for step in programme.steps)
+    if arguments.json:
+        figures = {"movements": moved, "seconds": programme.seconds, "file": str(path)}
+        print_json({**figures, "identified": known.found, "missing": known.missing, "advice": said})
+        return 0
+    lines = [
+        f"{moved} certified movements and {len(programme.steps) - moved} rests, {programme.seconds:.0f} s",
+        f"identified ({len(known.found)}): {', '.join(known.found)}",
+        f"not identified ({len(known.missing)}): {', '.join(known.missing) or 'nothing'}",
+        *(f"to add: {sentence}" for sentence in said),
+        str(path),
+    ]
+    sys.stdout.write("\n".join(lines) + "\n")
     return 0

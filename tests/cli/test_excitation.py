@@ -1,0 +1,67 @@
+"""A programme of excitation is certified, hangs together and says what it identifies."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from ir_cli.excitation.choice import Design
+from ir_cli.excitation.pool import straight
+from ir_cli.main import main
+from ir_cli.offline.asking import planner_of
+from ir_cli.offline.trace_file import read_trace
+from ir_description import data_sheet, load_power_data
+from ir_recorder.measure import PowerModel
+
+
+def test_every_movement_is_certified_and_begins_where_the_one_before_ended(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["energy", "excite", "demo", "--seconds", "12", "--postures", "1", "--output", str(tmp_path)]
+    assert main([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    page = yaml.safe_load((tmp_path / "programme.yaml").read_text())
+    planner = planner_of("demo")
+    names = planner.cell.robot.joint_names
+    here = np.array(planner.cell.machine_home)
+    movements = [step for step in page["steps"] if "trajectory" in step]
+    assert len(movements) == found["movements"] >= 4
+    for step in movements:
+        trajectory = read_trace(tmp_path / step["trajectory"], names)
+        np.testing.assert_allclose(trajectory.positions[0], here, atol=1e-9)
+        here = trajectory.positions[-1]
+        assert planner.evaluate(trajectory, 0.02, step["load"], "").verification.certified
+    assert {step["mode"] for step in page["steps"] if "mode" in step} >= {"STAND_ON_BRAKES", "BUS_POWER_OFF"}
+    assert set(found["identified"]).isdisjoint(found["missing"])
+    assert "watts.HIBERNATION" in found["missing"]
+    assert any("hibernate" in sentence for sentence in found["advice"])
+    with (tmp_path / movements[0]["trajectory"]).open() as file:
+        assert next(csv.reader(file))[0] == "time"
+
+
+def test_the_choice_prefers_what_the_prior_does_not_know() -> None:
+    planner, prior = planner_of("open"), data_sheet()
+    cell = planner.cell
+    model = PowerModel(cell.robot, load_power_data().dc_link, cell.base_pose, prior)
+    design, home = Design(model, prior), np.array(cell.machine_home)
+    before = design.identified()
+    assert before.found == ()
+    from ir_cli.excitation.pool import Excursion
+
+    def excursion(axis: int) -> Excursion:
+        there = home + 0.8 * np.eye(6)[axis]
+        ends = (straight(cell.robot.joint_names, *pair, 2.0) for pair in ((home, there), (there, home)))
+        return Excursion(f"A{axis + 1}", 0, "none", *ends)
+
+    pool = [excursion(axis) for axis in range(6)]
+    chosen = design.choose(pool, [design.of(each, ()) for each in pool], 1e9)
+    assert {each.name for each in chosen} == {each.name for each in pool}  # time for all
+    left = design.identified().left
+    for axis in range(6):
+        assert left[prior.index(f"coulomb.joint_a{axis + 1}")] < 1.0
+    assert left[prior.index("watts.HIBERNATION")] == pytest.approx(1.0)
