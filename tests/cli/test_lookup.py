@@ -38,6 +38,17 @@ def test_a_typo_is_answered_when_the_graph_has_settled(clock: Callable[[], float
     assert clock() > SETTLED_SECONDS + DISCOVERY_SECONDS
 
 
+def test_a_graph_that_grows_slowly_is_given_as_long_again(clock: Callable[[], float]) -> None:
+    """Half of a node's services after 3 s, the rest 2 s later: what comes late is no typo."""
+
+    def seen() -> dict[str, str]:
+        half = {"/node/plan_a": "x/srv/A"} if clock() > 3.0 else {}
+        return {**half, "/node/plan_b": "x/srv/B"} if clock() > 5.0 else half
+
+    assert type_of(seen, "/node/plan_b", "service") == "x/srv/B"
+    assert 5.0 < clock() < 5.1
+
+
 def test_a_graph_has_settled_when_it_has_not_grown_for_a_second(clock: Callable[[], float]) -> None:
     seen = {"/late": "x/srv/B"}
     assert settled(lambda: seen if clock() > 0.9 else {}) == seen

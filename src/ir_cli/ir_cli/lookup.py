@@ -9,10 +9,11 @@ from collections.abc import Callable, Mapping
 from .errors import CommandError
 from .suggestions import nearest, unknown_name
 
-DISCOVERY_SECONDS = 5.0
-"""Longest wait for a name to appear in the graph; discovery on one machine takes tenths of a second."""
+DISCOVERY_SECONDS = 10.0
+"""Longest wait for a graph to grow; discovery takes tenths of a second, on a busy machine seconds."""
 SETTLED_SECONDS = 1.0
-"""A graph that has not grown for this long is complete: a name that is near a known one is a typo then."""
+"""A graph that has not grown for this long, nor for as long as it took so far, is complete: a name that is
+near a known one is a typo then."""
 POLL_SECONDS = 0.02
 
 
@@ -29,8 +30,8 @@ def type_of(
     known = dict(look())
     while name not in known:
         now = time.monotonic()
-        typo = bool(nearest(name, known)) and now - grown > SETTLED_SECONDS
-        if typo or now - began > seconds:
+        typo = bool(nearest(name, known)) and _complete(began, grown, now)
+        if typo or now - grown > seconds:
             raise CommandError(_missing(name, kind, known))
         time.sleep(POLL_SECONDS)
         found = dict(look())
@@ -43,12 +44,17 @@ def settled(look: Callable[[], Mapping[str, str]]) -> dict[str, str]:
     """Names with their types once the graph has not grown for a moment, or changes without end."""
     began = grown = time.monotonic()
     known = dict(look())
-    while (now := time.monotonic()) - grown < SETTLED_SECONDS and now - began < DISCOVERY_SECONDS:
+    while not _complete(began, grown, now := time.monotonic()) and now - began < DISCOVERY_SECONDS:
         time.sleep(POLL_SECONDS)
         found = dict(look())
         if found != known:
             known, grown = found, time.monotonic()
     return known
+
+
+def _complete(began: float, grown: float, now: float) -> bool:
+    """Whether a graph that has been looked at since `began` and grew last at `grown` will show no more [s]."""
+    return now - grown > max(SETTLED_SECONDS, grown - began)
 
 
 def checked_type(typed: str, found: str, name: str, kind: str) -> str:

@@ -47,7 +47,7 @@ TOUR_STAY = 1.2
 """Seconds in each power mode at machine home: a plateau of the mains meter (100 Hz) needs some tenths."""
 LOOK_SECONDS = 0.1
 """Between two looks whether the nodes are there."""
-START_SECONDS = 30.0
+START_SECONDS = 60.0
 """Longest wait for a node to offer its services: four processes that start at once on a slow machine."""
 
 
