@@ -54,6 +54,11 @@ class SecondOpinion:
         left = [float((self._coal.distances(q) - row).min()) for q, row in zip(asked, kept, strict=True)]
         return min(left), len(asked)
 
+    def least_distance(self, trajectory: JointTrajectory) -> tuple[float, int]:
+        """Least distance of all pairs [m] by Coal, and at how many configurations."""
+        asked = sampled_densely(trajectory)
+        return min(float(self._coal.distances(q).min()) for q in asked), len(asked)
+
     def largest_share(self, trajectory: JointTrajectory) -> float:
         """Largest used share of position, speed, acceleration, jerk and torque limits at 10 kHz."""
         robot, times = self._scene.cell.robot, trajectory.times

@@ -87,8 +87,9 @@ def test_short_movements_cost_little_more_than_the_best_known(
         assert report.energy - report.base_energy < 1.03 * joules
 
 
-@pytest.mark.parametrize("cell", ["open", "demo", "deep_box"])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("cell", "seed"), [("open", 1), ("demo", 2), ("deep_box", 3), ("table_columns", 1), ("table_columns", 6)]
+)
 def test_no_answer_costs_more_than_a_shorter_one_stretched(cell: str, seed: int, scene_of: SceneOf) -> None:
     scene = scene_of(cell)
     q0, q1 = ends(scene, seed)

@@ -29,7 +29,7 @@ class PlannerSettings:
         maximum=100_000_000,
     )
     improvement_iterations: int = setting(
-        8_000,
+        2_500,
         "How many of them go into better movements once there is one, where the request doesn't say.",
         minimum=0,
         maximum=100_000_000,

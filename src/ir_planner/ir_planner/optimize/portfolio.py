@@ -10,6 +10,8 @@ more work makes it better.
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
@@ -19,14 +21,16 @@ from ir_planner.search import COARSE, apart, at_nine_shares, fewest_corners, fir
 from ir_planner.timing import Movement, straight_steps
 
 _BETTER = 0.99  # share of the cost below which an alike path replaces another
-_FIRST_LOOK = 16  # evaluations from every guess
+_FIRST_LOOK = 12  # evaluations from every guess
 _FOLLOWED = 6  # guesses that are followed further
 _OUT_OF_REACH = 1.25  # times the cost of the best: coarse solutions above are not refined
 
 
 @dataclass(eq=False)
 class Candidate:
-    """A path (M, n) found by `method`, its coarse solution, and how often it was refined."""
+    """A path (M, n) found by `method`, its coarse solution, and how much it was refined: 1 quickly, 2
+    thoroughly.
+    """
 
     method: str
     path: FloatArray
@@ -62,16 +66,29 @@ class Portfolio:
         self.candidates.sort(key=lambda candidate: candidate.solution.cost)
         return True
 
-    def descend(self, method: str, guesses: list[FloatArray]) -> int:
+    def descend(self, method: str, guesses: list[FloatArray], worth: float = np.inf) -> int:
         """Optimise guesses (M, n), which need not be free: all of them a little, then the cheapest that
-        differ as far as free paths are; the number of them that are new.
+        differ as far as free paths are, if they cost less than `worth` times the best candidate; the number
+        of them that are new.
         """
         looks = [(self.refinement.coarse(guess, _FIRST_LOOK), guess) for guess in guesses]
+        if self.candidates and np.isfinite(worth):
+            most = worth * self.candidates[0].solution.cost
+            looks = [look for look in looks if look[0].cost < most]
         looks.sort(key=lambda look: look[0].cost)
         new = 0
         for look, guess in first_different(looks, _FOLLOWED, COARSE, lambda look: _places(look[0])):
             solution = self.refinement.coarse_from(look.spline, guess, QUICK.coarse)
             new += self._take(Candidate(method, solution.spline.knots()[0], solution))
+        return new
+
+    def adopt(self, other: "Portfolio") -> int:
+        """Optimise the candidates of another objective at the requested duration; how many are new."""
+        duration, new = self.context.options.duration, 0
+        for candidate in other.candidates:
+            start = candidate.solution.spline.lasting(duration)
+            solution = self.refinement.coarse_from(start, candidate.path, QUICK.coarse)
+            new += self._take(Candidate(candidate.method, candidate.path, solution))
         return new
 
     def refine_best(self, count: int, effort: Effort = QUICK) -> int:
@@ -100,7 +117,7 @@ class Portfolio:
         return False
 
     def _refine(self, candidate: Candidate, effort: Effort) -> bool:
-        candidate.refined += 1
+        candidate.refined += 1 if effort is QUICK else 2
         movement = self.refinement.refined(candidate.solution, candidate.path, effort)
         if movement is None:
             self.journal.reject("not certified after refinement")

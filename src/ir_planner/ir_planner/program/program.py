@@ -33,7 +33,7 @@ from ir_planner.request import Context, Journal, Work
 from ir_planner.service import exit_searches
 from ir_planner.timing import at_the_mains
 
-_CHOOSING = 8_000  # work of a movement while configurations are chosen; more of it improves the chosen ones
+_CHOOSING = 2_500  # work of a movement while configurations are chosen; more of it improves the chosen ones
 
 
 def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobody) -> ProgramPlan:

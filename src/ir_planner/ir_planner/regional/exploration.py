@@ -6,13 +6,13 @@ first refinement and whatever the seed; searches of other seeds only add to them
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
-from ir_planner.optimize import QUICK, THOROUGH, Portfolio
+from ir_planner.optimize import QUICK, THOROUGH, Portfolio, Refinement
 from ir_planner.request import Context
 from ir_planner.search import Ends, Search, guesses, quick
 
@@ -24,6 +24,10 @@ FIRST = ("direct", "tree", "detours", "retract")
 EXPLORERS = ("detours", "tree", "genetic")
 GUESS = "guess"  # the method of movements that a guess became
 _GOALS, _FEWEST_GUESSES = 6, 8  # that guesses lead to, and so many to each of them
+# Where a straight segment is free, another class is rarely cheaper: fewer guesses, and only those descend
+# further that cost less than so many times the straight one at first sight.
+_FEW_GUESSES, _WORTH_FOLLOWING = 8, 1.3
+_RIVALS = 2  # refined beside the best where a duration is requested: their order in joules is less certain
 _REFINED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
 
 
@@ -73,11 +77,9 @@ def improve(
         return work.iterations < until and not work.exhausted
 
     with journal.stage("refine") as notes:
-        portfolio.add(paths[0][0], [path for _, path in paths])
-        guided = context.options.planner_id == "" and more()
-        if guided:
-            notes.append(f"{_guessed(ends, portfolio)} local minima from guesses")
-        notes.append(f"{portfolio.refine_best(1, THOROUGH if guided else QUICK)} certified")
+        notes.append(
+            _refined_first(ends, paths, portfolio, guided=context.options.planner_id == "", more=more)
+        )
     explorers = [name for name in EXPLORERS if context.options.planner_id in ("", name)]
     turn = 0
     with journal.stage("improve") as notes:
@@ -100,13 +102,49 @@ def improve(
         notes.append(f"{turn} turns, new paths: {others or 'none'}; {certified} certified")
 
 
-def _guessed(ends: Ends, portfolio: Portfolio) -> int:
-    """Descend from guesses to the nearest goals, which share them; how many new local minima there are."""
+def _refined_first(
+    ends: Ends, paths: list[Path], portfolio: Portfolio, *, guided: bool, more: Callable[[], bool]
+) -> str:
+    """Optimise the first paths and, where `guided` while there is more work, guesses; refine the best. A note
+    what came of it.
+    """
+    requested = portfolio.context.options.duration > 0.0
+    portfolio.add(paths[0][0], [path for _, path in paths])
+    if not (guided and more()):
+        return f"{portfolio.refine_best(1, QUICK)} certified"
+    straight = any(len(path) == 2 for _, path in paths)
+    minima = _guessed(ends, portfolio, straight)
+    if requested and not straight:
+        minima += _fast_ones(ends, paths, portfolio)
+    certified = portfolio.refine_best(1, THOROUGH)
+    if requested:
+        certified += portfolio.refine_best(_RIVALS)
+    return f"{minima} local minima from guesses; {certified} certified"
+
+
+def _guessed(ends: Ends, portfolio: Portfolio, straight: bool) -> int:
+    """Descend from guesses to the nearest goals, which share them; how many new local minima there are.
+    straight: a straight segment is free.
+    """
     space = portfolio.space
     park, nearest = np.array(space.scene.cell.park), ends.goals[:_GOALS]
     paths = [guesses(ends.start, goal, park, space.low, space.high) for goal in nearest]
+    if straight:
+        share = max(_FEW_GUESSES // len(nearest), 1)
+        few = [path for of_goal in paths for path in of_goal[:share]]
+        return portfolio.descend(GUESS, few, _WORTH_FOLLOWING)
     share = max(len(paths[0]) // len(nearest), _FEWEST_GUESSES)
     return portfolio.descend(GUESS, [path for of_goal in paths for path in of_goal[:share]])
+
+
+def _fast_ones(ends: Ends, paths: list[Path], portfolio: Portfolio) -> int:
+    """Local minima that the fastest movements come from: a shorter request is met by one of them, so a longer
+    one has it among its candidates too. How many are new.
+    """
+    fast = Portfolio(portfolio.space, Refinement(portfolio.context.asking("time")))
+    fast.add(paths[0][0], [path for _, path in paths])
+    _guessed(ends, fast, straight=False)
+    return portfolio.adopt(fast)
 
 
 def _seed(seed: int, turn: int, name: str) -> int:

@@ -17,12 +17,20 @@ from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.optimize import optimised_near as near
 from ir_planner.regional.exploration import Path, Searches, improve
 from ir_planner.request import DURATION_MAX, Context
+from ir_planner.scene import STILL
 from ir_planner.search import Ends
-from ir_planner.timing import DURATION_SLACK, Movement, baseline, straight_steps
+from ir_planner.timing import (
+    DURATION_SLACK,
+    Movement,
+    baseline,
+    baseline_costs_at_least,
+    straight_steps,
+)
 
 Answer = tuple[str, Movement]  # the search that found it
 _OPTIMISED_AGAIN = 2  # coarse solutions refined for another objective, and the best of them thoroughly
 _OTHER_DURATIONS, _DURATION_STEPS = (0.75, 1.33), 4  # factors tried on that of least joules, in so many steps
+_COARSELY = 0.99  # of a bound by a few durations: the best of all is little below it
 _WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
 DIRECT = "direct"  # the search that finds straight segments
 
@@ -97,6 +105,9 @@ def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Con
         straight = [path for path in straight if np.array_equal(path[-1], reached)] or straight
     for path in straight[:1]:
         with context.journal.stage("baseline") as notes:
+            if best is not None and _excluded(path, best[1], context):
+                notes.append("costs more even where torque is no limit")
+                continue
             better = [
                 movement
                 for movement in _along(path, context, hurried=best is None)
@@ -108,6 +119,14 @@ def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Con
             if better:
                 return DIRECT, min(better, key=lambda movement: movement.cost)
     return best
+
+
+def _excluded(segment: FloatArray, best: Movement, context: Context) -> bool:
+    """Whether a bound says that the baseline along a segment (2, n) costs more than the best movement."""
+    start, goal = segment
+    if context.options.objective == "time" or np.abs(goal - start).max() < STILL:
+        return False
+    return best.cost < _COARSELY * baseline_costs_at_least(start, goal, context)
 
 
 def _along(segment: FloatArray, context: Context, *, hurried: bool) -> Iterator[Movement]:

@@ -25,7 +25,7 @@ class Work:
     deadline: float
     clock: Clock
     cancelled: Callable[[], bool] = lambda: False
-    improvement: int = 8_000
+    improvement: int = 2_500
     iterations: int = field(default=0, init=False)
     truncated: bool = field(default=False, init=False)
 

@@ -1,6 +1,6 @@
 """Time scaling: seven-phase laws, straight movements (PTP), blended corners, the best duration."""
 
-from ir_planner.timing.baseline import baseline
+from ir_planner.timing.baseline import baseline, baseline_costs_at_least
 from ir_planner.timing.blending import TimedPath, blended, stretched
 from ir_planner.timing.durations import DURATION_SLACK, at_best_duration, check_duration, check_requested
 from ir_planner.timing.level_timing import fastest
@@ -30,6 +30,7 @@ __all__ = [
     "at_best_duration",
     "at_the_mains",
     "baseline",
+    "baseline_costs_at_least",
     "best_stretch",
     "blended",
     "check_duration",

@@ -14,6 +14,7 @@ from ir_planner.scene import STILL, MotionLimits
 from ir_planner.timing.blending import TimedPath, blended, stretched
 from ir_planner.timing.durations import DURATION_SLACK, at_best_duration
 from ir_planner.timing.movement import Movement
+from ir_planner.timing.objective import least_stretched_cost
 from ir_planner.timing.ptp import free_law, path_limits, torque_per_segment
 from ir_planner.timing.time_law import StepLaws
 from ir_planner.timing.torque_shares import within_torque
@@ -42,6 +43,14 @@ def baseline(start: FloatArray, goal: FloatArray, context: Context) -> Movement 
 
     movement = within_torque(timed, context)
     return movement if movement is not None and movement.torque.violation is None else None
+
+
+def baseline_costs_at_least(start: FloatArray, goal: FloatArray, context: Context) -> float:
+    """About what the baseline from `start` to `goal` (n,) costs at least: without limits of torque."""
+    ends = np.stack([start, goal])
+    law = free_law(path_limits(goal - start, context.limits))
+    at_limits = blended(TimedPath(ends, (StepLaws((law,)),), ()), context.joint_names)
+    return least_stretched_cost(at_limits, context)
 
 
 def _quickest(ends: FloatArray, limits: MotionLimits, context: Context) -> JointTrajectory | None:

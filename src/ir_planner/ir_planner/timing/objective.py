@@ -22,6 +22,7 @@ _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _SLOWER = np.array(
     [*_FACTORS, 3.0, 4.0, 6.0, 9.0, 14.0]
 )  # where a second costs what holding costs, and no more
+_CLOSE, _USUAL = 1.05 ** np.arange(54.0), 18  # so near that the least cost is hardly missed; how many for J
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported
 _FEWEST_STEPS, _MOST_STEPS = 100, 5000  # of a movement that is short, or lasts long
@@ -120,6 +121,20 @@ def coarse_cost(trajectory: JointTrajectory, context: Context) -> float:
     return coarse_energy_cost(trajectory, context)
 
 
+def least_stretched_cost(fastest: JointTrajectory, context: Context) -> float:
+    """About what a trajectory costs at the stretch that serves the objective best, or at the requested
+    duration; no torque is asked for, so nobody who must keep it costs less.
+    """
+    options = context.options
+    if options.duration > 0.0:
+        factors = np.array([options.duration / fastest.duration])
+    elif options.objective in ("time", "movement_cost"):
+        return coarse_cost(fastest, context)
+    else:
+        factors = _CLOSE[: None if options.objective == "energy" else _USUAL]
+    return float(_costs(fastest, factors, context).min())
+
+
 def best_stretch(fastest: JointTrajectory, context: Context) -> float:
     """Factor >= 1 on the duration of the fastest movement that minimises the objective."""
     if context.options.objective in ("time", "movement_cost"):
@@ -152,5 +167,6 @@ def _costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> F
         for power, step in zip(axes.reshape(len(factors), count, -1), steps, strict=True)
     ]
     options = context.options
-    per_second = options.time_value if options.objective == "time_and_energy" else 0.0
+    free = options.duration <= 0.0 and options.objective == "time_and_energy"
+    per_second = options.time_value if free else 0.0
     return np.array(drives) + per_second * factors * span
