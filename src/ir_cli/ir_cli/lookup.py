@@ -53,7 +53,7 @@ def settled(look: Callable[[], Mapping[str, str]]) -> dict[str, str]:
 
 
 def _complete(began: float, grown: float, now: float) -> bool:
-    """Whether a graph that has been looked at since `began` and grew last at `grown` will show no more [s]."""
+    """Whether a graph that was first seen at `began` and grew last at `grown` [s] will show no more."""
     return now - grown > max(SETTLED_SECONDS, grown - began)
 
 
