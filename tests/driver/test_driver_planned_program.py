@@ -19,7 +19,7 @@ from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant.loads import carried
 
-STEP_SHARE, STEP_JOULES = 0.03, 20.0  # whichever is larger
+STEP_SHARE, STEP_JOULES = 0.01, 10.0  # whichever is larger
 TOTAL_SHARE = 0.01
 TOOL = 0.001  # m
 LONGEST_PAUSE = 2.0  # s: the rest is stepped for nothing
