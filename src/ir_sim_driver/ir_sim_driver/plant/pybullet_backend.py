@@ -49,7 +49,7 @@ class PyBulletBackend:
         self._arm = BulletArm(plant.robot, dt, urdf, base)
         self._dt, self._n = dt, len(plant.robot.joint_names)
         self._drives, self._gears = Drivetrain(plant.robot), Gears(plant.gears, dt)
-        self._rotors: FloatArray = np.diag(self._drives.rotor_inertia)
+        self._diagonal = slice(None, None, self._n + 1)
         self._servo = ServoControl(model, dt, base, control)
         self._motor_torque: FloatArray = np.array(plant.robot.envelope_torque)[:, 0]
         self._brake_torque: FloatArray = BRAKE_FACTOR * self._motor_torque
@@ -122,13 +122,14 @@ class PyBulletBackend:
         """Take at most this torque (n,), of motors or brakes, to stop each joint within this step."""
         H, h = self.mass_matrix(), self._bias(self._speed)
         stopping = self._speed * (-1.0 / self._dt)
-        wanted = (H + self._rotors) @ stopping + h - self._drives.counterbalance(self.q)
+        links = H @ stopping + h
+        wanted = links + self._drives.rotor_inertia * stopping - self._drives.counterbalance(self.q)
         torque: FloatArray = np.clip(wanted, -most, most)
         self.torque, self.saturated = torque if motors else self._still, False
         if (torque != wanted).any() or self.disturbance is not None:
             self._drive(torque)
         else:
-            self._advance(H @ stopping + h)
+            self._advance(links)
         self._servo.reset(self.q)
 
     def rest(self) -> None:
@@ -176,30 +177,28 @@ class PyBulletBackend:
 
     def _drive(self, torque: FloatArray) -> None:
         """Make a step under this motor torque and the disturbance."""
-        gears, half = self._gears, 0.5 * self._dt
-        now = self.qd  # the state's speed lags half a step: qd is the speed at its position
-        H, h = self.mass_matrix(), self._bias(now)
-        balance = self._drives.counterbalance(self.q)
-        dry = gears.dry(now.tolist(), self._load.tolist())
-        outer = torque - h + balance
+        gears, half, lagging = self._gears, 0.5 * self._dt, self._speed
+        speed = self.qd  # the state's speed lags half a step: qd is the speed at its position
+        inertia, balance = self.mass_matrix(), self._drives.counterbalance(self.q)
+        inertia.flat[self._diagonal] += self._drives.rotor_inertia
+        outer = torque - self._bias(speed) + balance
         if self.disturbance is not None:
             outer = outer + self.disturbance
-        inertia = H + self._rotors
-        speed, qdd = now, (now - self._speed) / half
+        dry = gears.dry(speed.tolist(), self._load.tolist())
+        friction, slope = gears.friction(speed.tolist(), dry)
         for k in range(_ITERATIONS):
-            friction, slope = gears.friction(speed.tolist(), dry, chord=k >= _NEWTON)
-            rest = outer - friction - inertia @ qdd
-            if rest @ rest < _FRICTION**2:
-                break
             stiff = inertia.copy()
-            stiff.flat[:: self._n + 1] += half * slope
-            qdd = qdd + dposv(stiff, rest)[1]
-            speed = self._speed + half * qdd
+            stiff.flat[self._diagonal] += half * slope
+            qdd = dposv(stiff, outer - friction + slope * (speed - lagging))[1]
+            change = lagging + half * qdd - speed
+            speed, expected = speed + change, friction + slope * change
+            friction, slope = gears.friction(speed.tolist(), dry, chord=k >= _NEWTON)
+            if np.abs(friction - expected).max() < _FRICTION:
+                break
         gears.heat(friction, speed)
-        links = H @ qdd
-        self._load = links + h - balance
-        lagging = self._bias(self._speed)  # what Bullet's step takes off
-        self._advance(links + lagging)
+        links = self._arm.inverse_dynamics(self.q.tolist(), lagging.tolist(), qdd.tolist())
+        self._load = links - balance
+        self._advance(links)
 
     def _advance(self, links: FloatArray) -> None:
         """Make a step with these torques (n,) on the links."""
