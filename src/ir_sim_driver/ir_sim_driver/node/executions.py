@@ -63,6 +63,7 @@ class Executions:
         self._client_timeout = client_timeout
         self._tickets: dict[bytes, int] = {}
         self._canceled: set[bytes] = set()
+        self.points_of: Callable[[bytes], int] = lambda goal_id: 0  # that the server has left out
 
     async def execute(self, handle: Any) -> Any:
         """Carry a goal out; the action's result."""
@@ -73,7 +74,7 @@ class Executions:
             done.set_result(outcome)
             self._node.wake()
 
-        points = len(request.trajectory.points)
+        points = self.points_of(key) or len(request.trajectory.points)
         ticket = self._driver.submit(points, lambda: goal_from_action(request, limit), ended)
         self._tickets[key] = ticket
         if key in self._canceled:  # before it was submitted

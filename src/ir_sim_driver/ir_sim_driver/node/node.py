@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import CancelResponse
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
@@ -29,6 +29,7 @@ from ir_msgs_py.ros.serving import BoundedService
 from ir_sim_driver.controller import Driver, Frame, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, PlantStoppedError
 from ir_sim_driver.node.announcements import Announcements
+from ir_sim_driver.node.bounded_goals import BoundedActionServer
 from ir_sim_driver.node.executions import Executions
 from ir_sim_driver.node.grid import FOREIGN, OWN, SYSTEM
 from ir_sim_driver.node.links import open_links
@@ -127,7 +128,7 @@ class SimDriver(Node):
         BoundedService(self, Recover, names.RECOVER, answers.recover)
         BoundedService(self, SetLoad, names.SET_LOAD, answers.set_load)
 
-    def _serve_action(self, action_type: Any, name: str) -> ActionServer:
+    def _serve_action(self, action_type: Any, name: str) -> BoundedActionServer:
         executions = Executions(
             self._driver, self, action_type, name, self._configuration.node.client_timeout
         )
@@ -136,15 +137,18 @@ class SimDriver(Node):
             executions.cancel(handle)
             return CancelResponse.ACCEPT
 
-        return ActionServer(
+        server = BoundedActionServer(
             self,
             action_type,
             name,
             executions.execute,
+            most=lambda: self._driver.max_points,
             cancel_callback=cancel,
             result_timeout=_RESULT_KEPT,
             **ACTION_SERVICES,
         )
+        executions.points_of = server.points_of
+        return server
 
     # what executions borrow
 
