@@ -1,0 +1,57 @@
+"""Do the 90 % intervals that the planner gives before any measurement hold what typical plants draw?
+
+The plants are drawn by the driver's own rules (docs/plant.md), which the planner's assumptions do not know.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from _driven_movements import Driven, Predicted, all_predicted
+from _results import at_least, at_most
+from _truth_section import Asked, Found
+
+from ir_description import load_power_data, load_power_parameters
+from ir_planner.checks import Interval, interval, movement_spread
+from ir_planner.scene import scene_with
+
+TITLE = "90 % intervals before any measurement, against simulated energies of typical plants"
+QUICK = ("open",)
+EVERY, QUICK_EVERY = 2, 4  # movement of the cells is driven
+LEAST, MOST = 0.80, 0.97  # share of energies that lie within
+
+
+def measured(asked: Asked) -> Found:
+    """A row for each plant: which share of its movements lies within, below and above."""
+    step = QUICK_EVERY if asked.quick else EVERY
+    every = all_predicted(QUICK if asked.quick else asked.cells)[::step]
+    bounds = [_interval(each) for each in every]
+    rows = [{"plant": f"typical:{seed}", **_held(every, bounds, seed)} for seed in range(asked.seeds)]
+    within = float(np.mean([row["within"] for row in rows]))
+    widths = [(b.high - b.low) / each.energy for b, each in zip(bounds, every, strict=True)]
+    rows.append(
+        {"plant": "all", "parameters": load_power_parameters().name, "width": float(np.median(widths))}
+    )
+    name = f"energies of {asked.seeds} typical plants within the 90 % interval before any measurement"
+    return Found(rows, [at_least(name, within, "", LEAST), at_most(name, within, "", MOST)])
+
+
+def _interval(each: Predicted) -> Interval:
+    movement = each.movement
+    scene = scene_with(movement.cell, movement.load, load_power_data())
+    return interval(each.energy, movement_spread(movement.trajectory, scene))
+
+
+def _held(every: list[Predicted], bounds: list[Interval], seed: int) -> dict[str, Any]:
+    plants: dict[str, Driven] = {}
+    low, high = np.array([b.low for b in bounds]), np.array([b.high for b in bounds])
+    found = []
+    for each in every:
+        cell = each.movement.cell
+        plant = plants.setdefault(cell.name, Driven(cell, f"typical:{seed}"))
+        found.append(plant.drive(each.movement).energy)
+    energy = np.array(found)
+    shares = {"below": np.mean(energy < low), "above": np.mean(energy > high)}
+    within = float(np.mean((energy >= low) & (energy <= high)))
+    return {"movements": len(every), "within": within} | {k: float(v) for k, v in shares.items()}
