@@ -15,7 +15,8 @@ from ir_sim_driver import Simulation, TrajectoryGoal, make_simulation
 from ir_sim_driver.motion import Outcome
 from ir_sim_driver.plant import Plant, carried
 
-REST = 1.5  # s before a movement: the loops have settled, and the capacitor is empty
+REST = 0.5  # s in which the loops settle
+LONGEST_REST = 20.0  # s until what an axis gave back has been used up by holding
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +58,19 @@ class Driven:
         start = np.array(movement.trajectory.positions[0])
         simulation.backend.reset(start)
         simulation.executor.hold(start)
-        simulation.run(REST)
+        self._rest()
         simulation.execute(simulation.vet(TrajectoryGoal(movement.trajectory), 0), 0)
         while True:
             simulation.step()
             outcomes = simulation.take_outcomes()
             if outcomes:
                 return outcomes[-1]
+
+    def _rest(self) -> None:
+        """Stand until the capacitor is empty."""
+        mains, begun = self.simulation.mains, self.simulation.time
+        self.simulation.run(REST)
+        mains.settle()
+        while mains.meter.reading().capacitor_energy > 0.0 and self.simulation.time < begun + LONGEST_REST:
+            self.simulation.run(REST)
+            mains.settle()
