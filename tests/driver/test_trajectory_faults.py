@@ -85,7 +85,10 @@ def test_a_position_beyond_its_limit_is_named_with_the_excess(standing, start, p
 
 def test_a_position_a_billionth_beyond_is_within_the_slack(make, start, run_out, plan, cell, home):
     touching = home.copy()
-    touching[1] = cell.robot.position_max[1] + 1e-9
+    touching[1], touching[2] = (
+        cell.robot.position_max[1] + 1e-9,
+        0.0,
+    )  # A2 at its limit, the arm above the floor
     simulation = make(load="none")
     start(simulation, plan([20.0], touching))
     assert run_out(simulation).code == ErrorCode.SUCCESSFUL

@@ -123,6 +123,13 @@ class CollisionModel:
         distance, pair, point_a, point_b, normal = self._core.min_distance(self.chain.checked(q), shift)
         return MinDistance(distance, pair, point_a, point_b, normal)
 
+    def nearest(self, q: FloatArray, offset: FloatArray) -> tuple[float, int]:
+        """Distance [m] and number of the pair of least distance - offset (Z,) at one q (n,); inf and -1 where
+        there is none. Nothing is checked: for loops that ask all the time.
+        """
+        distance, pair, *_ = self._core.min_distance(q[None], offset)
+        return float(distance[0]), int(pair[0])
+
     def witnesses(self, q: ArrayLike, pair: ArrayLike) -> Witnesses:
         """Distance, nearest points and normal of one pair (N,) at each q (N, n)."""
         q = self.chain.checked(q)

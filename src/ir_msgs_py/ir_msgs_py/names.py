@@ -73,6 +73,8 @@ PLANT: Final = f"{SIM_DRIVER}/plant"
 LOAD_CHECK: Final = f"{SIM_DRIVER}/load_check"
 CONTROLLER_STATE: Final = f"{SIM_DRIVER}/controller_state"
 ROBOT_MARKERS: Final = f"{SIM_DRIVER}/robot_markers"
+CONTACTS: Final = f"{SIM_DRIVER}/contacts"
+MACHINE_STATES: Final = f"{SIM_DRIVER}/machine_states"
 
 # ir_program_runner: action and topics
 RUN_PROGRAM: Final = f"{PROGRAM_RUNNER}/run_program"

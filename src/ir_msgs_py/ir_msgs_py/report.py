@@ -183,7 +183,7 @@ class PlannedMovement:
     [s]. power_mode: the mode to rest in (pauses), "" = STAND_ON_MOTORS, several as in modes_of. attach,
     detach: load that is attached or detached when this step has ended; load: what is attached while it runs
     ("gripper+part", "none"). wait_for: signals of the machines to wait for before; set_signals: to set after,
-    "name=0" clears.
+    "name=0" clears; states: of machines that it relies on, "lathe=door_open".
     """
 
     kind: str
@@ -199,13 +199,14 @@ class PlannedMovement:
     load: str = ""
     wait_for: tuple[str, ...] = ()
     set_signals: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         kind = MovementKind(one_of(self.kind, list(MovementKind), "kind of movement"))
         set_field(self, "kind", kind)
         set_field(self, "duration", at_least(self.duration, 0.0, "duration of the movement", "s"))
-        set_field(self, "wait_for", tuple(self.wait_for))
-        set_field(self, "set_signals", tuple(self.set_signals))
+        for name in ("wait_for", "set_signals", "states"):
+            set_field(self, name, tuple(getattr(self, name)))
         modes_of(self.power_mode)
         if kind is MovementKind.PAUSE:
             if self.trajectory is not None or self.trajectory_id:

@@ -9,7 +9,7 @@ import numpy as np
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_program_runner.errors import ProgramError
 
@@ -56,6 +56,12 @@ def check_program(movements: Sequence[PlannedMovement]) -> None:
         if before is not None:
             _check_gap(where, before, movement)
         before = movement
+
+
+def station_of(movement: PlannedMovement) -> str:
+    """The station whose allowed contacts count in a movement: into it and out of it; "" elsewhere."""
+    service = movement.kind in (MovementKind.SERVICE_EXIT, MovementKind.SERVICE_ENTRY)
+    return movement.to_station if service else ""
 
 
 def load_after(movement: PlannedMovement) -> str:

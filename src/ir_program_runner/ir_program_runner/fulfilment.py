@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -45,10 +45,16 @@ class DriverPort(Protocol):
         """The modes with their times."""
 
     async def drive(
-        self, trajectory: JointTrajectory, stop: Callable[[], bool], cell_hash: str, load: str
+        self,
+        trajectory: JointTrajectory,
+        stop: Callable[[], bool],
+        cell_hash: str,
+        load: str,
+        station: str,
+        states: Sequence[str],
     ) -> Status:
         """Execute a trajectory that was planned in a cell and with a load; stop along the path when `stop`
-        is true.
+        is true. station: whose contacts are allowed; states: of machines that it relies on.
         """
 
 
@@ -127,8 +133,8 @@ class Fulfilment:
                 return await ports.driver.set_load(load)
             case ask.SetPlcInput(name, value):
                 return await ports.driver.set_plc_input(name, value)
-            case ask.Drive(trajectory, cell_hash, load):
-                return await ports.driver.drive(trajectory, self._stop, cell_hash, load)
+            case ask.Drive(trajectory, cell_hash, load, station, states):
+                return await ports.driver.drive(trajectory, self._stop, cell_hash, load, station, states)
             case ask.WaitForSignals(signals, timeout):
                 return await self._wait(lambda: ports.machines.holds(signals), timeout)
             case ask.WaitForMode(wanted, timeout):

@@ -15,7 +15,7 @@ from ir_msgs_py.program import Event
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-from ir_program_runner.checks import load_after, step_name
+from ir_program_runner.checks import load_after, station_of, step_name
 from ir_program_runner.errors import CanceledError, StepFailedError
 from ir_program_runner.pause import Pause
 from ir_program_runner.requests import (
@@ -117,7 +117,8 @@ class Program:
         else:
             assert movement.trajectory is not None  # checked with the program
             yield Phase("moving")
-            need((yield Drive(movement.trajectory, movement.report.cell_hash, movement.report.load)))
+            planned = movement.report.cell_hash, movement.report.load
+            need((yield Drive(movement.trajectory, *planned, station_of(movement), movement.states)))
         yield from self._carry(load_after(movement))
         for text in movement.set_signals:
             need((yield SetSignal(Signal.parse(text))))

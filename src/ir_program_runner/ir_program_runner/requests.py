@@ -64,11 +64,16 @@ class SetLoad:
 
 @dataclass(frozen=True)
 class Drive:
-    """Let the driver execute a trajectory to its end; cell_hash, load: what it was planned with."""
+    """Let the driver execute a trajectory to its end; cell_hash, load: what it was planned with.
+
+    station: whose contacts are allowed; states: of machines that it relies on.
+    """
 
     trajectory: JointTrajectory
     cell_hash: str = ""
     load: str = ""
+    station: str = ""
+    states: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,12 @@ from ir_msgs_py.ros.convert_candidates import (
     service_candidate_from_msg,
     service_candidate_to_msg,
 )
+from ir_msgs_py.ros.convert_contact import (
+    contact_from_msg,
+    contact_to_msg,
+    machine_states_from_msg,
+    machine_states_to_msg,
+)
 from ir_msgs_py.ros.convert_pose import (
     NORM_TOLERANCE,
     pose_from_msg,
@@ -85,6 +91,8 @@ __all__ = [
     "configuration_from_msg",
     "configuration_given",
     "configuration_to_msg",
+    "contact_from_msg",
+    "contact_to_msg",
     "controller_timers_from_msg",
     "controller_timers_to_msg",
     "distance_pair_from_msg",
@@ -93,6 +101,8 @@ __all__ = [
     "float_array",
     "ik_solution_from_msg",
     "ik_solution_to_msg",
+    "machine_states_from_msg",
+    "machine_states_to_msg",
     "plan_options_from_msg",
     "plan_options_to_msg",
     "planned_movement_from_msg",

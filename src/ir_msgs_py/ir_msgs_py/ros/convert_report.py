@@ -138,6 +138,7 @@ def planned_movement_to_msg(movement: PlannedMovement, include_points: bool = Tr
         duration=movement.duration,
         wait_for=list(movement.wait_for),
         set_signals=list(movement.set_signals),
+        states=list(movement.states),
     )
 
 
@@ -150,4 +151,5 @@ def planned_movement_from_msg(msg: PlannedMovementMsg) -> PlannedMovement:
         duration=msg.duration,
         wait_for=tuple(msg.wait_for),
         set_signals=tuple(msg.set_signals),
+        states=tuple(msg.states),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.action import ActionClient
@@ -119,13 +119,20 @@ class Driver:
         return status_from_msg(response.status), tuple(power_mode_from_msg(mode) for mode in response.modes)
 
     async def drive(
-        self, trajectory: JointTrajectory, stop: Callable[[], bool], cell_hash: str = "", load: str = ""
+        self,
+        trajectory: JointTrajectory,
+        stop: Callable[[], bool],
+        cell_hash: str = "",
+        load: str = "",
+        station: str = "",
+        states: Sequence[str] = (),
     ) -> Status:
         """Execute a trajectory; `stop` is looked at all the time, and when it is true the goal is canceled.
 
         SUCCESS, PREEMPTED when it was stopped along the path, else the driver's code and sentence. The
         duration is not limited: speed scaling may prolong or hold a movement. cell_hash, load: what it was
-        planned with, "": the driver doesn't compare.
+        planned with, "": the driver doesn't compare. station: whose contacts are allowed; states: of machines
+        that the movement relies on.
         """
         if not await self._waiting.until(self._execute.server_is_ready, self._response_timeout):
             return _timed_out(f"no node offers {self.name}/execute_trajectory", self._response_timeout)
@@ -134,6 +141,8 @@ class Driver:
             trajectory_id=trajectory.trajectory_id,
             cell_hash=cell_hash,
             load=load,
+            station=station,
+            states=list(states),
         )
         sent: Future = self._execute.send_goal_async(goal)
         if not await self._waiting.answer(sent, self._response_timeout):

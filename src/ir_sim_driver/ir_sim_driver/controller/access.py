@@ -15,11 +15,12 @@ from ir_sim_driver.notices import Level
 class Access:
     """Hands out `simulation`; wake_hint: what wakes the controller, for sentences.
 
-    failure: why the simulation is not stepped any more, "" while it is.
+    failure: why the simulation is not stepped any more, "" while it is. simulation: for single values that
+    are read without the lock.
     """
 
     def __init__(self, simulation: Simulation, wake_hint: str) -> None:
-        self._simulation, self._wake_hint = simulation, wake_hint
+        self.simulation, self._wake_hint = simulation, wake_hint
         self.lock = threading.Lock()
         self.failure = ""
 
@@ -27,7 +28,7 @@ class Access:
     def reading(self) -> Iterator[Simulation]:
         """To read, or to set what counts from the next step on."""
         with self.lock:
-            yield self._simulation
+            yield self.simulation
 
     @contextmanager
     def alive(self) -> Iterator[Simulation]:
@@ -35,7 +36,7 @@ class Access:
         with self.lock:
             if self.failure:
                 raise RequestRefusedError(StatusCode.FAILURE, self.failure)
-            yield self._simulation
+            yield self.simulation
 
     @contextmanager
     def online(self, *, asleep_too: bool = False) -> Iterator[Simulation]:

@@ -18,6 +18,7 @@ from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access
+from ir_sim_driver.controller.cell_side import CellSide
 from ir_sim_driver.controller.diagnostics import Entry, report
 from ir_sim_driver.controller.frames import Frame, Frames
 from ir_sim_driver.controller.goals import Goals
@@ -64,7 +65,7 @@ class Driver:
         self._stamp = 0
         self._goals = Goals(simulation, self._lock, lambda: self._stamp)
         self._frames = Frames(simulation, steps)
-        self.plc = PlcSide(self._access)
+        self.plc, self.cell_side = PlcSide(self._access), CellSide(self._access)
         self.joint_names = tuple(simulation.robot.joint_names)
 
     def close(self) -> None:
@@ -107,6 +108,7 @@ class Driver:
         def here() -> TrajectoryGoal:
             goal = read()
             self._simulation.surroundings.wait_for(goal.cell_hash)
+            self._simulation.cell_watch.wait_for(goal.states)
             return goal
 
         return self._goals.submit(points, here, ended)

@@ -26,7 +26,7 @@ class EmergencyStop:
         self, backend: Backend, executor: Executor, tool: ToolPoint, notices: Notices, reaction: int
     ) -> None:
         self._backend, self._executor, self._tool, self._notices = backend, executor, tool, notices
-        self._reaction, self._open = reaction, 0
+        self._reaction, self._open, self._powered = reaction, 0, False
         self._running: Excursion | None = None
         self.excursion = 0.0
 
@@ -35,20 +35,25 @@ class EmergencyStop:
         """Whether the robot still rolls on or slows down."""
         return self._running is not None
 
-    def start(self, sentence: str, braked: bool) -> None:
-        """Switch the motors off; the goal ends with this sentence. braked: the brakes are closed."""
+    def start(self, sentence: str, braked: bool, powered: bool = False) -> None:
+        """Stop; the goal ends with this sentence. braked: the brakes are closed; powered: the motors stop the
+        robot until the brakes act, else they are off.
+        """
         executor, q = self._executor, self._backend.q
         self._running = None if braked else Excursion(self._tool, executor.path, executor.path_parameter, q)
-        self._open = 0 if braked else self._reaction
+        self._open, self._powered = 0 if braked else self._reaction, powered
         executor.drop(sentence)
         executor.hold(q)
 
     def step(self) -> None:
-        """Make a step of dt: coast while the brakes react, brake, then rest."""
+        """Make a step of dt: coast, or halt, while the brakes react; brake, then rest."""
         backend = self._backend
         if self._open > 0:
             self._open -= 1
-            backend.coast()
+            if self._powered:
+                backend.halt()
+            else:
+                backend.coast()
             self._visit()
         elif backend.qd.any():
             backend.brake()

@@ -7,11 +7,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.controller.vetting import VettedGoal
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 
 QUEUE_MAX = 32  # a flood is refused before it fills the memory; a sender waits for its goal anyway
 NO_GOAL = 0
+_AGAIN = 3  # times that a goal is checked again because the cell has changed
 
 Read = Callable[[], TrajectoryGoal]
 Ended = Callable[[Outcome], None]
@@ -89,7 +91,7 @@ class Goals:
     def _check_and_start(self, ticket: int, read: Read, ended: Ended) -> None:
         refusal = None
         try:
-            vetted = self._simulation.vet(read(), self._now())
+            vetted = self._vetted(read())
         except TrajectoryRefusedError as error:
             refusal = _refused(str(error), error.code)
         except Exception as error:  # a bug must not leave the sender waiting, nor end the checking
@@ -112,6 +114,15 @@ class Goals:
                         self._simulation.cancel(goal_id)
         if refusal is not None:
             ended(refusal)
+
+    def _vetted(self, goal: TrajectoryGoal) -> VettedGoal:
+        """The goal, checked in the cell as it is at the end of the check; a door may move meanwhile."""
+        vetted = self._simulation.vet(goal, self._now())
+        for _ in range(_AGAIN):
+            if vetted.scene is self._simulation.cell_watch.scene:
+                break
+            vetted = self._simulation.vet(goal, self._now())
+        return vetted
 
 
 def _refused(sentence: str, code: int = ErrorCode.INVALID_GOAL) -> Outcome:

@@ -27,5 +27,6 @@ def take_offered_cell(simulation: Simulation) -> None:
         simulation.set_load(load)
     except BackendError as error:
         notices.add(Level.ERROR, f"load {load.text!r} of cell {cell.name!r} can't be carried: {error}")
+    simulation.cell_watch.stand_in(cell, simulation.load)
     surroundings.settle(planned)
     notices.add(Level.OK, f"the robot stands in cell {cell.name!r} now, hash {surroundings.hash}")

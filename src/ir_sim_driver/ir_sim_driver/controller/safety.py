@@ -36,6 +36,7 @@ class Safety:
         reaction = round(settings.supervision.brake_reaction / settings.dt)
         self.emergency = EmergencyStop(backend, executor, tool, notices, reaction)
         self._broken = False  # the physics gave up: only `recover` touches them
+        self._powered = False  # the motors stop the robot until the brakes act
         self.fault = ""
 
     @property
@@ -57,7 +58,7 @@ class Safety:
 
     def entered(self, braked: bool) -> None:
         """The controller is in EMERGENCY_STOP from now on; braked: the brakes are closed already."""
-        self.emergency.start(self.fault or "emergency stop", braked)
+        self.emergency.start(self.fault or "emergency stop", braked, self._powered)
 
     def supervise(self, motors_on: bool, tube: float) -> None:
         """Look at the robot after a step; tube [m]: how far the tool may be from its command."""
@@ -72,6 +73,12 @@ class Safety:
         self._backend.rest()
         self._stop_for(Fault(str(error), ErrorCode.INVALID_GOAL))
 
+    def touched(self, sentence: str) -> None:
+        """The robot touches what it may not: the motors stop it off its path, then the brakes hold it."""
+        self._powered = not self.stopped
+        if not self.fault:
+            self._stop_for(Fault(sentence, ErrorCode.CONTACT))
+
     def recover(self) -> None:
         """Unlatch all where the robot is now. Raises RequestRefusedError while the button is pressed."""
         if self._plc.pressed:
@@ -83,7 +90,7 @@ class Safety:
             self._backend.reset(q)
         if not self.emergency.stopping:
             self._executor.hold(q)
-        self.fault, self._broken = "", False
+        self.fault, self._broken, self._powered = "", False, False
         self._supervision.recovered(q)
         self._plc.reset_stop()
 

@@ -1,7 +1,6 @@
 """The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains meter.
 
-One `step` is dt of plant time. Whoever steps it decides how fast time passes; nothing here sleeps or asks a
-clock. No ROS.
+One `step` is dt of plant time. Whoever steps it decides how fast time passes. No ROS.
 """
 
 from __future__ import annotations
@@ -16,8 +15,10 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import OFF_THE_NETWORK, READY, Mode
 from ir_msgs_py.plc import PlcOutputs
 from ir_msgs_py.status import StatusCode
+from ir_sim_driver.controller.cell_watch import CellWatch
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.controller.mode_control import ModeControl
+from ir_sim_driver.controller.outcomes import Outcomes
 from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.speed_scaling import SpeedScaling
@@ -75,8 +76,11 @@ class Simulation:
         self.load_checks = LoadChecks(cell, settings.load_check, self.notices, PERIOD * settings.dt)
         self._carry(load)
         self.speed_scaling = SpeedScaling(self.executor, self.tool, self.plc, self.notices)
-        self.steps, self._goals, self._goal_energy = 0, 0, 0.0
-        self._outcomes: list[Outcome] = []
+        self.steps = 0
+        self.cell_watch = CellWatch(
+            cell, load, self.tool, backend, self.notices, settings.dt, lambda: self.time
+        )
+        self._outcomes = Outcomes(self.executor, self.mains, self.cell_watch, self.load_checks)
 
     @property
     def time(self) -> float:
@@ -110,21 +114,21 @@ class Simulation:
 
         Raises TrajectoryRefusedError.
         """
-        return vet(goal, self.robot, self.dynamics, self.settings.execution, now_ns)
+        return vet(goal, self.robot, self.dynamics, self.settings.execution, now_ns, self.cell_watch.asked)
 
     def execute(self, vetted: VettedGoal, now_ns: int) -> int:
         """Start a vetted goal, return its id; preempts the one that runs. Raises TrajectoryRefusedError."""
-        refusal = self._refusal() or self.surroundings.refusal(vetted.goal, self.load)
-        if refusal:
+        goal = vetted.goal
+        refusal = self._refusal() or self.surroundings.refusal(goal, self.load)
+        if refusal := refusal or self.cell_watch.refusal(goal, vetted.scene):
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         now, delay = self.executor.motion(), vetted.delay(now_ns)
         route = vetted.route(now, self.robot, self.dynamics, self.settings.execution, delay)
-        self._goals += 1
-        self.executor.start(self._goals, vetted.goal, route, 0.0 if now.qd.any() else delay)
-        self._collect_outcomes()
-        self._goal_energy = self.mains.energy()
+        self.executor.start(goal_id := self._outcomes.next_id(), goal, route, 0.0 if now.qd.any() else delay)
+        self.cell_watch.begin(goal.station)
+        self._outcomes.started()
         self.load_checks.begin()
-        return self._goals
+        return goal_id
 
     def cancel(self, goal_id: int) -> bool:
         """Stop this goal along its path; False when it does not run."""
@@ -139,8 +143,7 @@ class Simulation:
 
     def take_outcomes(self) -> list[Outcome]:
         """Goals that ended since the last call."""
-        outcomes, self._outcomes = self._outcomes, []
-        return outcomes
+        return self._outcomes.take()
 
     def set_speed_scaling(self, factor: float) -> float:
         """Scale the speed of every movement, from now on; returns what counts of the factor."""
@@ -163,6 +166,7 @@ class Simulation:
         except BackendError:
             self._carry(before)
             raise
+        self.cell_watch.carry(load)
 
     def set_execution(self, settings: ExecutionSettings) -> None:
         """Use other bounds of trajectories from the next goal on."""
@@ -182,13 +186,14 @@ class Simulation:
         if self.modes.mode is not Mode.EMERGENCY_STOP and not self.stopped:
             return f"nothing to recover from: the mode is {self.modes.mode.name}"
         self.safety.recover()
+        self.cell_watch.recovered()
         if self.modes.mode is not Mode.EMERGENCY_STOP:
             return f"the emergency stop is reset; the mode is {self.modes.mode.name}"
         self.control.latches.recover = True
         return "the brakes open where the robot stands; nothing resumes"
 
     def disturb(self, torque: FloatArray | None) -> None:
-        """Let an outside torque (n,) [Nm] act on the joints until the next call; None ends it."""
+        """Let an outside torque (n,) [Nm] act on the joints from now on; None: nothing more."""
         self.backend.disturbance = torque
 
     def outputs(self) -> PlcOutputs:
@@ -202,12 +207,14 @@ class Simulation:
         self._change_mode(self.settings.dt)
         try:
             self._move()
+            if self.steps >= self.cell_watch.due:
+                self.cell_watch.look(self.steps, self.executor, self.dynamics, self.safety)
             if self.steps % PERIOD == 0:
                 self._supervise()
         except BackendError as error:
             self.safety.failed(error)
         self.mains.step(self.modes.level)
-        self._collect_outcomes()
+        self._outcomes.collect()
         self.steps += 1
 
     def run(self, seconds: float) -> None:
@@ -290,11 +297,3 @@ class Simulation:
         self.mains.set_load(load)
         self.dynamics = DynamicsModel(self.robot, load.loads, self.cell.base_pose)
         self.executor.set_dynamics(self.dynamics)
-
-    def _collect_outcomes(self) -> None:
-        if self.executor.ended:
-            outcomes = self.executor.take_outcomes()
-            energy = self.mains.energy() - self._goal_energy
-            for outcome in outcomes:
-                finding = self.load_checks.ended(outcome.label)
-                self._outcomes.append(replace(outcome, energy=energy).weighed(finding))

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ir_description import RobotModel
 from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
+from ir_sim_driver.controller.collision_check import check_collision
+from ir_sim_driver.controller.contact_scene import ContactScene
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import (
     ErrorCode,
     ExecutionSettings,
     Motion,
+    Path,
     Route,
     TrajectoryGoal,
     check_goal,
@@ -23,10 +29,15 @@ _NS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class VettedGoal:
-    """A goal whose trajectory was found executable with the dynamics of one load."""
+    """A goal whose trajectory was found executable with the dynamics of one load, and free in one scene.
+
+    keep (Z,): the distances [m] that its pairs must keep.
+    """
 
     goal: TrajectoryGoal
     dynamics: DynamicsModel
+    scene: ContactScene
+    keep: FloatArray
 
     def route(
         self,
@@ -41,7 +52,10 @@ class VettedGoal:
             raise TrajectoryRefusedError(
                 ErrorCode.INVALID_GOAL, "the load changed while the trajectory was checked"
             )
-        return checked_route(self.goal.trajectory, now, robot, dynamics, settings, delay)
+        route = checked_route(self.goal.trajectory, now, robot, dynamics, settings, delay)
+        if not self.goal.allow_collision and route.lead:
+            check_collision(route.path, slice(0, route.lead), route.offset, self.scene, self.keep)
+        return route
 
     def delay(self, now_ns: int) -> float:
         """Seconds until time 0 of the trajectory."""
@@ -55,8 +69,18 @@ def vet(
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
     now_ns: int,
+    asked: Callable[[str], tuple[ContactScene, FloatArray]],
 ) -> VettedGoal:
-    """Check all of a goal that does not depend on the robot's state. Raises TrajectoryRefusedError."""
+    """Check all of a goal that does not depend on the robot's state. asked: the scene of now, and what a
+    station's trajectory must keep in it. Raises TrajectoryRefusedError.
+    """
     checked = check_goal(goal, tuple(robot.joint_names), settings, now_ns)
-    check_trajectory(checked.trajectory, robot, dynamics, settings)
-    return VettedGoal(checked, dynamics)
+    executed = check_trajectory(checked.trajectory, robot, dynamics, settings)
+    try:
+        scene, keep = asked(checked.station)
+    except InvalidValueError as error:
+        raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, str(error)) from error
+    if not checked.allow_collision:
+        path = Path(*executed.coefficients(), executed.positions[0])
+        check_collision(path, slice(0, None), -float(executed.times[0]), scene, keep)
+    return VettedGoal(checked, dynamics, scene, keep)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
+from ir_msgs_py.contact import Contact
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.load_check import LoadFinding
 
@@ -18,6 +19,7 @@ class ErrorCode(IntEnum):
     OLD_HEADER_TIMESTAMP = -3
     PATH_TOLERANCE_VIOLATED = -4
     GOAL_TOLERANCE_VIOLATED = -5
+    CONTACT = -6
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,9 @@ class TrajectoryGoal:
 
     stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for the goal
     tolerance after the end, 0 = the default. has_effort: points carry effort. multi_dof: number of multi-dof
-    points. cell_hash, load: the cell and the load that it was planned with, "": not compared.
+    points. cell_hash, load: the cell and the load that it was planned with, "": not compared. station: whose
+    contacts are allowed, "": none. states: of machines that it relies on ("lathe=door_open").
+    allow_collision: start it although it is known to collide.
     """
 
     trajectory: JointTrajectory
@@ -49,6 +53,9 @@ class TrajectoryGoal:
     label: str = ""
     cell_hash: str = ""
     load: str = ""
+    station: str = ""
+    states: tuple[str, ...] = ()
+    allow_collision: bool = False
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,8 @@ class Outcome:
     canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp; energy
     [J] at the mains while it ran; max_tracking_error: largest error of each joint [rad]; settling_time [s]
     from the end of the command until the robot was within the goal tolerance. label: of the goal. load_check:
-    what its torques say of the load, None where nothing.
+    what its torques say of the load, None where nothing; contact: the one that ended
+    it.
     """
 
     goal_id: int
@@ -71,6 +79,7 @@ class Outcome:
     settling_time: float = 0.0
     label: str = ""
     load_check: LoadFinding | None = None
+    contact: Contact | None = None
 
     def weighed(self, finding: LoadFinding | None) -> Outcome:
         """With what was found of the load, and its sentence where something was noticed."""

@@ -52,8 +52,9 @@ def check_goal(
 
 def check_trajectory(
     trajectory: JointTrajectory, robot: RobotModel, dynamics: DynamicsModel, settings: ExecutionSettings
-) -> None:
-    """Check every instant of a trajectory against the limits, whatever state the robot is in.
+) -> JointTrajectory:
+    """Check every instant of a trajectory against the limits, whatever state the robot is in; what is
+    executed of it.
 
     May take a while for long ones. Raises TrajectoryRefusedError.
     """
@@ -68,6 +69,7 @@ def check_trajectory(
             raise
         corners = f"corners of positions alone are rounded over {settings.blend_time:g} s"
         raise _invalid(f"{error}; {corners}: give the points velocities") from error
+    return executed
 
 
 def checked_route(

@@ -1,4 +1,7 @@
-"""What the driver announces to whoever comes later, and the planner's cell that it hears; latched topics."""
+"""What the driver announces to whoever comes later, and hears: the planner's cell, the machines' signals.
+
+Load, robot, timers and states of machines are latched; contacts are not.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,30 @@ from typing import Any
 
 import numpy as np
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from ir_description import DescriptionError, cell_from_yaml
 from ir_msgs.msg import CarriedLoad as CarriedLoadMsg
-from ir_msgs.msg import CellState
+from ir_msgs.msg import CellState, Signal
+from ir_msgs.msg import Contact as ContactMsg
 from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
+from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announced import CarriedLoad
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.ros.conversions import carried_load_to_msg, controller_timers_to_msg
+from ir_msgs_py.ros.conversions import (
+    carried_load_to_msg,
+    contact_to_msg,
+    controller_timers_to_msg,
+    machine_states_to_msg,
+)
 from ir_msgs_py.ros.quality import LATCHED
 from ir_sim_driver.controller import Driver, PlannedCell
 from ir_sim_driver.plant import Carried, plant_to_yaml
+
+_SIGNALS = QoSProfile(depth=100)  # all signals of a cell may change at once
+_CONTACTS = QoSProfile(depth=100)
 
 
 class Announcements:
@@ -36,6 +50,9 @@ class Announcements:
         self._loads = node.create_publisher(CarriedLoadMsg, names.CARRIED_LOAD, LATCHED)
         self._description = node.create_publisher(String, names.ROBOT_DESCRIPTION, LATCHED)
         self._timers = node.create_publisher(ControllerTimersMsg, names.CONTROLLER_TIMERS, LATCHED)
+        self._machines = node.create_publisher(MachineStatesMsg, names.MACHINE_STATES, LATCHED)
+        self._contacts = node.create_publisher(ContactMsg, names.CONTACTS, _CONTACTS)
+        self._version = -1
         timers = controller_timers_to_msg(driver.timers)
         timers.header.stamp = self._now()
         self._timers.publish(timers)
@@ -44,20 +61,23 @@ class Announcements:
         self.look()
         self._changed = node.create_guard_condition(self.look)
         node.create_subscription(CellState, names.CELL, self._heard, LATCHED)
+        for topic in (names.SIGNALS, names.MACHINE_SIGNALS):
+            node.create_subscription(Signal, topic, self._signalled, _SIGNALS)
 
     def close(self) -> None:
         """Read no more cells."""
         self._cells.shutdown(wait=True, cancel_futures=True)
 
     def watch(self, load: Carried) -> None:
-        """Let the node look soon when this load, which is carried now, has not been announced; any thread may
-        call it.
+        """Let the node look soon when this load, which is carried now, or a change around the robot has not been
+        announced; any thread may call it.
         """
-        if load is not self._load:
+        if load is not self._load or self._driver.cell_side.version != self._version:
             self._changed.trigger()
 
     def look(self) -> None:
-        """Announce the load, and the robot with it, when it has changed."""
+        """Announce what has changed: the load, and the robot with it, states of machines; and contacts."""
+        self._look_around()
         load = self._driver.carried
         if load is self._load:
             return
@@ -67,6 +87,21 @@ class Announcements:
         self._loads.publish(msg)
         self._description.publish(String(data=self._driver.description()))
         self._load_changed()
+
+    def _look_around(self) -> None:
+        cell, version = self._driver.cell_side, self._driver.cell_side.version
+        if version != self._version:
+            self._version = version
+            machines = machine_states_to_msg(cell.machine_states())
+            machines.header.stamp = self._now()
+            self._machines.publish(machines)
+        for contact in cell.take_contacts():
+            touched = contact_to_msg(contact)
+            touched.header.stamp = self._now()
+            self._contacts.publish(touched)
+
+    def _signalled(self, msg: Signal) -> None:
+        self._driver.cell_side.hear_signal(msg.name, bool(msg.value))
 
     def _now(self) -> Any:
         return self._node.get_clock().now().to_msg()

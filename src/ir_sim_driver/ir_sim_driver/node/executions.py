@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from ir_msgs.msg import LoadCheck
 from ir_msgs_py.checks import one_line
+from ir_msgs_py.ros.conversions import contact_to_msg
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Outcome
@@ -111,6 +112,7 @@ class Executions:
             result.max_tracking_error = list(outcome.max_tracking_error)
             result.settling_time, result.plant = outcome.settling_time, self._driver.plant.name
             result.load_check = _load_checks(outcome.load_check, self._driver.stamp_ns)
+            result.contacts = [] if outcome.contact is None else [contact_to_msg(outcome.contact)]
         if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):
             handle.canceled()
         elif outcome.code is ErrorCode.SUCCESSFUL:

@@ -56,6 +56,9 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
         label=_label(str(getattr(goal, "trajectory_id", ""))),
         cell_hash=str(getattr(goal, "cell_hash", "")),
         load=str(getattr(goal, "load", "")),
+        station=str(getattr(goal, "station", "")),
+        states=tuple(str(state) for state in getattr(goal, "states", ())),
+        allow_collision=bool(getattr(goal, "allow_collision", False)),
     )
 
 

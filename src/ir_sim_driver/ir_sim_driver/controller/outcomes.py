@@ -1,0 +1,52 @@
+"""How goals ended: numbered when they start, with their energy, what their load was, and their contact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ir_sim_driver.controller.cell_watch import CellWatch
+from ir_sim_driver.controller.mains import Mains
+from ir_sim_driver.load_check import LoadChecks
+from ir_sim_driver.motion import ErrorCode, Executor, Outcome
+
+
+class Outcomes:
+    """Of the goals of `executor`; energy is what `mains` counts while they run."""
+
+    def __init__(
+        self, executor: Executor, mains: Mains, cell_watch: CellWatch, load_checks: LoadChecks
+    ) -> None:
+        self._executor, self._mains, self._cell_watch = executor, mains, cell_watch
+        self._load_checks = load_checks
+        self._goals = 0
+        self._energy = 0.0
+        self._ended: list[Outcome] = []
+
+    def next_id(self) -> int:
+        """Id of the goal that starts now."""
+        self._goals += 1
+        return self._goals
+
+    def started(self) -> None:
+        """A goal has started; the one before has ended."""
+        self.collect()
+        self._energy = self._mains.energy()
+
+    def collect(self) -> None:
+        """Take what has ended; a goal that ended by a contact when the robot stands."""
+        if not self._executor.ended or self._cell_watch.unsettled:
+            return
+        for outcome in self._executor.take_outcomes():
+            energy = self._mains.energy() - self._energy
+            self._ended.append(self._told(replace(outcome, energy=energy)))
+
+    def _told(self, outcome: Outcome) -> Outcome:
+        contact = self._cell_watch.last
+        if outcome.code is not ErrorCode.CONTACT or contact is None:
+            return outcome
+        return replace(outcome, contact=contact, sentence=contact.sentence)
+
+    def take(self) -> list[Outcome]:
+        """Goals that ended since the last call."""
+        ended, self._ended = self._ended, []
+        return ended
