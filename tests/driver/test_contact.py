@@ -115,7 +115,7 @@ def test_a_door_that_is_not_open_stops_the_start_and_names_the_signal(run_out):
     started(simulation, HOME, HOME, seconds=0.1, **relies)
     run_out(simulation)
     simulation.cell_watch.hear("lathe_open_door", False)
-    with pytest.raises(TrajectoryRefusedError, match="on its way to door_closed for another"):
+    with pytest.raises(TrajectoryRefusedError, match="changing to door_closed for another"):
         started(simulation, HOME, HOME, **relies)
     simulation.run(1.6)
     with pytest.raises(
@@ -124,7 +124,7 @@ def test_a_door_that_is_not_open_stops_the_start_and_names_the_signal(run_out):
         started(simulation, HOME, HOME, **relies)
     simulation.cell_watch.hear("lathe_open_door", True)
     simulation.run(1.0)
-    with pytest.raises(TrajectoryRefusedError, match="on its way to door_open"):
+    with pytest.raises(TrajectoryRefusedError, match="changing to door_open"):
         started(simulation, HOME, HOME, **relies)
     simulation.run(0.6)
     started(simulation, HOME, HOME, **relies)

@@ -34,7 +34,7 @@ class Contact:
 
     @property
     def sentence(self) -> str:
-        """What people are told."""
+        """For people."""
         where = f" at {self.path_time:.3f} s of {self.trajectory_id}" if self.trajectory_id else ""
         return (
             f"{self.pair.body_a} touched {self.pair.body_b} ({self.pair.kind}){where}, which is not allowed: "

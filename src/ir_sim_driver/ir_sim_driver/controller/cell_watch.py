@@ -48,7 +48,7 @@ class CellWatch:
         self._done: list[Contact] = []
         self._last: Contact | None = None
         self._changed = threading.Condition()
-        self._machines_told = 0
+        self._versions = 0
         self.due = 0
         self._arrange()
 
@@ -75,7 +75,7 @@ class CellWatch:
     @property
     def version(self) -> int:
         """Grows with every change of a machine's state and every contact."""
-        return self._machines_told
+        return self._versions
 
     # -- what changes ---------------------------------------------------------------------------------------
 
@@ -84,7 +84,7 @@ class CellWatch:
         self._cell, self._load, self._station = cell, load, ""
         self._machines.stand_in(cell)
         self._parts.stand_in(cell, load)
-        self._told()
+        self._changed_state()
         self._arrange()
 
     def carry(self, load: Carried) -> None:
@@ -97,7 +97,7 @@ class CellWatch:
     def hear(self, signal: str, level: bool) -> None:
         """Take the level of a signal of the machines."""
         if self._machines.hear(signal, level, self._now()):
-            self._told()
+            self._changed_state()
             self._arrange(standing=False)
 
     def begin(self, station: str) -> None:
@@ -143,7 +143,7 @@ class CellWatch:
     def look(self, step: int, executor: Executor, dynamics: DynamicsModel, safety: Safety) -> None:
         """Look after this step, which is due; a robot that touches what it may not is stopped by `safety`."""
         if self._machines.next_change <= self._now() and self._machines.step(self._now()):
-            self._told()
+            self._changed_state()
             self._arrange(standing=False)
         touch = self._touch
         if touch is None:
@@ -187,9 +187,9 @@ class CellWatch:
             return due
         return min(due, step + max(1, math.ceil((change - self._now()) / self._dt)))
 
-    def _told(self) -> None:
+    def _changed_state(self) -> None:
         with self._changed:
-            self._machines_told += 1
+            self._versions += 1
             self._changed.notify_all()
 
     def _arrange(self, standing: bool = True) -> None:

@@ -57,7 +57,7 @@ class Machines:
         state, (ahead, when) = self._states[name], self._moving.get(name, ("", now))
         if target == (ahead or state):
             return False
-        if ahead and target == state:  # turned round on its way
+        if ahead and target == state:  # turned round in between
             self._states[name], time = ahead, max(0.0, time - (when - now))
         self._moving[name] = target, now + time
         return True
@@ -109,7 +109,7 @@ class Machines:
         state, (ahead, when) = self._states[name], self._moving.get(name, ("", now))
         if state == wanted and not ahead:
             return ""
-        going = f", on its way to {ahead} for another {when - now:.2f} s" if ahead else ""
+        going = f", changing to {ahead} for another {when - now:.2f} s" if ahead else ""
         return f"{name} is {state}{going}: the trajectory relies on {wanted}; {self._advice(machine, wanted)}"
 
     def _advice(self, machine: Equipment, wanted: str) -> str:

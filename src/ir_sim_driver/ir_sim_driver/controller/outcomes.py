@@ -38,9 +38,9 @@ class Outcomes:
             return
         for outcome in self._executor.take_outcomes():
             energy = self._mains.energy() - self._energy
-            self._ended.append(self._told(replace(outcome, energy=energy)))
+            self._ended.append(self._completed(replace(outcome, energy=energy)))
 
-    def _told(self, outcome: Outcome) -> Outcome:
+    def _completed(self, outcome: Outcome) -> Outcome:
         contact = self._cell_watch.last
         if outcome.code is not ErrorCode.CONTACT or contact is None:
             return outcome

@@ -71,8 +71,8 @@ def vet(
     now_ns: int,
     asked: Callable[[str], tuple[ContactScene, FloatArray]],
 ) -> VettedGoal:
-    """Check all of a goal that does not depend on the robot's state. asked: the scene of now, and what a
-    station's trajectory must keep in it. Raises TrajectoryRefusedError.
+    """Check all of a goal that does not depend on the robot's state. asked: the scene of now, and the
+    distances (Z,) that a station's trajectory must keep in it. Raises TrajectoryRefusedError.
     """
     checked = check_goal(goal, tuple(robot.joint_names), settings, now_ns)
     executed = check_trajectory(checked.trajectory, robot, dynamics, settings)

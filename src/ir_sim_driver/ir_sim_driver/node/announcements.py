@@ -69,8 +69,8 @@ class Announcements:
         self._cells.shutdown(wait=True, cancel_futures=True)
 
     def watch(self, load: Carried) -> None:
-        """Let the node look soon when this load, which is carried now, or a change around the robot has not been
-        announced; any thread may call it.
+        """Let the node look soon when this load, which is carried now, or a change around the robot has not
+        been announced; any thread may call it.
         """
         if load is not self._load or self._driver.cell_side.version != self._version:
             self._changed.trigger()
