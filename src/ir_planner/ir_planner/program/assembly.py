@@ -7,6 +7,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner.program.charge import Charge
 from ir_planner.program.pauses import Pause
+from ir_planner.program.reliance import Reliance
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
 from ir_planner.program.steps import PlacedStep, Scenes, signal_text
@@ -60,9 +61,11 @@ def assembled(  # long: what a step does, in its order
     start: FloatArray,
     pause: MakePause,
     charge: Charge,
+    reliance: Reliance,
 ) -> tuple[PlannedMovement, ...]:
     """Movements and pauses in order, from start (n,). `legs`: by the step they belong to. pause: how pauses
-    are spent. charge: what the capacitor holds at first; carried from step to step.
+    are spent. charge: what the capacitor holds at first; carried from step to step. reliance: the states of
+    machines that each movement relies on.
 
     A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
     """
@@ -73,7 +76,7 @@ def assembled(  # long: what a step does, in its order
         waiting = tuple(signal_text(signal) for signal in step.wait_for)
         setting = tuple(signal_text(signal) for signal in step.set_signals)
         leg = legs.get(k)
-        moves = [] if leg is None else _moves(leg, charge)
+        moves = [] if leg is None else _moves(leg, charge, reliance)
         if leg is not None:
             here = leg.to_name
             q = leg.movements[-1][1].trajectory.positions[-1] if leg.movements else q
@@ -99,7 +102,7 @@ def assembled(  # long: what a step does, in its order
     return tuple(result)
 
 
-def _moves(leg: Leg, charge: Charge) -> list[PlannedMovement]:
+def _moves(leg: Leg, charge: Charge, reliance: Reliance) -> list[PlannedMovement]:
     moves = []
     for kind, movement in leg.movements:
         station = leg.station_of(kind)
@@ -112,6 +115,7 @@ def _moves(leg: Leg, charge: Charge) -> list[PlannedMovement]:
             report=movement.report,
             duration=movement.trajectory.duration,
             load=leg.scene.load_text,
+            states=reliance.of(movement.trajectory, leg.scene, station),
         )
         moves.append(charge.moved(step, movement))
     return moves

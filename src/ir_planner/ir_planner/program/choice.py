@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from ir_msgs_py.report import PlannedMovement
 from ir_planner.program.assembly import assembled, legs_of
@@ -10,6 +11,7 @@ from ir_planner.program.charge import Charge
 from ir_planner.program.ladder import Ladder
 from ir_planner.program.movements import Failure, Movements
 from ir_planner.program.pauses import AUTO, Pause, pause_by_itself, planned_pause
+from ir_planner.program.reliance import Reliance
 from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.station_graph import Chain, Part
 from ir_planner.timing import Movement
@@ -26,6 +28,10 @@ class Choice:
     request: ProgramRequest
     ladder: Ladder
     chain: Chain
+
+    @cached_property
+    def _reliance(self) -> Reliance:
+        return Reliance(self.request.options.safety_distance)
 
     @property
     def movements(self) -> Movements:
@@ -64,7 +70,7 @@ class Choice:
         route, pause = self.movements.route, self._pause(by_itself)
         charge = Charge(self.request.settings.transitions)
         legs = legs_of(route, parts_of(self.chain, self.movements), found)
-        steps = assembled(route.steps, legs, route.scenes, self.request.start, pause, charge)
+        steps = assembled(route.steps, legs, route.scenes, self.request.start, pause, charge, self._reliance)
         left = until - duration_of(steps)
         if left <= _NO_WAIT:
             return steps
