@@ -86,7 +86,7 @@ class Cell:
         if mode is Mode.MOVING:
             q, rest = self.simulation.backend.q, np.zeros((2, 6))
             home, names = np.array(self.simulation.cell.machine_home), self.simulation.robot.joint_names
-            target = home + (0.3 if np.abs(q - home).max() < 0.15 else 0.0)
+            target = home + (-0.3 if np.abs(q - home).max() < 0.15 else 0.0)
             goal = TrajectoryGoal(JointTrajectory.from_seconds(names, [0.0, 2.0], [q, target], rest, rest))
             self.simulation.execute(self.simulation.vet(goal, 0), 0)
             self.run(0.5)

@@ -146,7 +146,7 @@ def test_a_jump_aborts_the_goal_with_its_reason_and_the_grid_starts_anew(
             jumped.append(feedback)
             clock.leap(jump)
 
-    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.3, 4.0)))
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(-0.3, 4.0)))
     result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=120.0)
     assert result.error_code == ExecuteTrajectory.Result.INVALID_GOAL
     assert f"the clock jumped {where}" in result.error_string

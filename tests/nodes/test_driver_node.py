@@ -255,7 +255,7 @@ def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_cli
             button.call_async(SetPlcInput.Request(name="emergency_stop", value=True))
 
     with pytest.raises(RequestRefusedError, match="emergency stop"):
-        cell_client.execute(movement(0.3, 3.0), feedback=watch, timeout=120.0)
+        cell_client.execute(movement(-0.3, 3.0), feedback=watch, timeout=120.0)
     wait_for(lambda: power[-1].mode == PowerMode.EMERGENCY_STOP)
     with pytest.raises(RequestRefusedError, match="release"):
         cell_client.ask(names.RECOVER, Recover.Request())
@@ -296,7 +296,7 @@ def test_a_movement_whose_client_has_gone_is_stopped_on_its_path(
     diagnostics = listen(names.DIAGNOSTICS, DiagnosticArray)
     client = ros_executor.run(lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY))
     wait_for(client.server_is_ready, timeout=60.0)
-    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(step=0.4, duration=200.0)))
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(step=-0.4, duration=200.0)))
     power = listen(names.POWER_STATE, PowerState)
     accepted = ros_executor.run(lambda: client.send_goal_async(goal))
     wait_for(accepted.done)
