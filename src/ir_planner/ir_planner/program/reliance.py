@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.clearance_checks import clearance_violation
+from ir_planner.checks import clearance_violation
 from ir_planner.scene import PlanningScene
 
 
