@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 
@@ -19,8 +20,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Callable[[], float]:
     def sleep(seconds: float) -> None:
         now[0] += seconds
 
-    monkeypatch.setattr(lookup.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(lookup.time, "sleep", sleep)
+    monkeypatch.setattr(lookup, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
     return lambda: now[0]
 
 

@@ -115,7 +115,11 @@ def with_pauses(cell: Cell, pauses: tuple[tuple[float, str], ...]) -> Cell:
     ("pauses", "modes"),
     [
         (((45.0, "AUTO"), (120.0, "AUTO")), ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF")),
-        (((30.0, "BUS_POWER_OFF"), (10.0, "STAND_ON_MOTORS")), ("BUS_POWER_OFF", "STAND_ON_MOTORS")),
+        pytest.param(
+            ((30.0, "BUS_POWER_OFF"), (10.0, "STAND_ON_MOTORS")),
+            ("BUS_POWER_OFF", "STAND_ON_MOTORS"),
+            marks=pytest.mark.long,
+        ),
         pytest.param(
             ((2.5, "AUTO"), (900.0, "AUTO")),
             ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF>HIBERNATION"),

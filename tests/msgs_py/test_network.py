@@ -95,7 +95,7 @@ def test_a_node_started_without_any_preparation_listens_on_loopback_only(
     script = tmp_path / "node.py"
     script.write_text(NODE, encoding="utf-8")
     run = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=180, check=True
     )
     sockets = re.findall(r"socket (\S+) ([0-9A-F]+):([0-9A-F]+)", run.stdout)
     assert "done" in run.stdout, run.stderr

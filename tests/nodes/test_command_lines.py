@@ -15,7 +15,7 @@ MODULES = {
     "ir-play": "ir_recorder.play.node",
 }
 NODES = ("ir_planner", "ir_sim_driver", "ir_program_runner")
-LIMIT = 60.0  # s; a node that starts would run for ever
+LIMIT = 180.0  # s; a node that starts would run for ever
 
 
 def run(name: str, *words: str) -> subprocess.CompletedProcess[str]:

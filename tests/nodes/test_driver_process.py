@@ -34,7 +34,7 @@ def command(**parameters):
     ],
 )
 def test_a_parameter_that_makes_no_sense_ends_the_start_with_a_sentence(parameters, sentence):
-    answer = subprocess.run(command(**parameters), capture_output=True, text=True, timeout=60, check=False)
+    answer = subprocess.run(command(**parameters), capture_output=True, text=True, timeout=180, check=False)
     assert answer.returncode == 1
     assert sentence in answer.stderr
     assert "Traceback" not in answer.stderr
@@ -90,7 +90,7 @@ sys.exit(main())
 
 def test_a_plant_that_fails_ends_the_process_with_a_sentence_and_a_code():
     words = [sys.executable, "-c", FAILING, *command()[3:]]
-    ended = subprocess.run(words, capture_output=True, text=True, timeout=60.0)
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=180.0)
     assert ended.returncode == 1
     assert "the plant has stopped: SystemError('no such body')" in ended.stderr
     assert "Traceback" not in ended.stderr
