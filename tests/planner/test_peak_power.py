@@ -12,7 +12,7 @@ from oracles import FloatArray, torque_available, torques
 
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import evaluate_trajectory, peak_power
-from ir_planner.scene import PlanningScene
+from ir_planner.scene import Drives, PlanningScene
 
 SceneOf = Callable[[str], PlanningScene]
 RATE = 20_000.0  # Hz
@@ -66,7 +66,7 @@ def mains_peak(scene: PlanningScene, qd: FloatArray, torque: FloatArray, charge:
     """Largest power at the mains [W], the bus stepped at RATE."""
     robot, power = scene.cell.robot, scene.power
     axes = torque * qd + robot.copper_loss * (torque / robot.gear_ratio) ** 2
-    if scene.regeneration == "none":
+    if scene.drives.regeneration == "none":
         return scene.base_watts + float(np.maximum(axes, 0.0).sum(axis=1).max())
     stored, peak = charge, 0.0
     for wanted in axes.sum(axis=1) / RATE:
@@ -86,7 +86,7 @@ def mains_peak(scene: PlanningScene, qd: FloatArray, torque: FloatArray, charge:
 def test_no_instant_takes_more_than_the_reported_peak(
     seed: int, cell: str, regeneration: str, charge: float, scene_of: SceneOf
 ) -> None:
-    scene = replace(scene_of(cell), regeneration=regeneration)
+    scene = replace(scene_of(cell), drives=Drives(regeneration))
     trajectory = generated(scene, seed)
     q, qd, qdd, _ = dense(trajectory)
     true = mains_peak(scene, qd, torques(scene, q, qd, qdd), charge)
