@@ -23,6 +23,7 @@ LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
 _ROUNDS = 20
 _DONE = 1e-4  # of a deviation: the largest change of a last step
 _REWEIGHTED = 3  # times that the noise is estimated anew
+_MOST_WIDENED = 1e4  # of the noise in motion
 _SHORTEST = 100  # residuals that a fit needs
 
 
@@ -44,7 +45,7 @@ class Fit:
     """What was found. parameters: with covariance; determined (P,): which of them the data determine; the
     others are as before. movements: residuals. time (W,) s, measured, before, after (W,) W: of windows.
     noise [W]: of a window at rest and in motion, with how many windows one independent residual takes.
-    inflation: what the covariance was multiplied by, so that it explains the residuals of movements.
+    inflation: of the noise in motion, so that the covariance explains the residuals of movements.
     """
 
     parameters: PowerParameters
@@ -102,8 +103,7 @@ class _Estimate:
         left = np.sqrt(np.diag(covariance)) / _safe(self._prior.deviation)
         determined = self._free & (left < DETERMINED)
         mean, _ = self._solve(mean, noise, correlated, determined)
-        inflation = self._inflation(mean, covariance, noise[1] ** 2 * correlated[1])
-        covariance = _at_most(covariance * inflation, covariance, self._prior)
+        covariance, inflation = self._widened(mean, noise, correlated)
         sources = np.where(determined, "fit", self._prior.sources)
         found = replace(
             self._prior,
@@ -202,20 +202,37 @@ class _Estimate:
             if np.isfinite(watts[first:behind]).all()
         )
 
-    def _inflation(self, mean: FloatArray, covariance: FloatArray, variance: float) -> float:
-        """How much larger squared residuals of movements are than covariance and noise explain; at least 1.
+    def _widened(
+        self, mean: FloatArray, noise: tuple[float, float], correlated: tuple[float, float]
+    ) -> tuple[FloatArray, float]:
+        """The covariance (P, P) that explains the residual energies of movements, and the factor on the noise
+        in motion that it takes.
 
-        variance [W^2]: of a window, as if windows were independent.
+        What residuals of neighbouring windows share is no noise of the meter but what the model lacks; other
+        movements will meet it too.
         """
         watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
-        missing = self._samples.watts - watts
-        ratios = []
-        for first, behind in movements(self._samples):
-            if np.isfinite(missing[first:behind]).all():
-                slope = slopes[first:behind].sum(axis=0)
-                explained = slope @ covariance @ slope + variance * WINDOW * (behind - first)
-                ratios.append(float(missing[first:behind].sum() ** 2 / explained))
-        return max(1.0, float(np.mean(ratios))) if ratios else 1.0
+        missing, reduced = self._samples.watts - watts, _by_window(slopes)[self._windows]
+        residual = self._watts - self._reduced(watts)
+        moved = residual[self._moving]
+        white = 0.5 * float(np.mean(np.diff(moved) ** 2)) if len(moved) > 1 else 0.0
+        rest, moving = (
+            reduced[rows].T @ reduced[rows] / (n**2 * c)
+            for rows, n, c in zip((~self._moving, self._moving), noise, correlated, strict=True)
+        )
+        pull = self._pull.T @ self._pull
+        runs = [
+            (slopes[a:b].sum(axis=0), missing[a:b].sum(), white * WINDOW * (b - a))
+            for a, b in movements(self._samples)
+            if np.isfinite(missing[a:b]).all()
+        ]
+        factor = 1.0
+        while True:
+            covariance = _inverse(rest + moving / factor + pull, self._prior.deviation)
+            ratios = [error**2 / (slope @ covariance @ slope + own) for slope, error, own in runs]
+            if not ratios or np.mean(ratios) <= 1.0 or factor >= _MOST_WIDENED:
+                return covariance, factor
+            factor *= 1.25
 
 
 def _by_window(values: FloatArray) -> FloatArray:
@@ -244,13 +261,6 @@ def _inverse(precision: FloatArray, deviation: FloatArray) -> FloatArray:
     inverse[certain] = 0.0
     inverse[:, certain] = 0.0
     return np.asarray(inverse)
-
-
-def _at_most(inflated: FloatArray, covariance: FloatArray, prior: PowerParameters) -> FloatArray:
-    """The inflated covariance with no deviation beyond the prior's or the fitted one's: shrunk from there."""
-    most = np.maximum(prior.deviation, np.sqrt(np.diag(covariance)))
-    shrink = np.minimum(1.0, most / _safe(np.sqrt(np.diag(inflated))))
-    return np.asarray(inflated * np.outer(shrink, shrink))
 
 
 def _correlated(residual: FloatArray) -> float:

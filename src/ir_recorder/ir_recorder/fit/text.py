@@ -25,9 +25,9 @@ def sentences(found: Fit) -> tuple[str, ...]:
     rest, moving = found.noise
     lines.append(f"power over 50 ms is off by {rest:.1f} W at rest and {moving:.1f} W in motion (rms)")
     if found.inflation > 1.0:
-        root = float(np.sqrt(found.inflation))
         lines.append(
-            f"deviations are {root:.1f} times as large as noise alone would give: the model is not all"
+            f"noise in motion counts {found.inflation:.1f} times: the model lacks something, and movements "
+            f"that were not driven will meet it too"
         )
     return tuple(lines)
 
