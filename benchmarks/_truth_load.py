@@ -17,7 +17,7 @@ from _truth_section import Asked, Found
 from ir_description import Cell, Load, PowerParameters, data_sheet, load_cell, load_power_data, robot_marks
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
-from ir_sim_driver.load_check import LoadFinding, Motion, Uncertainty, weighed
+from ir_sim_driver.load_check import Declared, LoadFinding, Motion, Uncertainty, weighed
 from ir_sim_driver.plant import Carried, Plant, nominal_plant, typical_plant
 
 TITLE = "a load that is not the declared one"
@@ -169,7 +169,9 @@ def _weighed(
     cell: Cell,
 ) -> LoadFinding:
     torque = _torque(plant, movement, carried, cell)
-    return weighed(Motion(*movement, torque), declared, robot, THRESHOLD)
+    found = weighed(Motion(*movement, torque), Declared(declared, robot), THRESHOLD)
+    assert found is not None  # there is gravity
+    return found
 
 
 def _viscous(plant: Plant) -> FloatArray:

@@ -10,7 +10,7 @@ from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import LoadCheckSettings, Outcome, SimulationSettings, TrajectoryGoal, make_simulation
 from ir_sim_driver.controller.diagnostics import report
-from ir_sim_driver.load_check import Motion, Uncertainty, weighed
+from ir_sim_driver.load_check import Declared, Motion, Uncertainty, weighed
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import carried
 
@@ -65,7 +65,7 @@ def test_the_estimated_mass_is_as_uncertain_as_it_says() -> None:
     draw, without any column of the check.
     """
     load, marks, generator = carried(CELL, "gripper"), robot_marks(), np.random.default_rng(5)
-    robot = Uncertainty(CELL.robot, data_sheet(), marks, CELL.base_pose)
+    declared = Declared(load, Uncertainty(CELL.robot, data_sheet(), marks, CELL.base_pose))
     z = []
     for seed in range(60):
         s = np.linspace(0.0, 1.0, 24)[:, None]
@@ -75,7 +75,8 @@ def test_the_estimated_mass_is_as_uncertain_as_it_says() -> None:
         qdd = (60.0 * s - 180.0 * s**2 + 120.0 * s**3) * delta / 1.5**2
         drawn = data_sheet().drawn(seed)
         other = DynamicsModel(drawn.robot_with(CELL.robot), drawn.loads_with(load.loads), CELL.base_pose)
-        finding = weighed(Motion(q, qd, qdd, other.inverse_dynamics(q, qd, qdd)), load, robot, 3.0)
+        finding = weighed(Motion(q, qd, qdd, other.inverse_dynamics(q, qd, qdd)), declared, 3.0)
+        assert finding is not None
         z.append(finding.mass / finding.mass_deviation)
     assert np.abs(z).max() < 3.0
     assert np.std(z) > 0.1

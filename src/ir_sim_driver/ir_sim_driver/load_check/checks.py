@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ir_description import Cell, Load, load_power_parameters, robot_marks
-from ir_sim_driver.load_check.estimate import LoadFinding, weighed
+from ir_sim_driver.load_check.estimate import Declared, LoadFinding, weighed
 from ir_sim_driver.load_check.settings import LoadCheckSettings
 from ir_sim_driver.load_check.uncertainty import Uncertainty
 from ir_sim_driver.load_check.watch import LoadWatch
@@ -24,13 +24,13 @@ class LoadChecks:
         self._settings, self._notices = settings, notices
         self._robot = Uncertainty(cell.robot, parameters, robot_marks(cell.robot.name), cell.base_pose)
         self._watch = LoadWatch(period)
-        self._load: Carried | None = None
+        self._declared: Declared | None = None
         self.last: LoadFinding | None = None
         self._new: LoadFinding | None = None
 
     def really(self, load: Carried) -> tuple[Load, ...]:
         """What the simulated robot carries where `load` is declared."""
-        self._load = load
+        self._declared = Declared(load, self._robot) if load.loads else None
         self._watch.begin()
         factor = 1.0 + self._settings.mass_error
         return tuple(
@@ -53,11 +53,13 @@ class LoadChecks:
 
     def ended(self, trajectory_id: str) -> LoadFinding | None:
         """What the movement says of the load; None where no load is declared or it says nothing."""
-        motion, load = self._watch.motion(), self._load
+        motion, declared = self._watch.motion(), self._declared
         self.begin()
-        if motion is None or load is None or not load.loads:
+        if motion is None or declared is None:
             return None
-        finding = weighed(motion, load, self._robot, self._settings.threshold)
+        finding = weighed(motion, declared, self._settings.threshold)
+        if finding is None:
+            return None
         self.last = self._new = finding = replace(finding, trajectory_id=trajectory_id)
         if finding.noticed:
             self._notices.add(Level.WARN, finding.sentence)

@@ -68,16 +68,35 @@ class LoadFinding:
         )
 
 
-def weighed(motion: Motion, load: Carried, robot: Uncertainty, threshold: float) -> LoadFinding:
-    """Weigh what was carried along a movement against the declared load."""
+class Declared:
+    """A declared load carried by a robot that is known as `robot`, and the loads near it that it is compared
+    with.
+    """
+
+    def __init__(self, load: Carried, robot: Uncertainty) -> None:
+        self.load, self.robot = load, robot
+        self._model = robot.carrying(load.loads)
+        self._others = [robot.carrying(loads) for loads in (_heavier(load.loads), *_shifted(load.loads))]
+
+    def torques(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Expected (N, n) [Nm], more for one kg (N, n), and more for a shift of the centre (N, n, 3)."""
+        q, qd, qdd, _ = motion
+        expected = self._model.inverse_dynamics(q, qd, qdd)
+        more, *shifted = (other.inverse_dynamics(q, qd, qdd) - expected for other in self._others)
+        return expected, more / _KG, np.stack(shifted, axis=2)
+
+
+def weighed(motion: Motion, declared: Declared, threshold: float) -> LoadFinding | None:
+    """Weigh what was carried along a movement; None where no torque depends on the load."""
     q, qd, qdd, torque = motion
-    expected = robot.torque(load.loads, q, qd, qdd)
-    more = (robot.torque(_heavier(load.loads), q, qd, qdd) - expected) / _KG
-    shifted = [robot.torque(other, q, qd, qdd) - expected for other in _shifted(load.loads)]
-    columns = np.concatenate((robot.columns(q, qd, qdd, expected), np.stack(shifted, axis=2)), axis=2)
+    load, robot = declared.load, declared.robot
+    expected, more, shifted = declared.torques(motion)
+    columns = np.concatenate((robot.columns(q, qd, qdd, expected), shifted), axis=2)
     noise = _noise(robot, qd)
     inverse = _Covariance(columns, noise)
     information = float((more * inverse.times(more)).sum())
+    if not information > 0.0:
+        return None
     mass = float((more * inverse.times(torque - expected)).sum()) / information
     deviation = float(np.hypot(information**-0.5, LOAD_MASS * load.mass))
     j, seen, found, spread = _clearest(more, expected, torque, columns, noise)

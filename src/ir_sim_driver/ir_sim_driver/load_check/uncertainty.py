@@ -52,9 +52,9 @@ class Uncertainty:
         )
         self._links = [self._dynamics(other) for other in _other_links(model, marks)]
 
-    def torque(self, loads: Sequence[Load], q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """Expected torques (N, n) [Nm] with these loads."""
-        return DynamicsModel(self.model, tuple(loads), self._base_pose).inverse_dynamics(q, qd, qdd)
+    def carrying(self, loads: Sequence[Load]) -> DynamicsModel:
+        """The dynamics that are expected with these loads."""
+        return DynamicsModel(self.model, tuple(loads), self._base_pose)
 
     def columns(self, q: FloatArray, qd: FloatArray, qdd: FloatArray, torque: FloatArray) -> FloatArray:
         """Torques (N, n, P) [Nm] more for one standard deviation of each of P independent parameters, where
