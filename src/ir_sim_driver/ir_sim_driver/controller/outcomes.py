@@ -42,9 +42,10 @@ class Outcomes:
 
     def _completed(self, outcome: Outcome) -> Outcome:
         contact = self._cell_watch.last
-        if outcome.code is not ErrorCode.CONTACT or contact is None:
-            return outcome
-        return replace(outcome, contact=contact, sentence=contact.sentence)
+        if outcome.code is ErrorCode.CONTACT and contact is not None:  # its torques are not the load's
+            self._load_checks.begin()
+            return replace(outcome, contact=contact, sentence=contact.sentence)
+        return outcome.weighed(self._load_checks.ended(outcome.label))
 
     def take(self) -> list[Outcome]:
         """Goals that ended since the last call."""
