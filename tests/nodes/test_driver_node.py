@@ -13,8 +13,9 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
-from ir_description import load_cell
+from ir_description import load_cell, load_power_data
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
@@ -25,6 +26,7 @@ from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.node import SimDriver
+from ir_sim_driver.plant import plant_to_yaml, typical_plant
 from ir_sim_driver.plc.modbus_map import COILS
 
 MAC = "02:00:00:c4:02:10"
@@ -102,6 +104,18 @@ def test_power_state_is_the_derivative_of_its_energy(make_driver, listen, wait_f
     energy = np.array([msg.energy for msg in received])
     power = np.array([msg.power for msg in received])
     assert np.allclose(np.diff(energy), power[1:] * np.diff(stamps) * 1e-9, rtol=1e-6)
+
+
+def test_the_plant_is_named_by_the_meter_and_published_with_its_figures(make_driver, listen, wait_for):
+    make_driver(backend="pybullet", plant="typical:9")
+    readings = listen(names.POWER_STATE, PowerState)
+    plants = listen(names.PLANT, String, latched=True)
+    wait_for(lambda: readings and plants, timeout=60.0)
+    assert readings[-1].plant == "typical:9"
+    assert len(readings[-1].joint_current) == len(readings[-1].joint_temperature) == 6
+    assert 0.0 < readings[-1].tool_power < readings[-1].base_power
+    drawn = typical_plant(load_cell("open").robot, load_power_data(), 9)
+    assert plants[-1].data == plant_to_yaml(drawn)
 
 
 def test_a_trajectory_is_executed_to_its_end(make_driver, cell_client, listen, wait_for):
