@@ -1,7 +1,7 @@
 """Withdrawals for a program: at stations that lie in a zone which the straight service line does not leave.
 
-One search per branch; configurations that differ by whole turns share its path, shifted by the turns. A path
-must be free both with what is held on arriving and with what is held on leaving.
+Some searches per branch; configurations that differ by whole turns share their paths, shifted by the turns. A
+path must be free both with what is held on arriving and with what is held on leaving.
 """
 
 from collections import Counter
@@ -12,9 +12,13 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Context, Journal
+from ir_planner.scene import path_cost
+from ir_planner.search import EXIT, first_different
 from ir_planner.service import Exit, ExitSearch, ServiceLine, WorkArea, withdrawal
 
-_WANTED = 2  # paths per branch: the second is for the scene in which the first collides
+_WANTED = 2  # paths per search: the second is for the scene in which the first collides
+_SEARCHES = 3  # per branch, whatever the seed, which adds to them: chance decided up to 2 % of a program's J
+_KEPT = 6  # paths per branch: each is a configuration of its own for the chain
 _SAME = 1e-6  # rad
 
 
@@ -37,23 +41,19 @@ def withdrawn_lines(
 ) -> list[ServiceLine]:
     """Paths out of the zone from interaction configurations (K, n), free on arriving and on leaving."""
     found: list[ServiceLine] = []
-    failed: list[FloatArray] = []
+    searched: list[tuple[FloatArray, list[FloatArray]]] = []
     robot = both[0].scene.cell.robot
     for q in interaction:
-        twin = next((line for line in found if _turned(q, line.interaction)), None)
-        if twin is not None:
-            shifted = twin.points + (q - twin.interaction)
+        known = next((paths for other, paths in searched if _turned(q, other)), None)
+        paths = _exit_paths(q, both, searches) if known is None else known
+        if known is None:
+            searched.append((q, paths))
+            if not paths:
+                rejected[f"no withdrawal from {both[0].station} found"] += 1
+        for points in paths:
+            shifted = points + (q - points[0])
             if (shifted >= robot.position_min).all() and (shifted <= robot.position_max).all():
                 found.append(ServiceLine(shifted, straight=False))
-            continue
-        if any(_turned(q, other) for other in failed):
-            continue
-        points = _exit_path(q, both, searches)
-        if points is None:
-            failed.append(q)
-            rejected[f"no withdrawal from {both[0].station} found"] += 1
-        else:
-            found.append(ServiceLine(points, straight=False))
     return found
 
 
@@ -62,23 +62,31 @@ def _turned(a: FloatArray, b: FloatArray) -> bool:
     return bool(np.abs(np.sin(0.5 * (a - b))).max() < _SAME)
 
 
-def _exit_path(
+def _exit_paths(
     q: FloatArray, both: tuple[Context, Context], searches: Mapping[str, ExitSearch]
-) -> FloatArray | None:
-    """The cheapest path (M, n) that is free in both scenes; searched in each of them."""
+) -> list[FloatArray]:
+    """Different paths (M, n) that are free in both scenes, of several searches in each of them; which serves
+    best is decided with the chain.
+    """
+    found: list[FloatArray] = []
     for here, there in (both, both[::-1]):
-        if here.work.exhausted:
-            return None
-        inside = FreeSpace.of(here.scene, here.safety_distance, here.work, here.station)
-        if not inside.states_free(q[None])[0]:
-            return None
-        problem, other = Exit.of(q, here), Exit.of(q, there)
-        inner = Journal(here.work, here.journal.seed)
-        for path in withdrawal(problem, _WANTED, "", searches, inner).paths:
-            points = path.points
-            free = other.inside.edges_free(points[:-1], points[1:]).all() and other.is_out(points[-1:])[0]
-            if free and other.contacts_end(points):
-                return points
-        if here.scene is there.scene:
+        if here.work.exhausted and found:
             break
-    return None
+        inside = FreeSpace.of(here.scene, here.safety_distance, here.work, here.station)
+        if here.work.exhausted or not inside.states_free(q[None])[0]:
+            return []
+        problem, other = Exit.of(q, here), Exit.of(q, there)
+        for seed in (*range(_SEARCHES), here.journal.seed):
+            paths: list[FloatArray] = []
+            inner = Journal(here.work, seed)
+            for path in withdrawal(problem, _WANTED, "", searches, inner).paths:
+                points = path.points
+                free = other.inside.edges_free(points[:-1], points[1:]).all()
+                if free and other.is_out(points[-1:])[0] and other.contacts_end(points):
+                    paths.append(points)
+            found += sorted(paths, key=lambda points: path_cost(here.scene.weights, points))
+            if not found:
+                break
+        if found or here.scene is there.scene:
+            break
+    return first_different(found, _KEPT, EXIT, lambda points: points[-1])
