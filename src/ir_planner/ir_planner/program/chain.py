@@ -17,6 +17,8 @@ from ir_planner.program.stops import posture_nodes, station_nodes
 from ir_planner.request import Context
 from ir_planner.service import ExitSearch, ServiceLine
 
+# with the default work for better answers, and in proportion with more of it
+_DEFAULT_WORK = 8_000
 TOLERANCE = 2e-3  # of the cost: a cheaper chain than that isn't looked for
 _PLANNED_PER_STOP = 8  # movements that may be planned for each stop once there is a chain
 _LATE_PER_STOP, _LATE = 8, 100  # once time or work have ended: movements planned, and chains looked at
@@ -60,7 +62,8 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
     travel = context.options.objective == "movement_cost"
     edges = (TravelEdges if travel else CostEdges)(movements, improvement)
 
-    most = count * (3 + (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP))
+    effort = max(context.work.improvement / _DEFAULT_WORK, 1.0)
+    most = count * (3 + effort * (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP))
 
     late: list[int] = []  # how many movements were planned when time or work had ended
 
@@ -73,7 +76,7 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
         return bool(late) and (movements.planned - late[0] > count * _LATE_PER_STOP or len(late) > _LATE)
 
     with context.journal.stage("station graph") as notes:
-        graph = StationGraph(edges.hops(), edges.settle, TOLERANCE, may_go_on, must_end)
+        graph = StationGraph(edges.hops(), edges.settle, TOLERANCE / effort, may_go_on, must_end)
         chain = graph.solve(lambda best: progress("station graph", 0, count, best))
         unit = "W" if travel else "cost"
         notes.append(

@@ -18,6 +18,7 @@ from ir_planner.service import Exit, ExitSearch, ServiceLine, WorkArea, withdraw
 
 _WANTED = 2  # paths per search: the second is for the scene in which the first collides
 _SEARCHES = 3  # per branch, whatever the seed, which adds to them: chance decided up to 2 % of a program's J
+_FOR_ANOTHER, _MOST = 16_000, 16  # max_iterations that buy another search, and another path; at most
 _KEPT = 6  # paths per branch: each is a configuration of its own for the chain
 _SAME = 1e-6  # rad
 
@@ -69,14 +70,13 @@ def _exit_paths(
     best is decided with the chain.
     """
     found: list[FloatArray] = []
+    more = min(both[0].work.improvement // _FOR_ANOTHER, _MOST)
     for here, there in (both, both[::-1]):
-        if here.work.exhausted and found:
-            break
         inside = FreeSpace.of(here.scene, here.safety_distance, here.work, here.station)
         if here.work.exhausted or not inside.states_free(q[None])[0]:
             return []
         problem, other = Exit.of(q, here), Exit.of(q, there)
-        for seed in (*range(_SEARCHES), here.journal.seed):
+        for seed in (*range(_SEARCHES), here.journal.seed, *range(_SEARCHES, _SEARCHES + more)):
             paths: list[FloatArray] = []
             inner = Journal(here.work, seed)
             for path in withdrawal(problem, _WANTED, "", searches, inner).paths:
@@ -89,4 +89,4 @@ def _exit_paths(
                 break
         if found or here.scene is there.scene:
             break
-    return first_different(found, _KEPT, EXIT, lambda points: points[-1])
+    return first_different(found, _KEPT + more, EXIT, lambda points: points[-1])
