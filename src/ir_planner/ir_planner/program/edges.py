@@ -84,6 +84,7 @@ class CostEdges:
         return [Settled(np.inf if part in blocked else 0.0, exact=part in blocked) for part in parts]
 
     def _coarse(self, part: Part) -> Settled:
+        self.movements.context.work.check()
         first, second = self.movements.ends(part)
         value = self._coarse_costs[part.hop].between(first, second)
         return Settled(value * (1.0 - MARGIN), exact=False, proved=False)
