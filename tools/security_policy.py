@@ -57,9 +57,12 @@ DRIVER = Rights(
         *(names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC, "/clock"),
         *(names.POWER_STATE, names.CONTROLLER_STATE, names.CONTROLLER_TIMERS, names.CARRIED_LOAD),
         *(names.PLC_OUTPUTS, names.PLC_INPUTS_IN_FORCE, names.ROBOT_MARKERS),
-        *(names.PLANT, names.LOAD_CHECK),
+        *(names.PLANT, names.LOAD_CHECK, names.CONTACTS, names.MACHINE_STATES),
     ),
-    subscribe=(names.COMMANDED_TRAJECTORY, names.PLC_INPUTS, names.SPEED_SCALING, names.CELL),
+    subscribe=(
+        *(names.COMMANDED_TRAJECTORY, names.PLC_INPUTS, names.SPEED_SCALING, names.CELL),
+        *(names.SIGNALS, names.MACHINE_SIGNALS),
+    ),
     reply=(
         *(names.SET_PLC_INPUT, names.START_PAUSE, names.END_PAUSE, names.QUERY_MODES),
         *(names.RECOVER, names.SET_LOAD),
