@@ -216,6 +216,8 @@ class _Reader:
         for time, message in self._messages(names.ROSOUT):
             if message.level >= _WARN and owns_logger(self._namespace, message.name):
                 yield TextEvent(time, message.name, message.msg)
+        for time, message in self._messages(names.CONTACTS):
+            yield TextEvent(time, names.SIM_DRIVER, _contact_sentence(message))
 
     def _goals(self) -> Iterator[GoalEnd]:
         """How every goal of planner and runner ended, by the status of their actions."""
@@ -283,3 +285,12 @@ class _Reader:
     def _attached(self, name: str) -> str:
         data = self._raw.attachment(name)
         return data.decode(errors="replace") if data is not None else ""
+
+
+def _contact_sentence(contact: Any) -> str:
+    """A recorded Contact, for people."""
+    pair = contact.pair
+    return (
+        f"contact: {pair.body_a} touched {pair.body_b} at {contact.speed:.2f} m/s, "
+        f"{contact.depth * 1e3:.1f} mm deep, about {contact.force:.0f} N (simulated)"
+    )
