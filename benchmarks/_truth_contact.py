@@ -124,16 +124,18 @@ def measured(asked: Asked) -> Found:
         for _ in range(free)[share]:
             _keep_clear(simulation, judge, rng, clear)
         found.rows.append({"cell": name, "load": load, "touching": total.driven, "free": clear.driven})
-    found.claims += [
-        at_least("touching trajectories: refused before the start", total.refused, "", total.driven),
-        at_least("started all the same: stopped with CONTACT", total.stopped, "", total.driven),
-        at_most("started all the same: ended SUCCESSFUL", total.successful, "", 0),
-        at_least("pair named as Coal finds it", total.named, "", total.driven),
-        at_most("motors brake after the first touch, at most", total.reaction, "ms", REACTION),
-        at_most("free trajectories: stopped", clear.stopped, "", 0),
-        at_most("free trajectories: touch by Coal", clear.touched, "", 0),
-        at_least("free trajectories: SUCCESSFUL", clear.successful, "", clear.driven),
-    ]
+    found.claims.extend(
+        [
+            at_least("touching trajectories: refused before the start", total.refused, "", total.driven),
+            at_least("started all the same: stopped with CONTACT", total.stopped, "", total.driven),
+            at_most("started all the same: ended SUCCESSFUL", total.successful, "", 0),
+            at_least("pair named as Coal finds it", total.named, "", total.driven),
+            at_most("motors brake after the first touch, at most", total.reaction, "ms", REACTION),
+            at_most("free trajectories: stopped", clear.stopped, "", 0),
+            at_most("free trajectories: touch by Coal", clear.touched, "", 0),
+            at_least("free trajectories: SUCCESSFUL", clear.successful, "", clear.driven),
+        ]
+    )
     found.rows.append({"longest stop ms": total.stood, "deepest mm": total.depth})
     return found
 

@@ -9,6 +9,7 @@ import importlib.util
 import struct
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ir_description import load_cell
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
@@ -48,6 +50,8 @@ SHORT = TransitionTimes(
     }
 )
 
+BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
+
 
 def neighbour(name: str) -> ModuleType:
     """Another module of this folder."""
@@ -69,7 +73,7 @@ class Fuzz:
     def __init__(self, generator: np.random.Generator, backend: str = "ideal") -> None:
         self.random = generator
         settings = SimulationSettings(transitions=SHORT, controller=ControllerSettings(enabling_switch=True))
-        self.simulation = make_simulation("open", backend=backend, settings=settings)
+        self.simulation = make_simulation(BARE, backend=backend, settings=settings)
         self.driver = Driver(self.simulation, steps=1)
         self.tables = ControllerTables(self.driver.plc, 2.0)
         self.judge = Judge(self.simulation.robot)

@@ -6,9 +6,12 @@ somebody recovers; who stays inside goes on.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from ir_description import load_cell
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
 from ir_msgs_py.plc import PlcInputs
 from ir_msgs_py.trajectory import JointTrajectory
@@ -25,12 +28,14 @@ SHORT = TransitionTimes(
         for part in ("enter", "leave", "minimum_stay")
     }
 )
+
+BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
 SITUATIONS = ("holding", "moving", "stopping", "drives_off", "ab", "hib", "emergency_stop")
 
 
 def brought_into(situation: str, steps: int) -> Simulation:
     """An ideal robot, so many steps after what brings it into a situation."""
-    simulation = make_simulation("open", backend="ideal", settings=SimulationSettings(transitions=SHORT))
+    simulation = make_simulation(BARE, backend="ideal", settings=SimulationSettings(transitions=SHORT))
     simulation.run(0.1)
     if situation in ("moving", "stopping", "emergency_stop"):
         q, rest = simulation.backend.q, np.zeros((2, 6))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from ir_description import load_cell
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import DriverError, ExecutionSettings, Simulation, TrajectoryGoal, make_simulation
 from ir_sim_driver.motion.rounding import rounded
+
+BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
 
 SLACK = 0.02  # share: a command is judged by differences over a step, the limits hold for its derivatives
 STEP_NOISE = 1e-3  # rad/s^2: differences of positions to 1e-16 rad, and interpolation of path time
@@ -51,7 +55,7 @@ def ride(simulation: Simulation, seconds: float) -> list[np.ndarray]:
 
 @pytest.fixture
 def simulation() -> Simulation:
-    return make_simulation("open", backend="ideal")
+    return make_simulation(BARE, backend="ideal")
 
 
 def trajectory(simulation: Simulation, times: Any, points: Any, *derivatives: Any) -> JointTrajectory:
@@ -169,11 +173,11 @@ def judged(cases: int, seed: int) -> tuple[int, list[str]]:
     generator = np.random.default_rng(seed)
     settings = ExecutionSettings()
     accepted, beyond = 0, []
-    simulation = make_simulation("open", backend="ideal")
+    simulation = make_simulation(BARE, backend="ideal")
     positions = [simulation.backend.q.copy()]
     for case in range(cases):
         if case % 50 == 0 or simulation.fault:
-            simulation = make_simulation("open", backend="ideal")
+            simulation = make_simulation(BARE, backend="ideal")
             positions = [simulation.backend.q.copy()]
         try:
             goal, stamp = random_goal(simulation, generator)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from ir_description import load_cell
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import (
@@ -17,6 +20,8 @@ from ir_sim_driver import (
 )
 from ir_sim_driver.controller.diagnostics import report
 from ir_sim_driver.notices import Level
+
+BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
 
 
 def start(simulation: Simulation, times: list[float], points: list[np.ndarray]) -> None:
@@ -38,7 +43,7 @@ def is_stopped(simulation: Simulation) -> bool:
 
 @pytest.fixture
 def simulation() -> Simulation:
-    return make_simulation("open", backend="pybullet")
+    return make_simulation(BARE, backend="pybullet")
 
 
 def pushed(torque: float) -> np.ndarray:
@@ -76,7 +81,7 @@ def test_a_robot_that_is_pushed_while_it_stops_along_its_path_is_stopped(simulat
 def test_a_motor_that_gives_all_it_has_for_long_is_stopped() -> None:
     """With a tube so wide that only the saturation shows."""
     settings = SimulationSettings(execution=ExecutionSettings(tube=0.1, path_tolerance=1.0))
-    simulation = make_simulation("open", backend="pybullet", settings=settings)
+    simulation = make_simulation(BARE, backend="pybullet", settings=settings)
     simulation.run(0.1)
     most = np.array(simulation.robot.envelope_torque)[0, 0]
     simulation.disturb(pushed(1.05 * most))  # a little more than it can hold
@@ -91,7 +96,7 @@ def moved_to(simulation: Simulation, q: np.ndarray) -> None:
 
 @pytest.mark.parametrize("beyond", [0.03, 0.2])
 def test_beyond_a_limit_it_is_stopped_and_can_only_be_driven_back(beyond: float) -> None:
-    simulation = make_simulation("open", backend="ideal")
+    simulation = make_simulation(BARE, backend="ideal")
     simulation.run(0.1)
     robot = simulation.robot
     outside = simulation.backend.q.copy()
@@ -120,7 +125,7 @@ def test_beyond_a_limit_it_is_stopped_and_can_only_be_driven_back(beyond: float)
 
 def test_a_command_that_jumps_is_stopped_whoever_made_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bug in the executor: the second look is independent of the first."""
-    simulation = make_simulation("open", backend="ideal")
+    simulation = make_simulation(BARE, backend="ideal")
     simulation.run(0.1)
     q, steps = simulation.backend.q, 0
 
