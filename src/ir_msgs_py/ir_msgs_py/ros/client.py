@@ -232,13 +232,23 @@ class Client:
         feedback: Callable[[ExecuteTrajectory.Feedback], object] | None = None,
         timeout: float = float("inf"),
         report: TrajectoryReport | None = None,
+        *,
+        station: str = "",
+        states: Sequence[str] = (),
+        allow_collision: bool = False,
     ) -> Execution:
         """Drive a trajectory; RequestRefusedError with the driver's code and sentence when it was aborted.
 
         report: of its plan; the driver refuses what was planned in another cell or with another load.
+        station: whose contacts are allowed; states: of machines that it relies on; allow_collision: start it
+        although it is known to collide.
         """
         goal = ExecuteTrajectory.Goal(
-            trajectory=trajectory_to_msg(trajectory), trajectory_id=trajectory.trajectory_id
+            trajectory=trajectory_to_msg(trajectory),
+            trajectory_id=trajectory.trajectory_id,
+            station=station,
+            states=list(states),
+            allow_collision=allow_collision,
         )
         if report is not None:
             goal.cell_hash, goal.load = report.cell_hash, report.load
