@@ -2,26 +2,30 @@
 
     python benchmarks/clearance.py [--cell FILE]... [--movements N] [--seeds N] [--quick] [--json FILE]
 
-Movements of the cells' tasks with the default work, as many seeds as it takes. Beside `min_clearance` of each
-report stands the least distance that Coal finds at configurations at most 0.0005 rad apart, over all pairs:
-it is never below the true minimum by more than Coal's own tolerance, and above it by what may hide between
-two configurations. Closes with one line per figure: measured value, bound, holds or falls short.
+Movements of the cells' tasks, and of three variants of each cell, with the default work and as many seeds as
+it takes; every different answer counts once. Beside `min_clearance` of each report stands the least distance
+that Coal finds at configurations at most 0.0005 rad apart, over all pairs: it is never below the true minimum
+by more than Coal's own tolerance, and above it by what may hide between two configurations. Closes with one
+line per figure: measured value, bound, holds or falls short.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from _regional_ours import asked, planner_of, run
 from _regional_tasks import CELLS, scene_of, tasks_of
 from _results import at_most, command_line, finish, line_of
 from _second_opinion import SecondOpinion
+from _variants import variant_files
 
 TOLERANCE = 2e-6  # m: what Coal's iterations leave between it and the true distance
 BELOW = 1e-4  # m by which a report may lie below the true minimum and still be useful
 MOVEMENTS, QUICK = 200, 6
+PER_CELL, VARIANTS = 3, Path("out/variants")  # mirrored, turned and jittered cells besides
 
 
 def arguments() -> argparse.Namespace:
@@ -36,19 +40,19 @@ def arguments() -> argparse.Namespace:
 
 def movements(cells: list[str], seeds: int, count: int) -> Iterator[dict[str, object]]:
     """A row per movement: reported clearance, Coal's least distance and their difference [m]."""
-    tasks = [task for name in cells for task in tasks_of(name)]
+    tasks = [(name, task) for name in cells for task in tasks_of(name)]
     planners = {name: planner_of(name) for name in cells}
     opinions = {name: SecondOpinion(scene_of(name)) for name in cells}
     done, known = 0, set[str]()
-    for seed, task in ((seed, task) for seed in range(seeds) for task in tasks):
+    for seed, (name, task) in ((seed, each) for seed in range(seeds) for each in tasks):
         if done == count:
             return
-        found = run(planners[task.cell], task, asked(task, seed))
+        found = run(planners[name], task, asked(task, seed))
         if found.trajectory is None or found.trajectory_id in known:
             continue
         known.add(found.trajectory_id)
         done += 1
-        least, configurations = opinions[task.cell].least_distance(found.trajectory)
+        least, configurations = opinions[name].least_distance(found.trajectory)
         yield {
             "cell": task.cell,
             "task": task.name,
@@ -64,7 +68,8 @@ def main() -> None:
     """Measure, print, write."""
     given = arguments()
     rows = []
-    for row in movements(given.cell or list(CELLS), given.seeds, given.movements):
+    cells = given.cell or [*CELLS, *variant_files(CELLS, PER_CELL, 0, VARIANTS)]
+    for row in movements(cells, given.seeds, given.movements):
         rows.append(row)
         print(line_of(row), flush=True)
     above = np.array([row["above_um"] for row in rows], dtype=float) * 1e-6

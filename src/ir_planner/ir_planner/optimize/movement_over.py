@@ -2,6 +2,7 @@
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.optimize.refinement import Refinement
+from ir_planner.optimize.stages import QUICK, THOROUGH
 from ir_planner.request import Context
 from ir_planner.timing import Movement, distinct, straight_steps
 
@@ -15,8 +16,9 @@ def movement_over(path: FloatArray, context: Context) -> Movement:
     path = distinct(path)
     if len(path) > 1 and context.options.timing == "synchronous":
         refinement = Refinement(context)
-        found = refinement.refined(refinement.coarse(path), path)
-        if found is not None and found.certified:
-            return found
+        for effort in (THOROUGH, QUICK):  # the second ends elsewhere, where the first isn't certified
+            found = refinement.refined(refinement.coarse(path, effort.coarse), path, effort)
+            if found is not None and found.certified:
+                return found
         refinement.check_requested()
     return straight_steps(path, context)
