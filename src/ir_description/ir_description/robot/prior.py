@@ -1,7 +1,7 @@
 """How far a robot may be from its data sheet, before anything is measured: from the marks of confidence.
 
-This is the one table of the planner's assumptions: its intervals, the reserve of torque and the start of a fit
-read it. The plants of the simulation are drawn by rules of their own (docs/plant.md), so that what
+This is the one table of the planner's assumptions: its intervals, the reserve of torque and the start of a
+fit read it. The plants of the simulation are drawn by rules of their own (docs/plant.md), so that what
 holds on them is a finding.
 """
 
