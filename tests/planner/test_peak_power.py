@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from oracles import FloatArray, torque_available, torques
 
+from ir_kernels.power import Regeneration
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import evaluate_trajectory, peak_power
 from ir_planner.scene import Drives, PlanningScene
@@ -84,7 +85,7 @@ def mains_peak(scene: PlanningScene, qd: FloatArray, torque: FloatArray, charge:
     charge=st.sampled_from([0.0, 40.0, 106.0]),
 )
 def test_no_instant_takes_more_than_the_reported_peak(
-    seed: int, cell: str, regeneration: str, charge: float, scene_of: SceneOf
+    seed: int, cell: str, regeneration: Regeneration, charge: float, scene_of: SceneOf
 ) -> None:
     scene = replace(scene_of(cell), drives=Drives(regeneration))
     trajectory = generated(scene, seed)
