@@ -181,7 +181,7 @@ def test_a_plc_that_falls_silent_stops_the_robot_until_it_is_back(make, serve, p
     driver, client, _ = serve(simulation)
     home = np.array(cell.machine_home)
     client.write_coil(HEARTBEAT, True)
-    start(simulation, plan(4.0, home, home + 0.3))
+    start(simulation, plan(4.0, home, home + 0.1))
     run(driver, 0.4)
     client.write_coil(HEARTBEAT, False)
     run(driver, 0.4)
