@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from _common_program import common_program
 from _program_chains import Chains
-from cycle import Programs, Row, excess
+from cycle import Programs, Row, above_best, excess
 
 
 def row(cycle: float, energy: float, drives: float, wait: str = "") -> Row:
@@ -41,3 +41,10 @@ def test_the_common_program_lasts_as_long_as_its_slowest_joints() -> None:
     assert found.duration > first.max()
     assert found.drive_energy > 0.0
     assert 0.0 <= found.not_free <= 1.0
+
+
+def test_the_best_known_is_that_of_the_same_cycle_time() -> None:
+    rows = [row(10.0, 1000.0, 500.0), row(12.0, 1020.0, 500.0)]
+    rivals = [row(10.0, 1100.0, 500.0), row(12.0, 1000.0, 500.0), row(14.0, 100.0, 50.0)]
+    assert above_best(rows, rivals) == pytest.approx(2.0)
+    assert above_best(rows, []) == 0.0
