@@ -88,7 +88,7 @@ class Programs:
     def over_cycle_times(self, points: int) -> list[Row]:
         """From the shortest cycle to twice the free one."""
         shortest = self.planned("shortest", 0.0, "time")
-        free = self.planned("free", 0.0)
+        free = self.planned("free", 0.0, "time_and_energy")
         cycles = np.linspace(1.01 * shortest.cycle, 2.0 * free.cycle, points)
         return [self.planned("cycle", float(cycle)) for cycle in cycles]
 
