@@ -16,7 +16,7 @@ from ir_recorder.traces import Trace
 from ir_sim_driver import Outcome, Simulation, TrajectoryGoal, carried, make_simulation
 
 ENCODER, METER = 0.005, 0.02  # s between readings
-SETTLING = 0.3  # s beside a movement
+SETTLING = 1.0  # s after a movement: the capacitors give their charge to the holding torque
 _LIMIT = 2.0  # times of a movement's duration until it must have ended
 
 

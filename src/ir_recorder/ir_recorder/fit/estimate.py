@@ -15,15 +15,25 @@ from scipy.optimize import lsq_linear
 from ir_description import PowerParameters, physical_bounds
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import FitError
+from ir_recorder.fit.residuals import (
+    FOLDS,
+    WINDOW,
+    by_window,
+    correlation_length,
+    inverse,
+    left_out,
+    rests,
+    safe,
+    scaled,
+)
 from ir_recorder.measure import PowerModel, Samples, movements
 
-WINDOW = 5  # samples whose mean is one residual: 50 ms
 DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
 LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
 _ROUNDS = 20
 _DONE = 1e-4  # of a deviation: the largest change of a last step
 _REWEIGHTED = 3  # times that the noise is estimated anew
-_MOST_WIDENED = 1e4  # of the noise in motion
+_MOST_WIDENED = 1e4  # of the variance of the noise
 _SHORTEST = 100  # residuals that a fit needs
 
 
@@ -45,7 +55,7 @@ class Fit:
     """What was found. parameters: with covariance; determined (P,): which of them the data determine; the
     others are as before. movements: residuals. time (W,) s, measured, before, after (W,) W: of windows.
     noise [W]: of a window at rest and in motion, with how many windows one independent residual takes.
-    inflation: of the noise in motion, so that the covariance explains the residuals of movements.
+    inflation: of the noise, so that the covariance explains the residuals of movements and rests.
     """
 
     parameters: PowerParameters
@@ -75,7 +85,7 @@ def fit(samples: Samples, model: PowerModel, prior: PowerParameters, name: str =
 class _Estimate:
     def __init__(self, samples: Samples, model: PowerModel, prior: PowerParameters) -> None:
         usable = samples.known & np.isfinite(samples.watts)
-        self._windows = np.flatnonzero(_by_window(usable.astype(float)) > 1.0 - 1e-9)
+        self._windows = np.flatnonzero(by_window(usable.astype(float)) > 1.0 - 1e-9)
         if len(self._windows) < _SHORTEST:
             raise FitError(
                 f"{len(self._windows) * WINDOW * samples.step:.1f} s have watts, motion, mode and load at "
@@ -86,21 +96,21 @@ class _Estimate:
         self._watts = self._reduced(samples.watts)
         self._moving = self._reduced(samples.moving.astype(float)) > 0.0
         self._low, self._high = physical_bounds(prior.names)
-        values, vectors = np.linalg.eigh(_scaled(prior))
+        values, vectors = np.linalg.eigh(scaled(prior))
         if values.min() <= 1e-9:
             raise FitError("the covariance of the prior is singular")
-        self._pull = (vectors / np.sqrt(values)).T / _safe(prior.deviation)  # (P, P): whitens the parameters
+        self._pull = (vectors / np.sqrt(values)).T / safe(prior.deviation)  # (P, P): whitens the parameters
         self._free = prior.deviation > 0.0
 
-    def result(self, name: str) -> Fit:
+    def result(self, name: str) -> Fit:  # long: one field per line
         """Both noises and the parameters in turn, then once more with what is not determined as before."""
         noise, correlated, mean = (50.0, 50.0), (1.0, 1.0), self._prior.mean.copy()
         for _ in range(_REWEIGHTED):
             mean, precision = self._solve(mean, noise, correlated, self._free)
             noise, correlated = self._noise(mean)
         mean, precision = self._solve(mean, noise, correlated, self._free)
-        covariance = _inverse(precision, self._prior.deviation)
-        left = np.sqrt(np.diag(covariance)) / _safe(self._prior.deviation)
+        covariance = inverse(precision, self._prior.deviation)
+        left = np.sqrt(np.diag(covariance)) / safe(self._prior.deviation)
         determined = self._free & (left < DETERMINED)
         mean, _ = self._solve(mean, noise, correlated, determined)
         covariance, inflation = self._widened(mean, noise, correlated)
@@ -127,7 +137,7 @@ class _Estimate:
         )
 
     def _reduced(self, values: FloatArray) -> FloatArray:
-        return np.asarray(_by_window(values)[self._windows])
+        return np.asarray(by_window(values)[self._windows])
 
     def _solve(
         self,
@@ -152,7 +162,7 @@ class _Estimate:
                     break
             else:
                 break
-            moved = np.abs((trial - mean) / _safe(self._prior.deviation)).max()
+            moved = np.abs((trial - mean) / safe(self._prior.deviation)).max()
             mean, (cost, residual, slopes) = trial, better
             if moved < _DONE:
                 break
@@ -162,7 +172,7 @@ class _Estimate:
         """Cost, weighted residuals (W,) and their slopes (W, P)."""
         watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
         residual = weight * (self._watts - self._reduced(watts))
-        weighted = weight[:, None] * _by_window(slopes)[self._windows]
+        weighted = weight[:, None] * by_window(slopes)[self._windows]
         pulled = self._pull @ (mean - self._prior.mean)
         return float(residual @ residual + pulled @ pulled), residual, weighted
 
@@ -170,7 +180,7 @@ class _Estimate:
         self, mean: FloatArray, residual: FloatArray, slopes: FloatArray, free: BoolArray
     ) -> FloatArray:
         """The step of Gauss and Newton within the bounds; zero for what is not free."""
-        scale = _safe(self._prior.deviation)[free]
+        scale = safe(self._prior.deviation)[free]
         reduced = np.asarray(np.linalg.qr(np.column_stack([slopes[:, free] * scale, residual]), mode="r"))
         matrix = np.concatenate([reduced[:, :-1], self._pull[:, free] * scale])
         target = np.concatenate([reduced[:, -1], self._pull @ (self._prior.mean - mean)])
@@ -187,7 +197,7 @@ class _Estimate:
         for rows in (~self._moving, self._moving):
             own = residual[rows]
             noise.append(max(float(np.sqrt(np.mean(own**2))), LEAST_WATTS) if len(own) else LEAST_WATTS)
-            correlated.append(_correlated(own))
+            correlated.append(correlation_length(own))
         return (noise[0], noise[1]), (correlated[0], correlated[1])
 
     def _movements(self, before: FloatArray, after: FloatArray) -> tuple[FittedMovement, ...]:
@@ -202,17 +212,17 @@ class _Estimate:
             if np.isfinite(watts[first:behind]).all()
         )
 
-    def _widened(
+    def _widened(  # long: one computation
         self, mean: FloatArray, noise: tuple[float, float], correlated: tuple[float, float]
     ) -> tuple[FloatArray, float]:
-        """The covariance (P, P) that explains the residual energies of movements, and the factor on the noise
-        in motion that it takes.
+        """The covariance (P, P) that explains the residual energies of movements and rests, each predicted
+        without its part of the data, and the factor on the noise that it takes.
 
         What residuals of neighbouring windows share is no noise of the meter but what the model lacks; other
         movements will meet it too.
         """
         watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
-        missing, reduced = self._samples.watts - watts, _by_window(slopes)[self._windows]
+        missing, reduced = self._samples.watts - watts, by_window(slopes)[self._windows]
         residual = self._watts - self._reduced(watts)
         moved = residual[self._moving]
         white = 0.5 * float(np.mean(np.diff(moved) ** 2)) if len(moved) > 1 else 0.0
@@ -221,58 +231,25 @@ class _Estimate:
             for rows, n, c in zip((~self._moving, self._moving), noise, correlated, strict=True)
         )
         pull = self._pull.T @ self._pull
+        weight = 1.0 / np.where(
+            self._moving, *(n * np.sqrt(c) for n, c in zip(noise[::-1], correlated[::-1], strict=True))
+        )
+        shifts = left_out(weight[:, None] * reduced, weight * residual, pull)
+        part = self._windows[-1] * WINDOW / FOLDS + 1.0  # samples of a fold
         runs = [
-            (slopes[a:b].sum(axis=0), missing[a:b].sum(), white * WINDOW * (b - a))
-            for a, b in movements(self._samples)
+            (
+                slope,
+                missing[a:b].sum() - slope @ shifts[min(int(a / part), FOLDS - 1)],
+                white * WINDOW * (b - a),
+            )
+            for a, b in (*movements(self._samples), *rests(self._samples))
             if np.isfinite(missing[a:b]).all()
+            for slope in (slopes[a:b].sum(axis=0),)
         ]
         factor = 1.0
         while True:
-            covariance = _inverse(rest + moving / factor + pull, self._prior.deviation)
+            covariance = inverse((rest + moving) / factor + pull, self._prior.deviation)
             ratios = [error**2 / (slope @ covariance @ slope + own) for slope, error, own in runs]
             if not ratios or np.mean(ratios) <= 1.0 or factor >= _MOST_WIDENED:
                 return covariance, factor
             factor *= 1.25
-
-
-def _by_window(values: FloatArray) -> FloatArray:
-    """Means (M // WINDOW, ...) of consecutive samples (M, ...)."""
-    count = len(values) // WINDOW
-    return np.asarray(values[: count * WINDOW].reshape(count, WINDOW, *values.shape[1:]).mean(axis=1))
-
-
-def _safe(deviation: FloatArray) -> FloatArray:
-    return np.where(deviation > 0.0, deviation, 1.0)
-
-
-def _scaled(prior: PowerParameters) -> FloatArray:
-    """The correlation (P, P) of the prior; 1 on the diagonal for what is certain."""
-    scale = _safe(prior.deviation)
-    matrix = prior.covariance / np.outer(scale, scale)
-    matrix[np.diag_indices_from(matrix)] = 1.0
-    return matrix
-
-
-def _inverse(precision: FloatArray, deviation: FloatArray) -> FloatArray:
-    """The covariance (P, P), inverted where parameters have deviations of one size; 0 for what is certain."""
-    scale = _safe(deviation)
-    inverse = np.linalg.inv(precision * np.outer(scale, scale)) * np.outer(scale, scale)
-    certain = deviation <= 0.0
-    inverse[certain] = 0.0
-    inverse[:, certain] = 0.0
-    return np.asarray(inverse)
-
-
-def _correlated(residual: FloatArray) -> float:
-    """Residuals per independent one: 1 + 2 times the sum of the autocorrelations up to the first negative."""
-    own = residual - residual.mean() if len(residual) else residual
-    power = float(own @ own)
-    if len(own) < 3 or power <= 0.0:
-        return 1.0
-    total = 1.0
-    for lag in range(1, min(len(own) // 2, 400)):
-        rho = float(own[:-lag] @ own[lag:]) / power
-        if rho <= 0.0:
-            break
-        total += 2.0 * rho
-    return total

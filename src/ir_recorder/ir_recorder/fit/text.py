@@ -26,7 +26,7 @@ def sentences(found: Fit) -> tuple[str, ...]:
     lines.append(f"power over 50 ms is off by {rest:.1f} W at rest and {moving:.1f} W in motion (rms)")
     if found.inflation > 1.0:
         lines.append(
-            f"noise in motion counts {found.inflation:.1f} times: the model lacks something, and movements "
+            f"noise counts {found.inflation:.1f} times: the model lacks something, and movements "
             f"that were not driven will meet it too"
         )
     return tuple(lines)
