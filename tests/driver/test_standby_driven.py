@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from ir_description import load_cell, load_power_data
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.transitions import TransitionTimes
@@ -31,15 +32,23 @@ DEBOUNCE = 0.02  # s: how long a level has to stay
 BITS = {"STAND_ON_BRAKES": "drives_off", "BUS_POWER_OFF": "ab", "HIBERNATION": "hib"}
 
 
+def posture(rng: np.random.Generator) -> FloatArray:
+    """Joint values (n,) [rad], not near a limit."""
+    robot = CELL.robot
+    share = rng.uniform(0.2, 0.8, robot.n)
+    return robot.position_min + share * (robot.position_max - robot.position_min)
+
+
 class Case:
     """A controller that stands at a posture with a load, and the planner's scene of it."""
 
     def __init__(self, seed: int) -> None:
         rng = np.random.default_rng(seed)
         load = LOADS[seed % len(LOADS)]
-        robot = CELL.robot
-        share = rng.uniform(0.2, 0.8, robot.n)
-        self.q = robot.position_min + share * (robot.position_max - robot.position_min)
+        free = scene_with(CELL, load, POWER).collision
+        self.q = posture(rng)
+        while free.distances(self.q[None]).min() <= 0.0:
+            self.q = posture(rng)
         self.times = TransitionTimes()
         self.timer = 20.0
         if seed % 2:
