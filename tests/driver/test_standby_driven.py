@@ -134,5 +134,6 @@ def followed(case: Case, steps: tuple[Step, ...], pause: float) -> tuple[float, 
     while not plant.modes.motors_on:
         plant.wake()
         plant.step()
+        assert plant.time - pause < 1000.0, plant.fault
     delay = plant.time - pause
     return plant.mains.energy() - begun, delay if delay > 2.0 * DEBOUNCE else 0.0
