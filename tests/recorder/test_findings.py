@@ -14,7 +14,8 @@ import pytest
 from ir_msgs.msg import PlannedMovement
 from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, Finding, Tolerances, Verdict, analyse, findings, read_recording, summary
-from ir_recorder.read.recording import GoalEnd
+from ir_recorder.analysis.results import StepResult
+from ir_recorder.read.recording import GoalEnd, Recording
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 NEAR = Tolerances(resting_rows=8, safety_distance=-1.0)  # the synthetic run passes through its machines
@@ -172,3 +173,30 @@ def test_clearance_is_held_against_the_safety_distance_it_was_planned_with(
         )
         assert check.ok == ok
         assert check.reason.startswith(source)
+
+
+def test_a_plant_that_is_not_the_model_is_held_against_twice_the_interval(analysis: Analysis) -> None:
+    """One joule more than the interval's end is no fault; as much beyond it again is one."""
+    recording = analysis.recording
+    assert recording.power is not None
+    other = replace(recording, power=replace(recording.power, plant="typical, seed 7"))
+    result = analysis.steps[0]
+    report = result.step.movement.report
+    low, high = 0.9 * report.energy, 1.1 * report.energy
+    movement = replace(result.step.movement, report=replace(report, energy_low=low, energy_high=high))
+
+    def check(energy: float, run: Recording) -> Finding:
+        step = replace(result, step=replace(result.step, movement=movement), energy=energy)
+        (found,) = named(
+            findings(replace(analysis, recording=run, steps=(step,))), f"energy of {step_name(step)}"
+        )[:1]
+        return found
+
+    assert check(high + 1.0, other).verdict is Verdict.HOLDS
+    assert "the plant is not the model" in check(high, other).reason
+    assert check(2.0 * high - report.energy + 11.0, other).verdict is Verdict.FAILS
+    assert check(high + 1.0, recording).verdict is Verdict.FAILS
+
+
+def step_name(result: StepResult) -> str:
+    return f"{result.step.index + 1} {result.step.label}"

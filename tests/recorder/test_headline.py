@@ -13,6 +13,11 @@ def test_simulated_figures_are_labelled(analysis: Analysis, page: str) -> None:
     assert "Simulated, not measured" in page
     real = replace(analysis, recording=replace(analysis.recording, hardware="KR210"))
     assert "Measured" in source(real)
+    assert analysis.recording.power is not None
+    power = replace(analysis.recording.power, plant="typical, seed 7")
+    assert "plant typical, seed 7" in source(
+        replace(analysis, recording=replace(real.recording, power=power))
+    )
     assert "plant not recorded" in source(replace(analysis, recording=replace(real.recording, hardware="")))
 
 

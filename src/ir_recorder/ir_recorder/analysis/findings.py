@@ -18,7 +18,7 @@ _SUCCEEDED = 4  # action_msgs/GoalStatus
 
 def findings(analysis: Analysis, tolerances: Tolerances | None = None) -> tuple[Finding, ...]:
     """All checks of the cell and of this run; what can't be checked is listed as such."""
-    bounds = tolerances or Tolerances()
+    bounds = (tolerances or Tolerances()).of_plant(analysis.recording.plant)
     steps = [result for result in analysis.steps if result.step.outcome == ENDED]
     return (
         *_requests(analysis),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ir_msgs_py.settings import check_settings, setting
+
+MODEL_PLANTS = ("", "nominal", "ideal")
+"""Plants whose figures are those that the planner's model has; "" for recordings that name none."""
 
 
 @dataclass(frozen=True)
@@ -52,5 +55,26 @@ class Tolerances:
         0.01, "Energy from joint states against the meter.", minimum=0.0, maximum=1.0
     )
 
+    plant_relative: float = setting(
+        0.2,
+        "Energy and power of a plant that is not the model, where the plan has no interval: two standard "
+        "deviations of figures of medium confidence.",
+        minimum=0.0,
+        maximum=1.0,
+    )
+
+    within_interval: bool = setting(
+        False, "Energy of a movement against twice the plan's 90 % interval, where it has one."
+    )
+
     def __post_init__(self) -> None:
         check_settings(self)
+
+    def of_plant(self, plant: str) -> Tolerances:
+        """The bounds for a plant of this name: only those of its own data agree closely with the model."""
+        if plant in MODEL_PLANTS:
+            return self
+        wide = self.plant_relative
+        return replace(
+            self, energy_relative=wide, indirect_relative=wide, resting_relative=wide, within_interval=True
+        )

@@ -152,6 +152,7 @@ class _Reader:
             columns.numbers("burnt_power"),
             columns.numbers("joint_power", len(names.JOINT_NAMES)),
             columns.numbers("joint_torque", len(names.JOINT_NAMES)),
+            next((name for name in reversed(columns.texts("plant")) if name), ""),
         )
 
     def _controller(self, columns: Columns, channel: RawChannel) -> ControllerSeries:

@@ -52,7 +52,7 @@ class PowerSeries(_ReadOnlyArrays):
     burnt_power (N,) W; energy (N,) J since the meter's start; bus_voltage (N,) V; joint_power (N, n) W at
     the DC bus, joint_torque (N, n) Nm.
 
-    A power is the mean since the reading before.
+    A power is the mean since the reading before. plant: what the meter measures, "" where it has no name.
     """
 
     time: FloatArray
@@ -65,6 +65,7 @@ class PowerSeries(_ReadOnlyArrays):
     burnt_power: FloatArray
     joint_power: FloatArray
     joint_torque: FloatArray
+    plant: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +164,11 @@ class Recording:
         if not self.hardware:
             return "recorded"
         return "simulated" if "simulated" in self.hardware else "measured"
+
+    @property
+    def plant(self) -> str:
+        """Name of the simulated plant, "" where none is recorded."""
+        return "" if self.power is None else self.power.plant
 
     def fact(self, key: str) -> str:
         """A fact of the file, "" where it is missing."""

@@ -46,7 +46,9 @@ def source(analysis: Analysis) -> str:
         return '<p class="source open">plant not recorded</p>'
     style = analysis.recording.origin
     kind = "Simulated, not measured" if style == "simulated" else "Measured"
-    return f'<p class="source {style}"><b>{kind}</b> {text(hardware.removesuffix(", simulated"))}</p>'
+    what, plant = hardware.removesuffix(", simulated"), analysis.recording.plant
+    what += f", plant {plant}" if plant else ""
+    return f'<p class="source {style}"><b>{kind}</b> {text(what)}</p>'
 
 
 def verdict(checks: Sequence[Finding]) -> str:
