@@ -51,6 +51,19 @@ def test_what_is_supplied_goes_to_axes_resistor_and_capacitor_at_every_step(
             assert flows.supplied > 0.0
 
 
+@settings(max_examples=200, deadline=None)
+@given(figures=links(), powers=POWERS, regeneration=st.sampled_from(REGENERATIONS))
+def test_many_steps_at_once_are_the_steps_one_by_one(
+    figures: LinkFigures, powers: list[list[float]], regeneration: Regeneration
+) -> None:
+    once, each = DcCircuit(figures, DT, regeneration), DcCircuit(figures, DT, regeneration)
+    together = once.steps(np.array(powers))
+    single = np.array([each.step(row) for row in powers]).sum(axis=0)
+    scale = 1.0 + DT * np.abs(powers).sum()
+    np.testing.assert_allclose(together, single, rtol=1e-9, atol=1e-9 * scale)
+    assert once.stored == pytest.approx(each.stored, abs=1e-9 * scale)
+
+
 @settings(max_examples=100, deadline=None)
 @given(powers=POWERS, regeneration=st.sampled_from(REGENERATIONS))
 def test_without_hysteresis_it_is_the_bus_of_the_planner(

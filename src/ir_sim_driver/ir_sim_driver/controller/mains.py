@@ -25,21 +25,42 @@ class Mains:
         self._backend = backend
         self.base, self._known = BasePower(plant.watts), BasePower(standing_watts(data))
         self.meter = PowerMeter(plant, dt, regeneration)
+        self._unsettled = 0
+        self._level, self._steps = (
+            Mode.STAND_ON_MOTORS,
+            0,
+        )  # steps at this level that the meter has not counted
 
     def set_load(self, load: Carried) -> None:
         """Count a load's own consumption from now on."""
+        self._count()
         for base in (self.base, self._known):
             base.set_tool(load.watts_always, load.watts_drive_bus)
 
     def step(self, level: Mode) -> None:
         """Count one step at this level: STAND_ON_MOTORS or a rest."""
-        self.meter.add(self.base.of(level), self.base.tool(level), level is Mode.STAND_ON_MOTORS)
-        if self.meter.pending() >= _SETTLE_STEPS:
+        if level is not self._level:
+            self._count()
+            self._level = level
+        self._steps += 1
+        self._unsettled += 1
+        if self._unsettled >= _SETTLE_STEPS:
             self.settle()
 
     def settle(self) -> None:
         """Bring the meter's reading up to the last step."""
+        self._count()
+        self._unsettled = 0
         self.meter.settle(self._backend.work())
+
+    def _count(self) -> None:
+        """Let the meter count the steps at the present level."""
+        if self._steps:
+            level = self._level
+            self.meter.add(
+                self.base.of(level), self.base.tool(level), level is Mode.STAND_ON_MOTORS, self._steps
+            )
+            self._steps = 0
 
     def energy(self) -> float:
         """Energy [J] up to the last step."""

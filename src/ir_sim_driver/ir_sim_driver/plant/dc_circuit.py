@@ -10,10 +10,14 @@ took.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from ir_kernels.power import Regeneration
+from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.plant.plant_parameters import LinkFigures
 
 _EVENTS = 1000  # in one step: far more than any chopper switches
@@ -59,6 +63,30 @@ class DcCircuit:
             return Flows(supplied, 0.0, self._loss(supplied))
         supplied, dissipated = self._events(power)
         return Flows(supplied, dissipated, self._loss(supplied))
+
+    def steps(self, powers: FloatArray) -> Flows:
+        """Let the axes take powers (K, n) [W] for a step each: the sums of the flows of `step`.
+
+        While the capacitor is empty and the axes take power, as nearly always, steps are summed at once.
+        """
+        total = powers.sum(axis=1)
+        flows, k = [0.0, 0.0, 0.0], 0
+        shared = self._regeneration == "shared"
+        braking = [*np.flatnonzero(total < 0.0).tolist(), len(total)] if shared else []
+        while k < len(total):
+            if shared and self.stored == 0.0 and not self._closed:
+                first = braking[bisect_left(braking, k)]
+                taken = total[k:first]
+                amount = float(taken.sum())
+                flows[0] += amount * self._dt
+                flows[2] += self._losses(amount, float(taken @ taken))
+                if first == len(total):
+                    break
+                k = first
+            for j, flow in enumerate(self.step(powers[k].tolist())):
+                flows[j] += flow
+            k += 1
+        return Flows(*flows)
 
     def _events(self, power: float) -> tuple[float, float]:
         """Energies supplied and dissipated in a step of this power."""
@@ -113,6 +141,10 @@ class DcCircuit:
         """Energy lost in the rectifier for what it gives in a step."""
         if supplied <= 0.0:
             return 0.0
+        power = supplied / self._dt
+        return self._losses(power, power * power)
+
+    def _losses(self, power: float, square: float) -> float:
+        """Energy lost in the rectifier in steps whose powers [W] and squares of powers have these sums."""
         f = self._figures
-        current = supplied / (self._dt * f.mains)
-        return self._dt * current * (f.rectifier_drop + f.rectifier_resistance * current)
+        return self._dt / f.mains * (f.rectifier_drop * power + f.rectifier_resistance / f.mains * square)

@@ -55,9 +55,8 @@ class PowerMeter:
         self._dt = dt
         self._losses = DriveLosses(plant.drives, np.array(plant.robot.gear_ratio))
         self._circuit = DcCircuit(plant.link, dt, regeneration)
-        self._base: list[float] = []
-        self._tool: list[float] = []
-        self._powered: list[bool] = []
+        self._loads: list[tuple[int, float, float, bool]] = []  # steps that have the same
+        self._pending = 0
         self._steps = 0
         self._supplied = self._dissipated = self._rectifier = self._base_energy = self._tool_energy = 0.0
         n = len(plant.robot.joint_names)
@@ -65,36 +64,31 @@ class PowerMeter:
         self._power = self._torque = self._current = np.zeros(n)
         self._last_base = self._last_tool = 0.0
 
-    def add(self, base_power: float, tool_power: float = 0.0, powered: bool = True) -> None:
-        """Count one step with this base load [W], the tool's share of it, and whether motors are on."""
-        self._base.append(base_power)
-        self._tool.append(tool_power)
-        self._powered.append(powered)
-
-    def pending(self) -> int:
-        """Steps that are counted but not yet settled."""
-        return len(self._base)
+    def add(self, base_power: float, tool_power: float = 0.0, powered: bool = True, steps: int = 1) -> None:
+        """Count steps with this base load [W], the tool's share of it, and whether motors are on."""
+        self._loads.append((steps, base_power, tool_power, powered))
+        self._pending += steps
 
     def settle(self, work: Work) -> None:
         """Take what the motors did in the steps that were added since the last call, one row per step."""
-        if not self._base:
+        if not self._pending:
             return
         dt = self._dt
-        axes = self._losses.power(work, np.array(self._powered, dtype=np.float64))
+        counts, base, tool, powered = zip(*self._loads, strict=True)
+        axes = self._losses.power(work, np.repeat(np.array(powered, dtype=np.float64), counts))
         total = axes.total
-        step = self._circuit.step
-        flows = np.array([step(row) for row in total.tolist()]).sum(axis=0).tolist()
-        self._supplied, self._dissipated = self._supplied + flows[0], self._dissipated + flows[1]
-        self._rectifier += flows[2]
+        flows = self._circuit.steps(total)
+        self._supplied += flows.supplied
+        self._dissipated += flows.dissipated
+        self._rectifier += flows.rectifier
         self._steps += len(total)
-        self._base_energy += dt * sum(self._base)
-        self._tool_energy += dt * sum(self._tool)
+        self._base_energy += dt * float(np.dot(counts, base))
+        self._tool_energy += dt * float(np.dot(counts, tool))
         self._parts = self._parts + dt * np.array([part.sum(axis=0) for part in axes[:4]])
         self._power, self._torque, self._current = total[-1], work.torque[-1], axes.current[-1]
-        self._last_base, self._last_tool = self._base[-1], self._tool[-1]
-        self._base.clear()
-        self._tool.clear()
-        self._powered.clear()
+        self._last_base, self._last_tool = base[-1], tool[-1]
+        self._loads.clear()
+        self._pending = 0
 
     def reading(self) -> MeterReading:
         """What the meter shows."""
