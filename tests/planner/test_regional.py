@@ -197,3 +197,13 @@ def test_a_safety_distance_of_zero_is_taken_literally(
     assert plan.status.ok
     assert plan.report.certified
     assert plan.report.min_clearance > -PROOF_TOLERANCE
+
+
+def test_what_is_free_at_once_is_found_without_any_work(scene_of: SceneOf, options: PlanOptions) -> None:
+    """A program's last movements may have no work left: a free straight one needs none."""
+    scene = scene_of("open")
+    home = np.array(scene.cell.machine_home)
+    budget = Work(0, 1e9, time.monotonic)
+    plan = planned(home, home + np.array([0.2, 0.0, 0.0, 0.1, 0.0, 0.0]), scene, options, budget)
+    assert plan.status.ok, plan.status.message
+    assert plan.report.certified

@@ -11,7 +11,8 @@ def refusal(start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Jour
     """The status for a movement from start to goal (n,), both free, that was not found."""
     found = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
     if found.verdict[0] == FREE:
-        reasons = "; ".join(f"{reason} ({count})" for reason, count in journal.rejected.items())
+        rejected = (f"{reason} ({count})" for reason, count in journal.rejected.items())
+        reasons = "; ".join(rejected) or "max_iterations or planning_time ended before one was timed"
         return Status(
             StatusCode.PLANNING_FAILED,
             f"the straight path is free but no movement could be certified: {reasons}",
