@@ -13,7 +13,8 @@ from ir_recorder.read.recording import ControllerSeries, ProgramEvent, Recording
 STARTED = "started"
 OPEN = "open"  # no end was recorded
 _FEWEST = 3  # states of the executor: fewer give no speed to extrapolate its start and end with
-_UNSEEN = 0.06  # s: a shorter movement has fewer states, at 50 Hz
+UNSEEN = 0.06
+"""A shorter movement [s] has fewer than three states of the controller, at 50 Hz."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,7 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
                 steps[-1] = replace(pause, end=max(pause.start, min(pause.end, ran[0])))
         start, stop = ran or (event.time - late, last - late)
         planned = event.movement.report.duration
-        if ran is None and 0.0 < planned < _UNSEEN:  # its events are as far apart as the nodes' answers
+        if ran is None and 0.0 < planned < UNSEEN:  # its events are as far apart as the nodes' answers
             stop = min(stop, start + planned)
         steps.append(
             ExecutedStep(
