@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 import rclpy
@@ -10,7 +11,7 @@ import rclpy
 from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.quality import SERVICE
-from ir_msgs_py.ros.serving import BoundedService
+from ir_msgs_py.ros.serving import UNDISCOVERED, BoundedService, send_until_taken
 from ir_msgs_py.status import StatusCode
 
 MOST, SENT = 50, 400
@@ -55,3 +56,16 @@ def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
     assert seen == [str(k) for k, good in enumerate(served) if good]
     assert MOST <= sum(served) < SENT
     assert said == {f"{MOST} requests of /bounded/ask are waiting: send fewer at once"}
+
+
+def test_a_response_is_sent_again_until_the_server_has_discovered_its_client() -> None:
+    """The middleware waits for the client's reader, and drops the response when it does not come."""
+    sent: list[float] = []
+
+    def send(_response: Any, _header: Any) -> None:
+        sent.append(time.monotonic())
+        if len(sent) < 3:
+            time.sleep(UNDISCOVERED + 0.02)
+
+    send_until_taken(send, "response", "header")
+    assert len(sent) == 3

@@ -6,6 +6,7 @@ takes all that have come into a queue of its own, refuses what exceeds it with a
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -20,6 +21,11 @@ from ir_msgs_py.ros.quality import REQUESTS_WAITING, SERVICE
 from ir_msgs_py.status import Status, StatusCode
 
 Handler = Callable[[Any, Any], Any]
+
+UNDISCOVERED = 0.09
+"""Seconds that the middleware waits, less a tenth, for a client that it has not discovered (0.1 s)."""
+
+_SENDS = 30  # 3 s: far more than a busy machine takes to discover a client
 
 
 class BoundedService(Waitable):
@@ -88,13 +94,28 @@ class BoundedService(Waitable):
         """Answer it."""
         if taken_data is not None:
             request, header = taken_data
-            self._service.send_response(self._handler(request, self._type.Response()), header)
+            send_until_taken(
+                self._service.send_response, self._handler(request, self._type.Response()), header
+            )
 
     def _refuse(self, header: Any) -> None:
         sentence = f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
         response = self._type.Response()
         response.status = status_to_msg(Status(StatusCode.FAILURE, sentence, self._source))
-        self._service.send_response(response, header)
+        send_until_taken(self._service.send_response, response, header)
+
+
+def send_until_taken(send: Callable[[Any, Any], None], response: Any, header: Any) -> None:
+    """Send a response, again where the server has not discovered its client yet.
+
+    A client may see the server before the server sees it. The middleware then waits UNDISCOVERED, drops the
+    response and warns; how long it took is all that tells. A client ignores an answer that it has already.
+    """
+    for _ in range(_SENDS):
+        begun = time.monotonic()
+        send(response, header)
+        if time.monotonic() - begun < UNDISCOVERED:
+            return
 
 
 def _nothing() -> None:
