@@ -202,12 +202,16 @@ def step_name(result: StepResult) -> str:
     return f"{result.step.index + 1} {result.step.label}"
 
 
-def test_a_movement_of_a_few_milliseconds_is_not_measured_by_its_positions(analysis: Analysis) -> None:
-    """There are too few to be differentiated; its energy by the meter is checked as ever."""
+def test_a_movement_of_a_few_milliseconds_is_not_measured_by_what_it_has_no_samples_of(
+    analysis: Analysis,
+) -> None:
+    """Positions, or a state of the controller; its energy by the meter is checked as ever."""
     result = analysis.steps[0]
     report = replace(result.step.movement.report, duration=0.004)
     step = replace(result.step, movement=replace(result.step.movement, report=report))
-    short = replace(analysis, steps=(replace(result, step=step, indirect_energy=math.nan),))
+    unseen = replace(result, step=step, indirect_energy=math.nan, tool_deviation=math.nan)
+    short = replace(analysis, steps=(unseen,))
+    assert named(findings(short), "tool deviation") == []
     assert [check.name for check in named(findings(short), "energy of")] == [f"energy of {step_name(result)}"]
     lost = replace(analysis, steps=(replace(result, indirect_energy=math.nan),))
     verdicts = [check.verdict for check in named(findings(lost), "energy of")]

@@ -25,10 +25,10 @@ def step_checks(result: StepResult, safety_distance: float, bounds: Tolerances) 
     if planned > 0.0:
         why = "ends are extrapolated from states at 50 Hz"
         yield near(f"duration of {name}", result.seconds, planned, bounds.duration, "s", why)
-    if planned >= UNSEEN:  # a shorter one has too few positions to be differentiated
+    if planned >= UNSEEN:  # a shorter one has too few positions, and perhaps no state of the controller
         yield _from_joint_states(name, result, bounds)
-    why = "beyond it the planned clearance is no proof"
-    yield at_most(f"tool deviation on {name}", result.tool_deviation, bounds.tool_deviation, "m", why)
+        why = "beyond it the planned clearance is no proof"
+        yield at_most(f"tool deviation on {name}", result.tool_deviation, bounds.tool_deviation, "m", why)
     yield from _clearance(name, result, safety_distance, bounds)
 
 
