@@ -97,6 +97,9 @@ def test_planned_and_measured_energy_agree_for_every_movement(run: Run) -> None:
             continue
         own = [s for s in states if s.trajectory_id == wanted and s.path_time > 0.0]
         own = [s for s in own if abs(stamp(s) - stamp(event)) < event.movement.duration + 1.0]
+        if not own:  # from where the robot stands, a few microradians off, into the first posture
+            assert event.movement.report.duration < 0.02
+            continue
         start = float(np.median([stamp(s) - s.path_time for s in own]))
         used = np.interp([start, start + event.movement.report.duration], power[:, 0], power[:, 1])
         planned = event.movement.report.energy
