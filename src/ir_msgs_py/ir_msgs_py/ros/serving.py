@@ -109,7 +109,7 @@ def send_until_taken(send: Callable[[Any, Any], None], response: Any, header: An
     """Send a response, again where the server has not discovered its client yet.
 
     A client may see the server before the server sees it. The middleware then waits UNDISCOVERED, drops the
-    response and warns; how long it took is all that tells. A client ignores an answer that it has already.
+    response and warns; only the time it took shows it. A client ignores an answer that it has already.
     """
     for _ in range(_SENDS):
         begun = time.monotonic()
