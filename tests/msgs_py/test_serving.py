@@ -11,7 +11,7 @@ import rclpy
 from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.quality import SERVICE
-from ir_msgs_py.ros.serving import UNDISCOVERED, BoundedService, send_until_taken
+from ir_msgs_py.ros.serving import SENDS, UNDISCOVERED, BoundedService, PatientSender
 from ir_msgs_py.status import StatusCode
 
 MOST, SENT = 50, 400
@@ -58,14 +58,34 @@ def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
     assert said == {f"{MOST} requests of /bounded/ask are waiting: send fewer at once"}
 
 
+class Middleware:
+    """Drops the first `lost` responses, each after waiting for the client's reader."""
+
+    def __init__(self, lost: int) -> None:
+        self.lost, self.sent = lost, 0
+
+    def send(self, _response: Any, _header: Any) -> None:
+        self.sent += 1
+        if self.sent <= self.lost:
+            time.sleep(UNDISCOVERED)
+
+
 def test_a_response_is_sent_again_until_the_server_has_discovered_its_client() -> None:
-    """The middleware waits for the client's reader, and drops the response when it does not come."""
-    sent: list[float] = []
+    middleware = Middleware(lost=2)
+    PatientSender(middleware.send).send("response", "header")
+    assert middleware.sent == 3
 
-    def send(_response: Any, _header: Any) -> None:
-        sent.append(time.monotonic())
-        if len(sent) < 3:
-            time.sleep(UNDISCOVERED + 0.02)
 
-    send_until_taken(send, "response", "header")
-    assert len(sent) == 3
+def test_a_client_that_is_never_discovered_costs_a_second_and_no_more() -> None:
+    """Its other responses are sent once; with a client that listens patience is back."""
+    middleware = Middleware(lost=SENDS + 2)
+    sender = PatientSender(middleware.send)
+    counts = []
+    for _ in range(4):
+        before = middleware.sent
+        sender.send("response", "header")
+        counts.append(middleware.sent - before)
+    assert counts == [SENDS, 1, 1, 1]
+    middleware.lost = middleware.sent + 1
+    sender.send("response", "header")
+    assert middleware.sent == middleware.lost + 1

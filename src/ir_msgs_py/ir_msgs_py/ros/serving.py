@@ -25,7 +25,9 @@ Handler = Callable[[Any, Any], Any]
 UNDISCOVERED = 0.09
 """Seconds that the middleware waits, less a tenth, for a client that it has not discovered (0.1 s)."""
 
-_SENDS = 30  # 3 s: far more than a busy machine takes to discover a client
+SENDS = 10
+"""A second: more than a busy machine takes to discover a client, and no longer than a dead one may hold up
+the others."""
 
 
 class BoundedService(Waitable):
@@ -51,6 +53,7 @@ class BoundedService(Waitable):
             service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
         )
         self._more = node.create_guard_condition(_nothing, callback_group=untouched)
+        self._sender = PatientSender(self._service.send_response)
         self._waiting: deque[tuple[Any, Any]] = deque()
         self._index = 0
         node.add_waitable(self)
@@ -94,28 +97,35 @@ class BoundedService(Waitable):
         """Answer it."""
         if taken_data is not None:
             request, header = taken_data
-            send_until_taken(
-                self._service.send_response, self._handler(request, self._type.Response()), header
-            )
+            self._sender.send(self._handler(request, self._type.Response()), header)
 
     def _refuse(self, header: Any) -> None:
         sentence = f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
         response = self._type.Response()
         response.status = status_to_msg(Status(StatusCode.FAILURE, sentence, self._source))
-        send_until_taken(self._service.send_response, response, header)
+        self._sender.send(response, header)
 
 
-def send_until_taken(send: Callable[[Any, Any], None], response: Any, header: Any) -> None:
-    """Send a response, again where the server has not discovered its client yet.
+class PatientSender:
+    """Sends a response again where the server has not discovered its client yet.
 
     A client may see the server before the server sees it. The middleware then waits UNDISCOVERED, drops the
-    response and warns; only the time it took shows it. A client ignores an answer that it has already.
+    response and warns; only the time it took shows it. A client ignores an answer that it has already. One
+    that is never discovered has died: what follows is sent once, until a client takes its answer at once.
     """
-    for _ in range(_SENDS):
-        begun = time.monotonic()
-        send(response, header)
-        if time.monotonic() - begun < UNDISCOVERED:
-            return
+
+    def __init__(self, send: Callable[[Any, Any], None]) -> None:
+        self._send, self._patient = send, True
+
+    def send(self, response: Any, header: Any) -> None:
+        """Send it, for about a second at most."""
+        for _ in range(SENDS if self._patient else 1):
+            begun = time.monotonic()
+            self._send(response, header)
+            if time.monotonic() - begun < UNDISCOVERED:
+                self._patient = True
+                return
+        self._patient = False
 
 
 def _nothing() -> None:
