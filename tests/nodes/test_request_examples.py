@@ -50,6 +50,7 @@ EXPECTED: dict[str, tuple[int, str]] = {
     "Recover": (Status.SUCCESS, "nothing to recover from"),
     "SetPlcInput": (Status.SUCCESS, ""),
     "StopRecording": (Status.SUCCESS, "messages over"),
+    "ControlPlayback": (Status.SUCCESS, ""),
 }
 
 
