@@ -128,9 +128,8 @@ class _Reader:
         first = next(self._decoded(channel), None)
         if first is None:
             raise ReadError("no message can be decoded")
-        joint_names = tuple(first[1].name)
+        joint_names, stamps = tuple(first[1].name), columns.stamps()
         n = len(joint_names)
-        stamps = columns.stamps()
         return JointSeries(
             joint_names,
             stamps,
@@ -152,6 +151,9 @@ class _Reader:
             columns.numbers("burnt_power"),
             columns.numbers("joint_power", len(names.JOINT_NAMES)),
             columns.numbers("joint_torque", len(names.JOINT_NAMES)),
+            columns.numbers("tool_power"),
+            columns.numbers("rectifier_loss"),
+            columns.numbers("joint_temperature", len(names.JOINT_NAMES)),
             next((name for name in reversed(columns.texts("plant")) if name), ""),
         )
 
@@ -162,6 +164,7 @@ class _Reader:
             columns.numbers("path_time"),
             columns.numbers("speed_scaling"),
             columns.numbers("tool_deviation"),
+            columns.numbers("error.positions", len(names.JOINT_NAMES)),
         )
 
     def _bits(self, bits: tuple[str, ...], stamped: bool) -> Callable[[Columns, RawChannel], BitSeries]:

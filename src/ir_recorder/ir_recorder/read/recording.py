@@ -50,7 +50,8 @@ class JointSeries(_ReadOnlyArrays):
 class PowerSeries(_ReadOnlyArrays):
     """The mains meter, N readings: mode and target numbers of ir_msgs/PowerMode; power, base_power,
     burnt_power (N,) W; energy (N,) J since the meter's start; bus_voltage (N,) V; joint_power (N, n) W at
-    the DC bus, joint_torque (N, n) Nm.
+    the DC bus, joint_torque (N, n) Nm; tool_power (N,) W, part of base_power; rectifier_loss (N,) W;
+    joint_temperature (N, n) deg C. What the plant doesn't have is NaN.
 
     A power is the mean since the reading before. plant: what the meter measures, "" where it has no name.
     """
@@ -65,13 +66,17 @@ class PowerSeries(_ReadOnlyArrays):
     burnt_power: FloatArray
     joint_power: FloatArray
     joint_torque: FloatArray
+    tool_power: FloatArray
+    rectifier_loss: FloatArray
+    joint_temperature: FloatArray
     plant: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class ControllerSeries(_ReadOnlyArrays):
     """The trajectory executor, N states: trajectory_id ("" while holding), path_time (N,) s along the
-    trajectory, speed_scaling (N,), tool_deviation (N,) m between commanded and simulated tcp.
+    trajectory, speed_scaling (N,), tool_deviation (N,) m between commanded and simulated tcp, joint_error
+    (N, n) rad between commanded and simulated joints.
     """
 
     time: FloatArray
@@ -79,6 +84,7 @@ class ControllerSeries(_ReadOnlyArrays):
     path_time: FloatArray
     speed_scaling: FloatArray
     tool_deviation: FloatArray
+    joint_error: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
