@@ -80,8 +80,9 @@ RUNNER = Rights(
 )
 ACTIONS = (*PLANNER.execute, *DRIVER.execute, *RUNNER.execute)
 COMMANDS = (names.COMMANDED_TRAJECTORY, names.PLC_INPUTS, names.SPEED_SCALING, names.SIGNALS)
-REPORTS = (*PLANNER.publish, *DRIVER.publish, *RUNNER.publish, *COMMON.publish)
 NODES = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER, names.RECORDER)
+CALLS = tuple(f"{node}/{names.CALLS}" for node in NODES)
+REPORTS = (*PLANNER.publish, *DRIVER.publish, *RUNNER.publish, *COMMON.publish, *CALLS)
 RECORDER = Rights(
     subscribe=(*REPORTS, *COMMANDS, *(f"{action}/_action/status" for action in ACTIONS)),
     reply=(names.START_RECORDING, names.STOP_RECORDING),
@@ -107,7 +108,7 @@ def rights() -> dict[str, Rights]:
     found = {}
     for node, own in {**CELL, OPERATOR: PEOPLE}.items():
         found[node] = Rights(
-            _sorted(own.publish, COMMON.publish),
+            _sorted(own.publish, COMMON.publish, (f"{node}/{names.CALLS}",) if node in NODES else ()),
             _sorted(own.subscribe, COMMON.subscribe),
             _sorted(own.reply, tuple(f"{node}/{service}" for service in PARAMETER_SERVICES)),
             _sorted(own.request),

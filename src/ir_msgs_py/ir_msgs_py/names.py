@@ -17,6 +17,7 @@ PLANNER: Final = "ir_planner"
 SIM_DRIVER: Final = "ir_sim_driver"
 PROGRAM_RUNNER: Final = "ir_program_runner"
 RECORDER: Final = "ir_recorder"
+CALLS: Final = "calls"  # topic of every node that answers: its requests and answers, for recordings
 
 # of nobody in particular
 JOINT_STATES: Final = "joint_states"

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
@@ -34,6 +34,7 @@ from ir_msgs_py.ros.driver import Driver
 from ir_msgs_py.ros.planner import Planner
 from ir_msgs_py.ros.quality import ACTION_SERVICES
 from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
@@ -89,7 +90,7 @@ class ProgramRunnerNode(Node):
         self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
         self._last, self._diagnostics = Status.success(), RunnerDiagnostics(self)
         self.create_timer(1.0, self._diagnose, clock=steady)
-        self._server = ActionServer(
+        self._server = RecordedActionServer(
             self,
             RunProgram,
             "~/run_program",

@@ -2,6 +2,7 @@
 
 The middleware keeps only so many requests and drops the oldest without a word. Here each turn of the executor
 takes all that have come into a queue of its own, refuses what exceeds it with a sentence, and answers one.
+What was answered is published for recordings (calls.py).
 """
 
 from __future__ import annotations
@@ -11,10 +12,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.action import ActionServer
 from rclpy.callback_groups import CallbackGroup
+from rclpy.executors import await_or_execute
 from rclpy.node import Node
 from rclpy.waitable import NumberOfEntities, Waitable
 
+from ir_msgs_py.ros.calls import Calls, type_text
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.polled import PolledGroup
 from ir_msgs_py.ros.quality import REQUESTS_WAITING, SERVICE
@@ -52,6 +56,7 @@ class BoundedService(Waitable):
         self._service = node.create_service(
             service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
         )
+        self._calls = Calls.of(node)
         self._more = node.create_guard_condition(_nothing, callback_group=untouched)
         self._sender = PatientSender(self._service.send_response)
         self._waiting: deque[tuple[Any, Any]] = deque()
@@ -97,13 +102,34 @@ class BoundedService(Waitable):
         """Answer it."""
         if taken_data is not None:
             request, header = taken_data
-            self._sender.send(self._handler(request, self._type.Response()), header)
+            answered = self._calls.taken(self._service.service_name, type_text(self._type), request)
+            response = self._handler(request, self._type.Response())
+            answered(response)
+            self._sender.send(response, header)
 
     def _refuse(self, header: Any) -> None:
         sentence = f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
         response = self._type.Response()
         response.status = status_to_msg(Status(StatusCode.FAILURE, sentence, self._source))
         self._sender.send(response, header)
+
+
+class RecordedActionServer(ActionServer):
+    """An ActionServer whose goals and results are published for recordings."""
+
+    def __init__(self, node: Node, action_type: Any, name: str, *arguments: Any, **options: Any) -> None:
+        self._calls, self._type_text = Calls.of(node), type_text(action_type)
+        self._full_name = node.resolve_topic_name(name)
+        super().__init__(node, action_type, name, *arguments, **options)
+
+    async def _execute_goal(self, execute_callback: Any, goal_handle: Any) -> None:
+        async def execute(goal: Any) -> Any:
+            answered = self._calls.taken(self._full_name, self._type_text, goal.request)
+            result = await await_or_execute(execute_callback, goal)
+            answered(result)
+            return result
+
+        await super()._execute_goal(execute, goal_handle)
 
 
 class PatientSender:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from rclpy.action import ActionServer
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
@@ -50,7 +49,7 @@ from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
 from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED
 from ir_msgs_py.ros.running import run_node
-from ir_msgs_py.ros.serving import BoundedService
+from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -133,7 +132,7 @@ class PlannerNode(Node):
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
         ):
             BoundedService(self, kind, name, ask.guarded(handler), group)
-        self._action = ActionServer(
+        self._action = RecordedActionServer(
             self,
             Plan,
             names.PLAN,

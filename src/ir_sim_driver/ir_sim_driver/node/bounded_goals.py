@@ -12,7 +12,7 @@ import ctypes
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.action import ActionServer
+from ir_msgs_py.ros.serving import RecordedActionServer
 
 _Convert = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
 _api = ctypes.pythonapi
@@ -84,8 +84,8 @@ class _CountedRequest:
         self.as_class: Any = type("CountedRequest", (), own)()
 
 
-class BoundedActionServer(ActionServer):  # type: ignore[misc]  # untyped
-    """An ActionServer of goals that begin with a trajectory; most: points that are converted at most."""
+class BoundedActionServer(RecordedActionServer):
+    """An action server of goals that begin with a trajectory; most: points that are converted at most."""
 
     _is_goal_request_ready: bool
 
