@@ -83,6 +83,7 @@ reports = st.builds(
     min_clearance=st.one_of(numbers, st.just(float("inf"))),
     closest=st.none() | pairs,
     closest_time=lengths,
+    safety_distance=lengths,
     velocity_ratio=arrays(6),
     acceleration_ratio=arrays(6),
     jerk_ratio=arrays(0),

@@ -127,6 +127,11 @@ def test_signals_and_pauses_stand_where_the_program_says(demo: ProgramPlan) -> N
             assert movement.report.energy > 0.0
 
 
+def test_reports_say_the_safety_distance_that_was_planned_with(demo: ProgramPlan) -> None:
+    moving = {m.report.safety_distance for m in demo.movements if not m.is_pause}
+    assert moving == {demo.report.safety_distance} == {PlanOptions().safety_distance}
+
+
 def test_the_same_program_has_the_same_id(demo: ProgramPlan, demo_cell: Cell, power: PowerData) -> None:
     again = planned(load_cell("demo"), power)
     assert again.program_id == demo.program_id

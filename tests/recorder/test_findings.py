@@ -154,8 +154,8 @@ def test_clearance_may_only_lack_what_the_tool_was_off(analysis: Analysis, devia
         (math.nan, False, 0.006, 0.02, "default safety distance (none is recorded) 20.0 mm"),
         (math.nan, True, 0.05, 0.02, "default safety distance (none is recorded) 20.0 mm"),
         (math.nan, True, math.inf, 0.02, "default safety distance (none is recorded) 20.0 mm"),
-        (0.035, True, 0.006, 0.035, "safety distance of the plan 35.0 mm"),
-        (0.001, False, 0.5, 0.001, "safety distance of the plan 1.0 mm"),
+        (0.035, True, 0.006, 0.035, "safety distance of the recording 35.0 mm"),
+        (0.001, False, 0.5, 0.001, "safety distance of the recording 1.0 mm"),
     ],
 )
 def test_clearance_is_held_against_the_safety_distance_it_was_planned_with(
@@ -173,6 +173,17 @@ def test_clearance_is_held_against_the_safety_distance_it_was_planned_with(
         )
         assert check.ok == ok
         assert check.reason.startswith(source)
+
+
+def test_the_safety_distance_of_the_plan_comes_before_that_of_the_recording(analysis: Analysis) -> None:
+    moved = analysis.movements[1]
+    report = replace(moved.step.movement.report, certified=True, min_clearance=0.006, safety_distance=0.005)
+    step = replace(moved.step, movement=replace(moved.step.movement, report=report))
+    near = replace(moved.clearance, least=0.0051)
+    result = replace(moved, step=step, tool_deviation=0.0, clearance=near)
+    (check,) = named(findings(replace(analysis, steps=(result,), safety_distance=0.02)), "clearance on")
+    assert check.ok
+    assert check.reason.startswith("safety distance of the plan 5.0 mm")
 
 
 def test_a_plant_that_is_not_the_model_is_held_against_twice_the_interval(analysis: Analysis) -> None:

@@ -69,7 +69,8 @@ class TrajectoryReport:
     energy_low to energy_high (from the uncertainty of power_parameters), joint_energy (n,) at the DC bus
     (signed), base_energy of controller, drives and tool, burnt_energy in the brake resistor [J];
     peak_power [W]; min_clearance [m] over all pairs without an allowed contact (inf: no pair), closest:
-    that pair at closest_time [s]; *_ratio (n,): largest used share of each joint's limit; path_length of
+    that pair at closest_time [s]; safety_distance: S_m [m] that it was planned or judged with, 0 where
+    nobody said; *_ratio (n,): largest used share of each joint's limit; path_length of
     the tcp [m]; certified: clearance and limits proved for every instant, in the cell of cell_hash and with
     this load; contacts: pairs that were allowed their own safety distance. torque_reserve:
     share of the torque envelope that was left to the feedback.
@@ -87,6 +88,7 @@ class TrajectoryReport:
     min_clearance: float = float("inf")
     closest: DistancePair | None = None
     closest_time: float = 0.0
+    safety_distance: float = 0.0
     velocity_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
     acceleration_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
     jerk_ratio: FloatArray = field(default_factory=lambda: _zeros(0))
@@ -102,7 +104,9 @@ class TrajectoryReport:
     def __post_init__(self) -> None:
         for name in ("duration", "burnt_energy", "path_length", "torque_reserve"):
             set_field(self, name, at_least(getattr(self, name), 0.0, name))
-        for name in ("movement_cost", "energy", "base_energy", "peak_power", "closest_time", *_INTERVAL):
+        for name in ("movement_cost", "energy", "base_energy", "peak_power", "closest_time"):
+            set_field(self, name, finite(getattr(self, name), name))
+        for name in ("safety_distance", *_INTERVAL):
             set_field(self, name, finite(getattr(self, name), name))
         set_field(self, "min_clearance", not_nan(self.min_clearance, "min_clearance", "m"))
         joints = np.shape(self.joint_energy)[:1] or (0,)

@@ -32,6 +32,7 @@ _NUMBERS = (
     "peak_power",
     "min_clearance",
     "closest_time",
+    "safety_distance",
     "path_length",
     "torque_reserve",
 )

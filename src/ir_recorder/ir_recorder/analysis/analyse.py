@@ -58,7 +58,7 @@ class _Analyser:
             peak_power=float(power.power.max()) if power is not None else NAN,
             steps=results,
             program=program_totals(results, meter, self._unshortened(results, meter, cell)),
-            safety_distance=self._safety_distance(),
+            safety_distance=self._safety_distance(results),
             stations=station_uses(results),
             modes=mode_shares(power) if power is not None else (),
             grid=check_grid(recording.joints, power) if recording.joints is not None else None,
@@ -76,7 +76,11 @@ class _Analyser:
             self.problems.append(f"the attached cell can't be read: {error}")
             return None
 
-    def _safety_distance(self) -> float:
+    def _safety_distance(self, results: tuple[StepResult, ...]) -> float:
+        """The least S_m that a movement was planned with; of plans that say none the one among the facts."""
+        said = [result.step.movement.report.safety_distance for result in results]
+        if planned := [distance for distance in said if distance > 0.0]:
+            return min(planned)
         fact = self.recording.fact(contents.SAFETY_DISTANCE).removesuffix("m")
         try:
             return float(fact) if fact else NAN

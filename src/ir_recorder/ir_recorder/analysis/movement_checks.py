@@ -107,11 +107,14 @@ def _clearance(name: str, result: StepResult, recorded: float, bounds: Tolerance
 def kept_distance(result: StepResult, recorded: float, bounds: Tolerances) -> tuple[float, str]:
     """The distance [m] that the executed clearance is held against, and its source.
 
-    S_m as it was recorded; else the clearance of a certified plan that comes nearer than the default S_m.
+    S_m that the plan's report says, else the one among the facts; else the clearance of a certified plan that
+    comes nearer than the default S_m.
     """
-    if not math.isnan(recorded):
-        return recorded, "safety distance of the plan"
     planned = result.step.movement.report
+    if planned.safety_distance > 0.0:
+        return planned.safety_distance, "safety distance of the plan"
+    if not math.isnan(recorded):
+        return recorded, "safety distance of the recording"
     if planned.certified and planned.min_clearance < bounds.safety_distance:
         return planned.min_clearance, "clearance of the certified plan"
     return bounds.safety_distance, "default safety distance (none is recorded)"

@@ -59,7 +59,7 @@ def _interval(message: Any) -> tuple[float, float]:
 
 def report_from(message: Any) -> TrajectoryReport:
     """A TrajectoryReport of its decoded message; what recordings of before don't have keeps its default."""
-    later = ("energy_low", "energy_high", "power_parameters", "torque_reserve")
+    later = ("energy_low", "energy_high", "power_parameters", "torque_reserve", "safety_distance")
     return TrajectoryReport(
         **{name: getattr(message, name) for name in later if hasattr(message, name)},
         duration=message.duration,
