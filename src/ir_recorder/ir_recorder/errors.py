@@ -10,6 +10,7 @@
     ├── NothingRecordedError   a recording was asked to end, and none is in progress
     ├── ReadError        not a recording at all, or nothing in it that could be read
     ├── TraceError       measured data that make no sense, with the line and the column
+    ├── CostsError       a file of prices that makes no sense, with the key
     └── FitError         data that a fit can't use
 """
 
@@ -44,6 +45,10 @@ class ReadError(RecorderError):
 
 class TraceError(RecorderError):
     """Measured data that make no sense; the sentence names the file, the line and the column."""
+
+
+class CostsError(RecorderError):
+    """Prices and shifts that make no sense; the sentence names the file and the key."""
 
 
 class FitError(RecorderError):

@@ -13,6 +13,7 @@ from ir_recorder.arguments import add_roots
 from ir_recorder.errors import RecorderError
 from ir_recorder.read.reader import read_recording
 from ir_recorder.report import write_report
+from ir_recorder.report.costs import read_costs
 from ir_recorder.report.picture import write_picture
 
 
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
     parser.add_argument("--namespace", help="of the cell, where the recording holds several")
     add_roots(parser)
+    parser.add_argument("--costs", default="", help="prices, shifts and CO2 (YAML); else as assumed")
     parser.add_argument("--picture", default="", help="picture to write as well (.png)")
 
 
@@ -33,7 +35,9 @@ def run(options: argparse.Namespace) -> int:
     analysis = analyse(read_recording(options.file, roots, namespace=options.namespace))
     for problem in analysis.problems:
         sys.stderr.write(f"{options.file}: {problem}\n")
-    sys.stdout.write(f"{write_report(analysis, findings(analysis), options.output, roots=roots)}\n")
+    costs = read_costs(options.costs, roots) if options.costs else None
+    page = write_report(analysis, findings(analysis), options.output, roots=roots, costs=costs)
+    sys.stdout.write(f"{page}\n")
     if options.picture:
         sys.stdout.write(f"{write_picture(analysis, options.picture, roots)}\n")
     return 0

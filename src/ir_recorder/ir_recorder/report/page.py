@@ -12,9 +12,12 @@ from ir_description import load_power_data
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.report.charts import CHARTS
+from ir_recorder.report.costs import Costs
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import notes, source, subtitle, tiles, verdict
+from ir_recorder.report.lever_table import lever_section
+from ir_recorder.report.money import costs_section
 from ir_recorder.report.tables import check_table
 from ir_recorder.report.words import joules, text
 
@@ -29,17 +32,23 @@ def write_report(
     path: str | Path,
     tolerances: Tolerances | None = None,
     roots: FileRoots = ANYWHERE,
+    costs: Costs | None = None,
 ) -> Path:
     """Writes the page below `roots`, in place of another page but of no other file; its absolute path.
 
     PathError when it can't be written.
     """
-    page = report_html(analysis, checks, tolerances).encode()
+    page = report_html(analysis, checks, tolerances, costs).encode()
     return write_output(path, page, PAGE_START, roots)
 
 
-def report_html(analysis: Analysis, checks: Sequence[Finding], tolerances: Tolerances | None = None) -> str:
-    """The page as text, with the checks to show.
+def report_html(
+    analysis: Analysis,
+    checks: Sequence[Finding],
+    tolerances: Tolerances | None = None,
+    costs: Costs | None = None,
+) -> str:
+    """The page as text, with the checks to show; without `costs` with those that are assumed.
 
     The chart of clearances shows the recorded safety distance, else that of the tolerances.
     """
@@ -55,6 +64,8 @@ def report_html(analysis: Analysis, checks: Sequence[Finding], tolerances: Toler
         "notes": notes(analysis),
         "tiles": tiles(analysis),
         "capacity": text(joules(load_power_data().dc_link_capacity_energy)),
+        "costs": costs_section(analysis, costs or Costs()),
+        "levers": lever_section(analysis, costs or Costs()),
         "checks": check_table(checks),
         "style": _asset("page.css"),
         "data": page_data(analysis, drawn),

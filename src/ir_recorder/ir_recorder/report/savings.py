@@ -32,7 +32,7 @@ def savings_section(analysis: Analysis) -> str:
         '<section id="savings"><h2>What the program saves</h2>'
         '<p class="hint">Predicted energies at the mains, over the same seconds, with the 90 % interval of '
         "what is saved; nothing here is simulated or measured.</p>"
-        f"{table(heads, cells)}"
+        f"{table(heads, cells, 'What the program saves')}"
         f'<p class="hint">{text(savings.sentence)}; program {text(savings.program_id)}.</p></section>'
     )
 

@@ -27,21 +27,26 @@ MOST_WARNINGS = 100  # a node that repeats itself must not fill the page
 LONGEST_TEXT = 500  # characters of one warning
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
-    """A table; cells are HTML. A head that starts with ">" is a column of numbers."""
-    columns = "".join(f"<th{_number(head)}>{text(head.lstrip('>'))}</th>" for head in heads)
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = "") -> str:
+    """A table; cells are HTML. A head that starts with ">" is a column of numbers.
+
+    caption: for screen readers, and the name of the CSV file that the page writes of it.
+    """
+    columns = "".join(f'<th scope="col"{_number(head)}>{text(head.lstrip(">"))}</th>' for head in heads)
     body = "".join(f"<tr>{_cells(heads, row)}</tr>" for row in rows)
     if not body:
         return '<p class="empty">Nothing was recorded.</p>'
     head = f"<thead><tr>{columns}</tr></thead>"
-    return f'<div class="scroll"><table class="{kind}">{head}<tbody>{body}</tbody></table></div>'
+    named = f'<caption class="unseen">{text(caption)}</caption>'
+    return f'<div class="scroll"><table class="{kind}">{named}{head}<tbody>{body}</tbody></table></div>'
 
 
 def step_table(analysis: Analysis) -> str:
     """Every step: predicted, with its 90 % interval, against simulated or measured."""
     found = f">{analysis.recording.origin}"
     heads = ("#", "step", "load", ">time", ">predicted", found, ">deviation", ">mean power", ">clearance")
-    return table((*heads, ">tool deviation"), (_step(result) for result in analysis.steps))
+    rows = (_step(result) for result in analysis.steps)
+    return table((*heads, ">tool deviation"), rows, "Steps of the program")
 
 
 def _step(result: StepResult) -> tuple[str, ...]:
@@ -92,7 +97,7 @@ def measurement_table(both: Agreement) -> str:
         ">from torques",
         ">by Pinocchio's torques",
     )
-    return table(heads, rows) + f"<p>{text(both.sentence)}.</p>"
+    return table(heads, rows, "Two measurements") + f"<p>{text(both.sentence)}.</p>"
 
 
 def station_table(analysis: Analysis) -> str:
@@ -109,7 +114,8 @@ def station_table(analysis: Analysis) -> str:
     other = analysis.elsewhere
     if math.isfinite(other.energy):
         rows.append((text(other.name), DASH, DASH, DASH, f"{other.seconds:.1f} s", joules(other.energy)))
-    return table(("station", ">travel to it", ">service movements", ">pauses", ">time", ">energy"), rows)
+    heads = ("station", ">travel to it", ">service movements", ">pauses", ">time", ">energy")
+    return table(heads, rows, "Stations")
 
 
 def mode_table(analysis: Analysis) -> str:
@@ -125,7 +131,7 @@ def mode_table(analysis: Analysis) -> str:
         )
         for share in sorted(analysis.modes, key=lambda share: -share.energy)
     ]
-    return table(("mode", ">time", ">energy", ">mean", ""), rows)
+    return table(("mode", ">time", ">energy", ">mean", ""), rows, "Power modes")
 
 
 def resting_table(analysis: Analysis) -> str:
@@ -143,7 +149,7 @@ def resting_table(analysis: Analysis) -> str:
     ]
     found = f">{analysis.recording.origin}"
     heads = ("mode and load at machine home", ">by the data", found, ">deviation", ">Table II", ">over")
-    return table(heads, rows)
+    return table(heads, rows, "Power at rest")
 
 
 def check_table(findings: Sequence[Finding]) -> str:
@@ -152,10 +158,10 @@ def check_table(findings: Sequence[Finding]) -> str:
     held = [f for f in findings if f.ok]
     rows = [_check(f) for f in sorted(shown, key=lambda f: f.verdict is not Verdict.FAILS)]
     heads = ("", "check", ">found", ">allowed", ">expected", "reason of the bound", "note")
-    top = table(heads, rows, "checks") if rows else ""
+    top = table(heads, rows, "Checks that fail or were not made", "checks") if rows else ""
     if not held:
         return top or '<p class="empty">Nothing was checked.</p>'
-    below = table(heads, [_check(f) for f in held], "checks")
+    below = table(heads, [_check(f) for f in held], "Checks that hold", "checks")
     count = f"{len(held)} checks hold" if len(held) > 1 else "1 check holds"
     return f"{top}<details><summary>{count}</summary>{below}</details>"
 
@@ -175,7 +181,7 @@ def _check(finding: Finding) -> tuple[str, ...]:
 
 def fact_table(analysis: Analysis) -> str:
     """Facts and topics of the file."""
-    facts = table(("fact", "value"), ((text(k), text(v)) for k, v in analysis.recording.facts))
+    facts = table(("fact", "value"), ((text(k), text(v)) for k, v in analysis.recording.facts), "Facts")
     topics = table(
         ("topic", "type", ">messages", ">per second"),
         (
@@ -187,6 +193,7 @@ def fact_table(analysis: Analysis) -> str:
             )
             for t in sorted(analysis.recording.topics, key=lambda topic: topic.name)
         ),
+        "Topics",
     )
     return facts + topics
 
@@ -199,7 +206,7 @@ def warning_table(analysis: Analysis) -> str:
     rows = [(f"{w.time:.2f} s", text(w.name), text(w.text[:LONGEST_TEXT])) for w in warnings[:MOST_WARNINGS]]
     more = len(warnings) - MOST_WARNINGS
     left = f'<p class="empty">{more} more in the recording.</p>' if more > 0 else ""
-    return table((">time", "node", "text"), rows) + left
+    return table((">time", "node", "text"), rows, "Warnings in the log") + left
 
 
 def problem_list(problems: Sequence[str]) -> str:

@@ -26,6 +26,14 @@ def watts(value: float) -> str:
     return f"{value:,.0f} W".replace(",", " ") if abs(value) >= 10.0 else f"{value:.1f} W"
 
 
+def kilowatt_hours(value: float) -> str:
+    """Joules as kWh with three significant digits, whole ones from 100 on."""
+    if not math.isfinite(value):
+        return DASH
+    kwh = value / 3.6e6
+    return f"{kwh:,.0f} kWh".replace(",", " ") if abs(kwh) >= 100.0 else f"{kwh:.3g} kWh"
+
+
 def seconds(value: float) -> str:
     """Seconds with two decimals, from ten minutes on as minutes."""
     if not math.isfinite(value):

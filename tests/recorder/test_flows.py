@@ -1,0 +1,86 @@
+"""Energy flows balance at every node, and a Sankey diagram of them is as wide as its joules."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ir_recorder import Analysis, analyse
+from ir_recorder.analysis.flows import EnergyFlows, energy_flows
+from ir_recorder.analysis.levers import levers
+from ir_recorder.report.sankey import TALL, rows, sankey, sankey_section
+
+OF_READINGS = 1.0  # J: the program's ends lie between two readings of the meter
+OF_SAMPLING = 0.02  # of the axes' energy: joint states and readings of the meter are not at the same instants
+JOULES = st.floats(1.0, 1e6)
+
+
+def test_the_mains_are_those_of_the_program(analysis: Analysis) -> None:
+    flows, program = energy_flows(analysis), analysis.program
+    assert flows is not None
+    assert program is not None
+    assert flows.mains == pytest.approx(program.whole.energy, rel=0.01)
+    assert flows.mains == pytest.approx(flows.controller + flows.tool + flows.rectifier + flows.from_mains)
+
+
+def test_friction_and_losses_are_those_of_the_data(analysis: Analysis) -> None:
+    """By the friction and the copper losses of the robot's data, which `energy_flows` doesn't read."""
+    flows, joints, cell = energy_flows(analysis), analysis.recording.joints, analysis.cell
+    assert flows is not None
+    assert joints is not None
+    assert cell is not None
+    moving = np.zeros(len(joints.time), bool)
+    for result in analysis.movements:
+        moving |= (joints.time >= result.step.start) & (joints.time <= result.step.end)
+    speed, robot = np.abs(joints.velocity[moving]), cell.robot
+    friction = speed**2 @ robot.friction_viscous + speed @ robot.friction_coulomb
+    assert flows.friction == pytest.approx(friction.sum() * 0.002, abs=OF_SAMPLING * flows.taken)
+    heat = (joints.effort[moving] / robot.gear_ratio) ** 2 @ robot.copper_loss
+    assert flows.motors >= heat.sum() * 0.002 - OF_SAMPLING * flows.taken
+
+
+def test_what_is_lifted_comes_down_again_on_the_path_home(analysis: Analysis) -> None:
+    flows = energy_flows(analysis)
+    assert flows is not None
+    assert flows.lifted > 0.0
+    assert flows.lowered > 0.0
+
+
+def test_without_a_meter_there_are_no_flows_and_no_levers(analysis: Analysis) -> None:
+    bare = analyse(replace(analysis.recording, power=None))
+    assert energy_flows(bare) is None
+    assert sankey_section(bare) == ""
+    assert levers(bare) == ()
+
+
+def test_levers_are_at_most_the_joules_of_the_run(analysis: Analysis) -> None:
+    found, program = levers(analysis), analysis.program
+    assert program is not None
+    assert 1 <= len(found) <= 5
+    assert all(0.0 < lever.joules <= program.whole.energy for lever in found)
+    assert [lever.joules for lever in found] == sorted((x.joules for x in found), reverse=True)
+
+
+@given(JOULES, JOULES, JOULES, JOULES, JOULES, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_every_node_gives_what_it_takes(
+    base: float, tool: float, taken: float, lifted: float, resistor: float, back: float, lowered: float
+) -> None:
+    returned = back * taken
+    mains = base + tool + taken + resistor - returned
+    flows = EnergyFlows(
+        mains, base, tool, 0.0, taken, returned, resistor, 0.0, lifted * 0.01, lifted * 0.01 * lowered
+    )
+    for node in ("DC bus", "axes"):
+        into = sum(value for _, to, value in rows(flows) if to in (node, f"back to the {node}"))
+        out = sum(value for source, _, value in rows(flows) if source == node)
+        assert into == pytest.approx(out, rel=1e-9, abs=1e-6 * mains)
+    drawn = sankey(flows)
+    assert drawn.startswith("<svg")
+    assert "nan" not in drawn
+    heights = [float(high) for high in re.findall(r'<rect[^>]* height="([\d.]+)"', drawn)]
+    assert max(heights) <= TALL + 0.1
