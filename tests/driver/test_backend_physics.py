@@ -14,7 +14,8 @@ from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings
-from ir_sim_driver.plant import nominal_plant
+from ir_sim_driver.plant import nominal_plant, typical_plant
+from ir_sim_driver.plant.bullet_arm import BulletArm
 from ir_sim_driver.plant.drivetrain import Drivetrain
 from ir_sim_driver.plant.gears import Gears
 from ir_sim_driver.plant.ideal_backend import IdealBackend
@@ -41,7 +42,11 @@ def test_centres_of_mass_are_where_the_chain_puts_them(backend, cell):
         poses = chain.link_poses(q[None])[0]
         for link in range(1, 7):
             position = backend.link_com_position(link)
-            expected = poses[link] @ np.append(robot.link_com[link], 1.0)
+            com = robot.link_com[link]
+            if link == 6:  # one body with its load
+                m, tool = robot.link_mass[link], cell.tool
+                com = (m * com + tool.mass * tool.com) / (m + tool.mass)
+            expected = poses[link] @ np.append(com, 1.0)
             assert np.abs(position - expected[:3]).max() < POSITION_TOLERANCE
 
 
@@ -61,9 +66,9 @@ def test_a_tilted_base_turns_gravity(cell, make):
     simulation = make_simulation(replace(cell, base_pose=tilted), backend="pybullet")
     q = simulation.backend.q[None]
     assert np.abs(simulation.backend.bias() - simulation.dynamics.gravity(q)[0]).max() < TORQUE_TOLERANCE
-    position = simulation.backend.link_com_position(6)
-    pose = Chain(cell.robot, tilted).link_poses(q)[0, 6]
-    assert np.abs(position - (pose @ np.append(cell.robot.link_com[6], 1.0))[:3]).max() < POSITION_TOLERANCE
+    position = simulation.backend.link_com_position(5)
+    pose = Chain(cell.robot, tilted).link_poses(q)[0, 5]
+    assert np.abs(position - (pose @ np.append(cell.robot.link_com[5], 1.0))[:3]).max() < POSITION_TOLERANCE
 
 
 def test_a_lopsided_load_reaches_the_joints(cell, make):
@@ -170,3 +175,18 @@ def test_ideal_torques_of_a_batch_equal_those_of_single_steps(cell):
         torques.append(single.torque.copy())
     assert np.allclose(batch.work().torque, torques)
     assert np.allclose(single.work().torque, torques)
+
+
+def test_bullet_computes_with_every_plant_and_load_and_prints_nothing(cell, capfd):
+    data, generator, home = load_power_data(), np.random.default_rng(7), np.array(cell.machine_home)
+    for seed in range(30):
+        plant = typical_plant(cell.robot, data, seed)
+        spread = generator.normal(size=(3, 3))
+        inertia = np.sum(spread**2) * np.eye(3) - spread @ spread.T  # of three points of 1 kg
+        load = Load("lopsided", "tool", 40.0 * generator.random(), generator.normal(size=3), inertia)
+        arm = BulletArm(plant.robot, 0.001, np.eye(4))
+        arm.carry((load,), home.tolist())
+        H = DynamicsModel(plant.robot, (load,)).mass_matrix(home[None])[0]
+        assert np.abs(arm.mass_matrix(home.tolist()) - H).max() < 1e-9 * np.abs(H).max(), seed
+        arm.close()
+    assert capfd.readouterr() == ("", "")

@@ -55,7 +55,7 @@ def test_a_seed_draws_the_same_plant_again_and_another_one_another(cell, data):
 def test_typical_figures_stay_as_near_to_the_data_as_their_marks_say(cell, data):
     nominal, drawn = cell.robot, [typical_plant(cell.robot, data, seed) for seed in range(40)]
     masses = np.array([plant.robot.link_mass / nominal.link_mass - 1.0 for plant in drawn])
-    assert np.abs(masses[:, :4]).max() <= CUT * SPREAD["H"] + 1e-5  # masses have 17 bits
+    assert np.abs(masses[:, :4]).max() <= CUT * SPREAD["H"] + 1e-12
     assert masses[:, 1].std() == pytest.approx(SPREAD["H"], rel=0.4)
     friction = np.array([plant.gears.coulomb / nominal.friction_coulomb - 1.0 for plant in drawn])
     assert friction.std() == pytest.approx(SPREAD["M"], rel=0.2)

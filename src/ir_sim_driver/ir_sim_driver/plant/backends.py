@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ir_description import Cell, load_power_data, robot_urdf
+from ir_description import Cell, load_power_data
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant.backend import Backend
 from ir_sim_driver.plant.control import ControlSettings
@@ -14,7 +14,7 @@ from ir_sim_driver.plant.pybullet_backend import PyBulletBackend
 
 
 def _pybullet(cell: Cell, dt: float, control: ControlSettings, plant: Plant) -> Backend:
-    return PyBulletBackend(plant, cell.robot, dt, robot_urdf, cell.base_pose, control)
+    return PyBulletBackend(plant, cell.robot, dt, cell.base_pose, control)
 
 
 def _ideal(cell: Cell, dt: float, control: ControlSettings, plant: Plant) -> Backend:

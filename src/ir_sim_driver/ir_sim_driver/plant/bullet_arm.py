@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from ir_description import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import BackendError
-from ir_sim_driver.plant.bullet_inertia import ATTEMPTS, nudged, nudged_robot, solid
+from ir_sim_driver.plant.bullet_bodies import bodies_of, urdf_of
 
 GRAVITY = 9.80665
 SPEED_GUARD = 50.0
@@ -21,24 +21,18 @@ SPEED_GUARD = 50.0
 class BulletArm:
     """Links of `robot` standing at base_pose (4, 4), stepped by dt [s].
 
-    urdf: makes the URDF text of the robot with a tuple of loads.
     Raises BackendError when PyBullet is missing or has diverged.
     """
 
-    def __init__(
-        self,
-        robot: RobotModel,
-        dt: float,
-        urdf: Callable[[RobotModel, tuple[Load, ...]], str],
-        base_pose: FloatArray,
-    ) -> None:
+    def __init__(self, robot: RobotModel, dt: float, base_pose: FloatArray) -> None:
         # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no base pose
         self._base = base_pose
         self._gravity = (base_pose[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
         self._bullet, self._client = _pybullet(), -1
-        self._robot, self._dt, self._urdf = robot, dt, urdf
+        self._robot, self._dt = robot, dt
         self._loads: tuple[Load, ...] = ()
-        self._still = [0.0] * len(robot.joint_names)
+        self._still = [0.0] * robot.n
+        self._joints = list(range(robot.n))
 
     def close(self) -> None:
         """Let go of the physics server."""
@@ -50,22 +44,10 @@ class BulletArm:
             self.carry(self._loads, self._still)
 
     def carry(self, loads: Sequence[Load], q: Sequence[float]) -> None:
-        """Rebuild the robot with these loads. Raises BackendError where Bullet takes none of their inertia.
-
-        Bullet turns an inertia into the frame of a link, and refuses to compute with it where rounding has
-        left it unsymmetrical by one bit: then it is tried with one that differs by parts in a billion.
-        """
-        bodies = [solid(load) for load in loads]
-        for attempt in range(ATTEMPTS):
-            self._loads = tuple(nudged(load, attempt) for load in bodies)
-            self._build(nudged_robot(self._robot, attempt))
-            try:
-                self.inverse_dynamics(q, self._still, self._still)
-                return
-            except BackendError:
-                continue
-        names = ", ".join(load.name for load in loads)
-        raise BackendError(f"PyBullet cannot compute with the inertia of {names or 'the robot'}")
+        """Rebuild the robot with these loads. Raises BackendError where Bullet can't compute with it."""
+        self._loads = tuple(loads)
+        self._build(urdf_of(self._robot, bodies_of(self._robot, self._loads)))
+        self.inverse_dynamics(q, self._still, self._still)
 
     def mass_matrix(self, q: Sequence[float]) -> FloatArray:
         """H (n, n) at q, without rotor inertia."""
@@ -77,7 +59,7 @@ class BulletArm:
         return np.array(self._call(self._bullet.calculateInverseDynamics, self._body, q, qd, qdd))
 
     def link_com_position(self, link: int) -> FloatArray:
-        """Centre of mass (3,) of link 1..n in the world [m].
+        """Centre of mass (3,) of link 1..n in the world [m], the last one's with its loads.
 
         Bullet keeps this frame in double precision, the link frame itself only in single.
         """
@@ -109,11 +91,11 @@ class BulletArm:
             raise BackendError(f"the physics has diverged: a joint moves faster than {SPEED_GUARD:g} rad/s")
         return np.array([state[0] for state in states]), np.array(speeds)
 
-    def _build(self, robot: RobotModel) -> None:
+    def _build(self, text: str) -> None:
         """Make a new server: the inverse dynamics of a removed body live on in the old one. Where that is not
         possible the old one stays.
         """
-        text, old = self._urdf(robot, self._loads), self._client
+        old = self._client
         self._client = _connect(self._bullet, self._dt, self._gravity)
         try:
             self._body = self._load(text)
@@ -139,7 +121,6 @@ class BulletArm:
         """Take from the body what Bullet adds: damping, collisions, motors."""
         bullet, client = self._bullet, self._client
         undamped = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0.0)
-        self._joints = self._movable_joints()
         for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
             bullet.changeDynamics(self._body, link, **undamped, physicsClientId=client)
             bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=client)
@@ -147,13 +128,6 @@ class BulletArm:
             bullet.setJointMotorControl2(
                 self._body, joint, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client
             )
-
-    def _movable_joints(self) -> list[int]:
-        by_name = {}
-        for joint in range(self._bullet.getNumJoints(self._body, physicsClientId=self._client)):
-            info = self._bullet.getJointInfo(self._body, joint, physicsClientId=self._client)
-            by_name[info[1].decode()] = joint
-        return [by_name[name] for name in self._robot.joint_names]
 
     def _call(self, function: Any, *arguments: Any, **more: Any) -> Any:
         try:

@@ -8,7 +8,7 @@ the links.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg.lapack import dposv
@@ -32,7 +32,6 @@ _NEWTON, _ITERATIONS = 4, 16  # steps of Newton's method for it, and with those 
 class PyBulletBackend:
     """Implements Backend for the plant of `model`, the robot as its controller knows it, at base_pose (4, 4).
 
-    urdf: makes the URDF text of the robot with a tuple of loads.
     Raises BackendError when PyBullet is missing or has diverged.
     """
 
@@ -41,12 +40,11 @@ class PyBulletBackend:
         plant: Plant,
         model: RobotModel,
         dt: float,
-        urdf: Callable[[RobotModel, tuple[Load, ...]], str],
         base_pose: FloatArray | None = None,
         control: ControlSettings | None = None,
     ) -> None:
         base = np.eye(4) if base_pose is None else np.array(base_pose)
-        self._arm = BulletArm(plant.robot, dt, urdf, base)
+        self._arm = BulletArm(plant.robot, dt, base)
         self._dt, self._n = dt, len(plant.robot.joint_names)
         self._drives, self._gears = Drivetrain(plant.robot), Gears(plant.gears, dt)
         self._diagonal = slice(None, None, self._n + 1)

@@ -34,11 +34,6 @@ SUPPLY = 0.02
 THRESHOLDS = 0.01
 """Standard deviation of the chopper's voltages, as a share: they are set by resistors of 1 %."""
 
-BITS = 17
-"""Of masses and centres, relative 4e-6: products of three are exact then, in any order. Bullet refuses
-inertias that rounding has left unsymmetrical.
-"""
-
 INVERTER_SHARE = 0.35
 """Of the holding losses that the data, calibrated at the mains, call copper: the part of the inverter."""
 SWITCHING = 10.0
@@ -103,7 +98,6 @@ def _robot(robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> RobotMod
         mass[i] *= draw.one(marks[f"{place}.mass_kg"])
         com[i] += LINK_SIZE * (draw.mark(marks[f"{place}.com_m"], 3) - 1.0)
         inertia[i] *= draw.one(marks[f"{place}.inertia_kgm2"])
-    mass, com = _short(mass), _short(com)
     rotors = robot.reflected_inertia * draw.mark(marks["drives.reflected_inertia_kgm2"], robot.n)
     spring = robot.counterbalance
     if spring is not None:
@@ -117,13 +111,6 @@ def _robot(robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> RobotMod
         reflected_inertia=rotors,
         counterbalance=spring,
     )
-
-
-def _short(figures: FloatArray) -> FloatArray:
-    """The figures to BITS bits."""
-    mantissa, exponent = np.frexp(figures)
-    short: FloatArray = np.ldexp(np.round(np.ldexp(mantissa, BITS)), exponent - BITS)
-    return short
 
 
 def _drives(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> DriveFigures:
