@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 
 from ir_description import Body, Cell
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.contact import Contact, MachineState
 from ir_sim_driver.controller.contact import LONGEST, ContactWatch, Touch
 from ir_sim_driver.controller.contact_scene import ContactScene
+from ir_sim_driver.controller.keep import Keep
 from ir_sim_driver.controller.machines import SOON, Machines
 from ir_sim_driver.controller.parts import Parts
 from ir_sim_driver.controller.safety import Safety
@@ -133,10 +133,9 @@ class CellWatch:
         with self._changed:
             self._changed.wait_for(lambda: not self._machines.soon(states, self._now()), _PATIENCE)
 
-    def asked(self, station: str) -> tuple[ContactScene, FloatArray]:
-        """The scene of now, and the distances (Z,) that a trajectory of this station must keep in it."""
-        scene = self._scene
-        return scene, self._contacts.asked(scene, station)
+    def asked(self, station: str) -> Keep:
+        """What a trajectory of this station must keep clear of now."""
+        return self._contacts.asked(self._scene, station)
 
     # -- stepped --------------------------------------------------------------------------------------------
 

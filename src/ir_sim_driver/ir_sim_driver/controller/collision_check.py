@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from ir_kernels.collision import COLLIDES, FREE
 from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.controller.contact_scene import ContactScene
+from ir_sim_driver.controller.keep import Keep, Piece
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Path
 
@@ -16,37 +18,43 @@ CHECK_TIME = 20.0  # s of processor time: 20 000 points take some 0.02 s
 _PIECES = 200  # segments that are proved together
 
 
-def check_collision(
-    path: Path, segments: slice, offset: float, scene: ContactScene, threshold: FloatArray
-) -> None:
-    """Prove that every pair keeps its distance (Z,) along some segments of a path; offset [s]: of its
-    trajectory's time 0. Raises TrajectoryRefusedError.
+def check_collision(path: Path, segments: slice, offset: float, keep: Keep) -> None:
+    """Prove that every pair keeps its distance along some segments of a path; offset [s]: of its trajectory's
+    time 0. Raises TrajectoryRefusedError.
     """
-    coefficients, durations = path.coefficients[segments], path.durations[segments]
     begin = float(np.sum(path.durations[: segments.start or 0]))
+    if len(path.durations[segments]) == 0:
+        _check_point(path.start, keep)
+        return
     started = time.thread_time()
-    if len(durations) == 0:
-        _check_point(path.start, scene, threshold)
-    for first in range(0, len(durations), _PIECES):
-        piece = slice(first, first + _PIECES)
-        found = scene.model.certify_trajectory(coefficients[piece], durations[piece], threshold)
+    for piece in _bounded(keep.pieces(path.coefficients[segments], path.durations[segments])):
+        found = keep.scene.model.certify_trajectory(*piece)
         if found.verdict != FREE:
             at = begin + found.interval[1]
-            raise _refused(path.position(at), at - offset, found.verdict, found.pair, scene)
+            raise _refused(path.position(at), at - offset, found.verdict, found.pair, keep.scene)
+        begin += float(piece.durations.sum())
         if time.thread_time() - started > CHECK_TIME:
             raise TrajectoryRefusedError(
                 ErrorCode.INVALID_GOAL,
                 f"the trajectory could not be proved free of collisions within {CHECK_TIME:g} s of processor "
-                f"time: it was up to {begin + float(durations[piece].sum()) - offset:.3f} s",
+                f"time: it was up to {begin - offset:.3f} s",
             )
-        begin += float(durations[piece].sum())
 
 
-def _check_point(q: FloatArray, scene: ContactScene, threshold: FloatArray) -> None:
-    near = scene.model.min_distance(q[None], threshold)
+def _bounded(pieces: Iterable[Piece]) -> Iterator[Piece]:
+    """The pieces in parts of at most _PIECES segments."""
+    for piece in pieces:
+        for first in range(0, len(piece.durations), _PIECES):
+            part = slice(first, first + _PIECES)
+            yield Piece(piece.coefficients[part], piece.durations[part], piece.thresholds)
+
+
+def _check_point(q: FloatArray, keep: Keep) -> None:
+    threshold = keep.at(q)
+    near = keep.scene.model.min_distance(q[None], threshold)
     z = int(near.pair[0])
     if z >= 0 and near.distance[0] <= threshold[z]:
-        raise _refused(q, 0.0, COLLIDES, z, scene)
+        raise _refused(q, 0.0, COLLIDES, z, keep.scene)
 
 
 def _refused(q: FloatArray, at: float, verdict: int, z: int, scene: ContactScene) -> TrajectoryRefusedError:

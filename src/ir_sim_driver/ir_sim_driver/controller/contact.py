@@ -1,9 +1,11 @@
 """Does the robot touch what it may not? Looked at as often as its speed and the clearance ask for.
 
 After a look that found the clearance d the next one is due before any surface can have moved by d: with v the
-speed bound of all surfaces now and A that of their acceleration, v T + A T^2 / 2 = d. Near things that is
-every step. A pair that touches when the scene changes, or when the robot recovers, may go on touching, but no
-deeper: whoever is in contact may only leave it.
+speed bound of all surfaces now and A that of their acceleration, v T + A T^2 / 2 = d. A is what motors and
+gravity can do at most, whoever supervises them. Near things that is every step.
+
+A pair that touches when the scene changes, or when the robot recovers, may go on touching, but no deeper:
+whoever is in contact may only leave it.
 """
 
 from __future__ import annotations
@@ -19,13 +21,17 @@ from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.contact import Contact
 from ir_msgs_py.report import DistancePair
 from ir_sim_driver.controller.contact_scene import ALLOWED_DEPTH, ContactScene
+from ir_sim_driver.controller.keep import Keep
 from ir_sim_driver.plant import Backend
 
 LONGEST = 100  # steps between two looks, however far everything is
 _FAR = 10.0  # m: as far as nothing gets within LONGEST
 STIFFNESS = 1e6  # N/m of the arm at its tool: 1 N per micrometre, what robots of this size are measured at
 _RELEASE = 5e-4  # m that a pair in contact may go deeper: opening brakes let the arm settle
-_HARDER = 2.0  # times the acceleration limits: the supervision stops whoever reaches that
+HARDEST = 6.0
+"""Times the acceleration limits: the torque envelope and gravity give a surface 4.1 times (the largest over
+random states, loads and plants), in every mode: driven, falling, braking.
+"""
 _FRESH = 0.5  # share of the clearance that a bound may use up before distances are computed again
 
 
@@ -103,7 +109,7 @@ class ContactWatch:
     """Watches a robot with these acceleration limits (n,), stepped by dt [s]. due: step of the next look."""
 
     def __init__(self, acceleration_max: FloatArray, dt: float) -> None:
-        self._hardest: FloatArray = _HARDER * np.asarray(acceleration_max)
+        self._hardest: FloatArray = HARDEST * np.asarray(acceleration_max)
         self._dt = dt
         self.due = 0
         self._scene: ContactScene | None = None
@@ -156,12 +162,15 @@ class ContactWatch:
         self.thresholds = np.where(before < plain, np.minimum(before, self._plain()), self._plain())
         self._start()
 
-    def asked(self, scene: ContactScene, station: str) -> FloatArray:
-        """Distances (Z,) that a trajectory of this station must keep in this scene as it is watched now."""
-        plain = np.where(scene.allowed(station), -ALLOWED_DEPTH, scene.touching)
-        if scene is self._scene and len(plain):
-            plain = np.where(self.thresholds < self._plain(), np.minimum(plain, self.thresholds), plain)
-        return plain
+    def asked(self, scene: ContactScene, station: str) -> Keep:
+        """What a trajectory of this station must keep in this scene as it is watched now."""
+        outside, allowed = scene.touching, scene.allowed(station)
+        if scene is self._scene and len(outside):
+            held = self.thresholds < self._plain()
+            outside = np.where(held, np.minimum(outside, self.thresholds), outside)
+        if not allowed.any():
+            return Keep(scene, outside)
+        return Keep(scene, outside, station, np.where(allowed, np.minimum(outside, -ALLOWED_DEPTH), outside))
 
     def look(self, step: int, backend: Backend, dynamics: DynamicsModel) -> Touch | None:
         """Look at what is due; a touch that is not allowed."""

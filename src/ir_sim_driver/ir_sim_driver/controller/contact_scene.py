@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -64,7 +64,7 @@ class ContactScene:
         near = (inner == 0) & (outer <= _UPPER_ARM)
         joints = np.arange(n)
         return (
-            (near, self._reach_of([c for c in self.capsules if c.link <= _UPPER_ARM])),
+            (near, self._reach_of(_ends(c for c in self.capsules if c.link <= _UPPER_ARM))),
             (wrist, np.where(joints >= _FOREARM, self.reach, 0.0)),
             (~near & ~wrist, self.reach),
         )
@@ -72,15 +72,15 @@ class ContactScene:
     @cached_property
     def reach(self) -> FloatArray:
         """(n,): how far from each joint's axis anything that it moves can be [m]."""
-        return self._reach_of(self.capsules)
+        return self._reach_of(_ends(self.capsules))
 
-    def _reach_of(self, capsules: Iterable[Capsule]) -> FloatArray:
+    def _reach_of(self, points: Iterable[tuple[int, float]]) -> FloatArray:
+        """The same for points on links, so far [m] from their frames."""
         robot = self.cell.robot
         offsets = np.linalg.norm(np.array(robot.joint_origin)[:, :3, 3], axis=1)
         result = np.zeros(robot.n)
-        for capsule in capsules:
-            far = max(float(np.linalg.norm(capsule.p0)), float(np.linalg.norm(capsule.p1)))
-            for joint in range(capsule.link - 1, -1, -1):
+        for link, far in points:
+            for joint in range(link - 1, -1, -1):
                 result[joint] = max(result[joint], far)
                 far += float(offsets[joint])
         return result
@@ -101,8 +101,25 @@ class ContactScene:
 
     def inside(self, q: FloatArray, station: str) -> bool:
         """Whether the tcp at q (n,) is in the zone of a station's machine, or within ZONE_MARGIN of it."""
+        return bool(self.depth(q[None], station)[0] >= 0.0)
+
+    def depth(self, q: FloatArray, station: str) -> FloatArray:
+        """(N,): how far [m] the tcp at q (N, n) is from leaving that; negative: from getting there."""
         zone = self.cell.machine(self.station(station).equipment).zone
-        tcp = self.chain.tcp_poses(q[None])[0, :3, 3]
+        tcp = self.chain.tcp_poses(q)[:, :3, 3]
         local = (tcp - zone.pose[:3, 3]) @ zone.pose[:3, :3]
-        beyond = np.maximum(np.abs(local) - 0.5 * zone.size, 0.0)
-        return bool(np.linalg.norm(beyond) <= ZONE_MARGIN)
+        beyond = np.abs(local) - 0.5 * zone.size
+        far = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+        depth: FloatArray = ZONE_MARGIN - far - np.minimum(beyond.max(axis=1), 0.0)
+        return depth
+
+    @cached_property
+    def tcp_reach(self) -> FloatArray:
+        """(n,): how far from each joint's axis the tcp can be [m]."""
+        return self._reach_of([(self.cell.robot.n, float(np.linalg.norm(self.cell.tcp[:3, 3])))])
+
+
+def _ends(capsules: Iterable[Capsule]) -> Iterator[tuple[int, float]]:
+    """Link and distance [m] from its frame of what moves farthest of each: the end of its segment."""
+    for capsule in capsules:
+        yield capsule.link, max(float(np.linalg.norm(capsule.p0)), float(np.linalg.norm(capsule.p1)))

@@ -119,7 +119,7 @@ class Goals:
         """The goal, checked in the cell as it is at the end of the check; a door may move meanwhile."""
         vetted = self._simulation.vet(goal, self._now())
         for _ in range(_AGAIN):
-            if vetted.scene is self._simulation.cell_watch.scene:
+            if vetted.keep.scene is self._simulation.cell_watch.scene:
                 break
             vetted = self._simulation.vet(goal, self._now())
         return vetted

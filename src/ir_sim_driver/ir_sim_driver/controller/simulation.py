@@ -120,7 +120,7 @@ class Simulation:
         """Start a vetted goal, return its id; preempts the one that runs. Raises TrajectoryRefusedError."""
         goal = vetted.goal
         refusal = self._refusal() or self.surroundings.refusal(goal, self.load)
-        if refusal := refusal or self.cell_watch.refusal(goal, vetted.scene):
+        if refusal := refusal or self.cell_watch.refusal(goal, vetted.keep.scene):
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         now, delay = self.executor.motion(), vetted.delay(now_ns)
         route = vetted.route(now, self.robot, self.dynamics, self.settings.execution, delay)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from ir_description import RobotModel
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 from ir_sim_driver.controller.collision_check import check_collision
-from ir_sim_driver.controller.contact_scene import ContactScene
+from ir_sim_driver.controller.keep import Keep
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import (
     ErrorCode,
@@ -29,15 +28,11 @@ _NS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class VettedGoal:
-    """A goal whose trajectory was found executable with the dynamics of one load, and free in one scene.
-
-    keep (Z,): the distances [m] that its pairs must keep.
-    """
+    """A goal whose trajectory was found executable with the dynamics of one load, and free in one scene."""
 
     goal: TrajectoryGoal
     dynamics: DynamicsModel
-    scene: ContactScene
-    keep: FloatArray
+    keep: Keep
 
     def route(
         self,
@@ -54,7 +49,7 @@ class VettedGoal:
             )
         route = checked_route(self.goal.trajectory, now, robot, dynamics, settings, delay)
         if not self.goal.allow_collision and route.lead:
-            check_collision(route.path, slice(0, route.lead), route.offset, self.scene, self.keep)
+            check_collision(route.path, slice(0, route.lead), route.offset, self.keep)
         return route
 
     def delay(self, now_ns: int) -> float:
@@ -69,18 +64,18 @@ def vet(
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
     now_ns: int,
-    asked: Callable[[str], tuple[ContactScene, FloatArray]],
+    asked: Callable[[str], Keep],
 ) -> VettedGoal:
-    """Check all of a goal that does not depend on the robot's state. asked: the scene of now, and the
-    distances (Z,) that a station's trajectory must keep in it. Raises TrajectoryRefusedError.
+    """Check all of a goal that does not depend on the robot's state. asked: what a station's
+    trajectory must keep clear of now. Raises TrajectoryRefusedError.
     """
     checked = check_goal(goal, tuple(robot.joint_names), settings, now_ns)
     executed = check_trajectory(checked.trajectory, robot, dynamics, settings)
     try:
-        scene, keep = asked(checked.station)
+        keep = asked(checked.station)
     except InvalidValueError as error:
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, str(error)) from error
     if not checked.allow_collision:
         path = Path(*executed.coefficients(), executed.positions[0])
-        check_collision(path, slice(0, None), -float(executed.times[0]), scene, keep)
-    return VettedGoal(checked, dynamics, scene, keep)
+        check_collision(path, slice(0, None), -float(executed.times[0]), keep)
+    return VettedGoal(checked, dynamics, keep)
