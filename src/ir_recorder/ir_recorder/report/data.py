@@ -12,6 +12,7 @@ from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.shares import mode_name
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import BitSeries
+from ir_recorder.report.axes import axis_curves
 from ir_recorder.report.scene import scene
 from ir_recorder.report.series import Json, envelope, floats
 from ir_recorder.report.words import mode_words
@@ -33,6 +34,7 @@ def page_data(analysis: Analysis, safety_distance: float) -> str:
             if result.clearance is not None
         ],
         "safetyDistance": safety_distance,
+        "axes": axis_curves(analysis),
         "scene": scene(analysis),
     }
     return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

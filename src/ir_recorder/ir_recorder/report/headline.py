@@ -9,7 +9,20 @@ from datetime import UTC, datetime, timedelta
 
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.format.contents import OWN_FACTS, VERSION
-from ir_recorder.report.words import DASH, joules, millimetres, number, percent, seconds, share, text, watts
+from ir_recorder.report.costs import NAMES, Costs
+from ir_recorder.report.money import cycle_of, money
+from ir_recorder.report.words import (
+    DASH,
+    joules,
+    kilowatt_hours,
+    millimetres,
+    number,
+    percent,
+    seconds,
+    share,
+    text,
+    watts,
+)
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
 
@@ -67,11 +80,13 @@ def notes(analysis: Analysis) -> str:
     return f'<ul class="notes"><li class="head">Settings of this run</li>{items}</ul>'
 
 
-def tiles(analysis: Analysis) -> str:
+def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     """The figures; those of the program where one was executed."""
     program = analysis.program
+    origin = analysis.recording.origin
+    paid = (_saved(analysis), _yearly(analysis, costs or Costs()))
     shown = (
-        [_whole(analysis, program), _unshortened(program), *_parts(program, analysis.recording.origin)]
+        [_whole(analysis, program), _unshortened(program), *paid, *_parts(program, origin)]
         if program is not None
         else [Tile("program", "none executed", ("figures of the whole recording only",)), _recorded(analysis)]
     )
@@ -118,6 +133,30 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
     return Tile(
         "cycle with full pauses", joules(full.energy), (energy, cut, "computed from this run and the data")
     )
+
+
+def _saved(analysis: Analysis) -> Tile | None:
+    """What the common program takes, and what the plan saves of it."""
+    if analysis.savings is None:
+        return None
+    total = analysis.savings.total
+    within = (
+        f"90 % interval {joules(total.saved_low)} to {joules(total.saved_high)}"
+        if total.saved_high > total.saved_low
+        else ""
+    )
+    before = f"{joules(total.saved)} of the common program's {joules(total.common)}, predicted"
+    return Tile("saved by its plan", f"{100.0 * total.share:.1f} %", (before, within))
+
+
+def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
+    cycle = cycle_of(analysis)
+    if cycle is None:
+        return None
+    energy = cycle.energy * costs.cycles_per_year(cycle.seconds)
+    co2 = f"{kilowatt_hours(energy)}, {number(costs.co2(energy), 'kg')} CO2"
+    assumed = "prices and shifts assumed" if set(costs.given) != set(NAMES) else "prices and shifts as given"
+    return Tile("a year of such cycles", money(costs.money(energy), costs.currency), (co2, assumed))
 
 
 def _parts(program: ProgramTotals, origin: str) -> list[Tile]:

@@ -12,18 +12,18 @@ from ir_description import load_power_data
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.report.charts import CHARTS
+from ir_recorder.report.check_tables import check_table
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import notes, source, subtitle, tiles, verdict
 from ir_recorder.report.lever_table import lever_section
 from ir_recorder.report.money import costs_section
-from ir_recorder.report.tables import check_table
 from ir_recorder.report.words import joules, text
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
 PAGE_START = b"<!doctype html>"
-SCRIPTS = ("charts.js", "renderer.js", "motion.js", "app.js")
+SCRIPTS = ("charts.js", "axes.js", "renderer.js", "motion.js", "export.js", "app.js")
 
 
 def write_report(
@@ -62,7 +62,7 @@ def report_html(
         "source": source(analysis),
         "verdict": verdict(checks),
         "notes": notes(analysis),
-        "tiles": tiles(analysis),
+        "tiles": tiles(analysis, costs or Costs()),
         "capacity": text(joules(load_power_data().dc_link_capacity_energy)),
         "costs": costs_section(analysis, costs or Costs()),
         "levers": lever_section(analysis, costs or Costs()),

@@ -33,7 +33,8 @@ def savings_section(analysis: Analysis) -> str:
         '<p class="hint">Predicted energies at the mains, over the same seconds, with the 90 % interval of '
         "what is saved; nothing here is simulated or measured.</p>"
         f"{table(heads, cells, 'What the program saves')}"
-        f'<p class="hint">{text(savings.sentence)}; program {text(savings.program_id)}.</p></section>'
+        f"<details><summary>In words</summary><p>{text(savings.sentence)}; program "
+        f"{text(savings.program_id)}.</p></details></section>"
     )
 
 

@@ -1,4 +1,4 @@
-"""Tables of the page: movements, stations, modes, Table II, checks, facts."""
+"""Tables of the page: movements, stations, modes, Table II, facts."""
 
 from __future__ import annotations
 
@@ -6,17 +6,15 @@ import math
 from collections.abc import Iterable, Sequence
 
 from ir_msgs_py.report import TrajectoryReport
-from ir_recorder.analysis import Analysis, Finding, Verdict
+from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.agreement import Agreement
 from ir_recorder.analysis.findings import row_name
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.report.words import (
     DASH,
-    interval,
     joules,
     millimetres,
     mode_words,
-    number,
     percent,
     seconds,
     text,
@@ -150,33 +148,6 @@ def resting_table(analysis: Analysis) -> str:
     found = f">{analysis.recording.origin}"
     heads = ("mode and load at machine home", ">by the data", found, ">deviation", ">Table II", ">over")
     return table(heads, rows, "Power at rest")
-
-
-def check_table(findings: Sequence[Finding]) -> str:
-    """All checks: what fails and what was not checked first, what holds folded away."""
-    shown = [f for f in findings if not f.ok]
-    held = [f for f in findings if f.ok]
-    rows = [_check(f) for f in sorted(shown, key=lambda f: f.verdict is not Verdict.FAILS)]
-    heads = ("", "check", ">found", ">allowed", ">expected", "reason of the bound", "note")
-    top = table(heads, rows, "Checks that fail or were not made", "checks") if rows else ""
-    if not held:
-        return top or '<p class="empty">Nothing was checked.</p>'
-    below = table(heads, [_check(f) for f in held], "Checks that hold", "checks")
-    count = f"{len(held)} checks hold" if len(held) > 1 else "1 check holds"
-    return f"{top}<details><summary>{count}</summary>{below}</details>"
-
-
-def _check(finding: Finding) -> tuple[str, ...]:
-    style = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}[finding.verdict]
-    return (
-        f'<b class="{style}">{finding.verdict}</b>',
-        text(finding.name),
-        text(number(finding.measured, finding.unit)),
-        text(interval(finding.low, finding.high, finding.unit)),
-        text(number(finding.expected, finding.unit)),
-        text(finding.reason),
-        text(finding.note),
-    )
 
 
 def fact_table(analysis: Analysis) -> str:

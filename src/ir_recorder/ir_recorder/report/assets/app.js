@@ -6,6 +6,8 @@
   const timeline = new Timeline(data.end);
   const power = new PowerChart(find("power"), timeline, find("tip"), data);
   const clearance = new ClearanceChart(find("clearance"), timeline, find("tip"), data);
+  const axes = axesSection(find("axes"), timeline, find("tip"), data.axes);
+  if (!data.axes.length) find("axes").hidden = true;
   let motion = null;
   if (data.scene) {
     motion = new Motion(find("view"), timeline, data.scene);
@@ -81,9 +83,8 @@
   addEventListener("beforeprint", () => {
     theme = root.dataset.theme || "";
     root.dataset.theme = "light";
-    for (const part of document.querySelectorAll("details")) part.open = true;
-    power.draw();
-    clearance.draw();
+    for (const chart of [power, clearance, ...axes]) chart.draw();
+    if (motion) { motion.recolour(); motion.draw(); }
   });
   addEventListener("afterprint", () => {
     if (theme) root.dataset.theme = theme; else delete root.dataset.theme;
@@ -91,7 +92,7 @@
   });
 
   /* light and dark */
-  const repaint = () => { power.schedule(); clearance.schedule(); if (motion) motion.recolour(); };
+  const repaint = () => { for (const chart of [power, clearance, ...axes]) chart.schedule(); if (motion) motion.recolour(); };
   find("theme").addEventListener("click", () => {
     const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
     root.dataset.theme = dark ? "light" : "dark";
@@ -99,6 +100,7 @@
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
 
+  exportButtons();
   const wanted = /[#&]t=([\d.]+)/.exec(location.hash);
   timeline.seek(wanted ? Number(wanted[1]) : 0);
 })();

@@ -63,9 +63,11 @@ class TimeChart {
     canvas.addEventListener("pointerdown", (e) => this.down(e));
     canvas.addEventListener("pointermove", (e) => this.move(e));
     canvas.addEventListener("pointerup", (e) => this.up(e));
-    canvas.addEventListener("pointerleave", () => { this.tip.hidden = true; });
+    for (const gone of ["pointerleave", "blur"]) canvas.addEventListener(gone, () => { this.tip.hidden = true; });
     canvas.addEventListener("dblclick", () => timeline.zoom(0, timeline.end));
+    canvas.addEventListener("pointercancel", () => { this.drag = null; this.schedule(); });
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    canvas.addEventListener("keydown", (e) => this.key(e));
   }
   schedule() {
     if (this.pending) return;
@@ -102,10 +104,31 @@ class TimeChart {
     const centre = this.time(this.position(event)), factor = Math.exp(event.deltaY * 0.002);
     this.timeline.zoom(centre - (centre - this.timeline.from) * factor, centre + (this.timeline.to - centre) * factor);
   }
+  key(event) {
+    const { from, to, now, end } = this.timeline, span = to - from;
+    const acts = {
+      ArrowLeft: () => this.timeline.seek(now - span / 50), ArrowRight: () => this.timeline.seek(now + span / 50),
+      "+": () => this.timeline.zoom(now - span / 4, now + span / 4), "-": () => this.timeline.zoom(from - span / 2, to + span / 2),
+      0: () => this.timeline.zoom(0, end),
+    };
+    if (!acts[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    acts[event.key]();
+    this.say(this.timeline.now);
+  }
+  /* The values at a time beside the cursor: what the pointer would show. */
+  say(time) {
+    const box = this.canvas.getBoundingClientRect();
+    this.tip.textContent = this.describe(time);
+    this.tip.hidden = !this.tip.textContent;
+    this.tip.style.left = `${Math.min(box.left + this.x(time) + 10, innerWidth - this.tip.offsetWidth - 8)}px`;
+    this.tip.style.top = `${box.top + 20}px`;
+  }
   begin() {
     const scale = window.devicePixelRatio || 1, box = this.canvas.getBoundingClientRect();
     this.width = box.width;
     this.height = box.height;
+    this.left = box.width < 520 ? 68 : 96;
     if (this.canvas.width !== Math.round(box.width * scale)) this.canvas.width = Math.round(box.width * scale);
     if (this.canvas.height !== Math.round(box.height * scale)) this.canvas.height = Math.round(box.height * scale);
     const g = this.canvas.getContext("2d");
@@ -116,7 +139,7 @@ class TimeChart {
     return g;
   }
   timeAxis(g) {
-    const step = tickStep((this.timeline.to - this.timeline.from) / 8);
+    const step = tickStep((this.timeline.to - this.timeline.from) / Math.min(8, this.width / 80));
     g.strokeStyle = css("--line");
     g.fillStyle = css("--soft");
     g.textAlign = "center";

@@ -108,6 +108,7 @@ class Motion {
     canvas.addEventListener("keydown", (e) => {
       const steps = { ArrowLeft: [-30, 0], ArrowRight: [30, 0], ArrowUp: [0, -30], ArrowDown: [0, 30] };
       if (steps[e.key]) { e.preventDefault(); this.orbit(...steps[e.key]); }
+      if (e.key === "+" || e.key === "-") { e.preventDefault(); this.zoom(e.key === "+" ? 0.85 : 1.18); }
     });
   }
   orbit(dx, dy) {

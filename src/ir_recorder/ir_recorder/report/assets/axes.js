@@ -1,0 +1,105 @@
+"use strict";
+/* Curves of the axes: one chart per quantity, with the limits of the robot, on the time axis of all charts. */
+
+class AxesChart extends TimeChart {
+  constructor(canvas, timeline, tip, curves, shown) {
+    super(canvas, timeline, tip);
+    const scaled = (text) => Float32Array.from(shorts(text), (v) => v * curves.step);
+    this.curves = curves;
+    this.times = floats(curves.time);
+    this.high = scaled(curves.high);
+    this.low = curves.low ? scaled(curves.low) : this.high;
+    this.shown = shown;
+    this.top = 8;
+    this.right = 14;
+  }
+  names() { return this.curves.series === "tool" ? ["tool"] : Array.from({ length: this.curves.count }, (_, k) => `A${k + 1}`); }
+  used() { return this.names().map((_, k) => k).filter((k) => this.curves.series === "tool" || this.shown.axes[k]); }
+  draw() {
+    const g = this.begin();
+    this.timeAxis(g);
+    const n = this.curves.count, axes = this.used(), limits = this.shown.limits ? this.curves.limits : null;
+    const first = Math.max(floorIndex(this.times, this.timeline.from) - 1, 0);
+    const until = Math.min(floorIndex(this.times, this.timeline.to) + 1, this.times.length - 1);
+    let least = 0, most = 0;
+    for (const k of axes) {
+      for (let i = first; i <= until; i++) { least = Math.min(least, this.low[i * n + k]); most = Math.max(most, this.high[i * n + k]); }
+      if (limits) { least = Math.min(least, limits[k][0]); most = Math.max(most, limits[k][1]); }
+    }
+    const room = Math.max(most - least, 1e-6) * 0.04, low = least - room, high = most + room;
+    const y = (v) => this.height - this.bottom - (v - low) / (high - low) * (this.height - this.bottom - this.top);
+    this.valueAxis(g, low, high, this.curves.unit, y);
+    this.plot(g);
+    for (const k of axes) {
+      g.strokeStyle = css(this.curves.series === "tool" ? "--accent" : `--a${k + 1}`);
+      if (limits) {
+        g.setLineDash([6, 4]);
+        for (const bound of limits[k]) line(g, this.left, y(bound), this.width - this.right, y(bound));
+        g.setLineDash([]);
+      }
+      this.curve(g, k, first, until, y);
+    }
+    g.restore();
+    this.cursor(g);
+  }
+  /* One column of pixels shows the span of all values in it. */
+  curve(g, k, first, until, y) {
+    const n = this.curves.count;
+    let column = NaN, low = 0, high = 0, begun = false;
+    const put = () => {
+      if (Number.isNaN(column)) return;
+      if (begun) g.lineTo(column, y(high)); else g.moveTo(column, y(high));
+      if (high > low) g.lineTo(column, y(low));
+      begun = true;
+    };
+    g.lineWidth = 1.3;
+    g.beginPath();
+    for (let i = first; i <= until; i++) {
+      const x = Math.round(this.x(this.times[i]) * 2) / 2;
+      if (x === column) { low = Math.min(low, this.low[i * n + k]); high = Math.max(high, this.high[i * n + k]); continue; }
+      put();
+      [column, low, high] = [x, this.low[i * n + k], this.high[i * n + k]];
+    }
+    put();
+    g.stroke();
+    g.lineWidth = 1;
+  }
+  describe(time) {
+    const i = floorIndex(this.times, time), n = this.curves.count, names = this.names();
+    const rows = this.used().map((k) => `${names[k]}  ${(+this.high[i * n + k].toPrecision(4))} ${this.curves.unit}`);
+    return rows.length ? [`${time.toFixed(2)} s  ${this.curves.name}`, ...rows].join("\n") : "";
+  }
+}
+
+/* Toggles for axes, quantities and limits, and a chart for each quantity. */
+function axesSection(place, timeline, tip, list) {
+  const shown = { axes: Array(12).fill(true), limits: false }, charts = [];
+  const bar = place.querySelector(".toggles"), most = list.reduce((n, c) => Math.max(n, c.series === "tool" ? 0 : c.count), 0);
+  const toggle = (label, checked, change, style) => {
+    const box = document.createElement("label"), input = document.createElement("input");
+    input.type = "checkbox";
+    input.checked = checked;
+    input.addEventListener("change", () => { change(input.checked); for (const c of charts) c.schedule(); });
+    box.append(input);
+    if (style) { const key = document.createElement("i"); key.className = `key ${style}`; box.append(key); }
+    box.append(label);
+    bar.append(box);
+  };
+  for (let k = 0; k < most; k++) toggle(`A${k + 1}`, true, (on) => { shown.axes[k] = on; }, `a${k + 1}`);
+  toggle("limits", false, (on) => { shown.limits = on; });
+  for (const curves of list) {
+    const figure = document.createElement("figure"), caption = document.createElement("figcaption"), canvas = document.createElement("canvas");
+    figure.className = "chart axis-chart";
+    caption.textContent = `${curves.name} [${curves.unit}]`;
+    canvas.tabIndex = 0;
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", `${curves.name} of the axes over time`);
+    canvas.dataset.name = curves.name;
+    figure.append(caption, canvas);
+    figure.hidden = !curves.shown;
+    place.append(figure);
+    charts.push(new AxesChart(canvas, timeline, tip, curves, shown));
+    toggle(curves.name, curves.shown, (on) => { figure.hidden = !on; });
+  }
+  return charts;
+}

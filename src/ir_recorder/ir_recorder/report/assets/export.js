@@ -1,0 +1,98 @@
+"use strict";
+/* Every table as CSV, every canvas as PNG, every drawing as SVG: files that the browser writes, nothing leaves it. */
+
+function download(name, type, content) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+  link.download = name;
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+const fileName = (words, ending) => `${words.toLowerCase().replace(/[^a-z0-9]+/g, "_").replace(/^_|_$/g, "") || "figure"}.${ending}`;
+
+/* A spreadsheet takes a text that begins with = + - @ for a formula: such a text gets an apostrophe, a number none. */
+function csvCell(cell) {
+  const parts = [...cell.childNodes].map((node) => node.textContent.trim()).filter(Boolean);
+  const words = parts.join("; ").replace(/\s+/g, " ");
+  const safe = /^[=+\-@\t]/.test(words) && !/^[+-]?[\d.]/.test(words) ? `'${words}` : words;
+  return `"${safe.split('"').join('""')}"`;
+}
+const csvOf = (table) => [...table.rows].map((row) => [...row.cells].map(csvCell).join(",")).join("\r\n") + "\r\n";
+
+const SVG = (() => {
+  const template = document.createElement("template");
+  template.innerHTML = "<svg></svg>";
+  return template.content.firstChild.namespaceURI;
+})();
+
+/* A drawing with the colours it has on the page, and the font. */
+function svgOf(svg) {
+  const copy = svg.cloneNode(true), box = svg.viewBox.baseVal;
+  const from = [svg, ...svg.querySelectorAll("*")], to = [copy, ...copy.querySelectorAll("*")];
+  from.forEach((element, k) => {
+    const style = getComputedStyle(element);
+    for (const name of ["fill", "stroke", "opacity", "font-size", "font-weight", "font-family"]) to[k].style.setProperty(name, style.getPropertyValue(name));
+  });
+  copy.setAttribute("width", box.width);
+  copy.setAttribute("height", box.height);
+  return new XMLSerializer().serializeToString(copy);
+}
+
+/* The bars of joules, which are boxes of the page, as a drawing. */
+function barsToSvg(place) {
+  const make = (name, values) => {
+    const element = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(values)) element.setAttribute(key, value);
+    return element;
+  };
+  const rows = [...place.querySelectorAll(".row")], wide = 560, left = 220;
+  const svg = make("svg", { viewBox: `0 0 ${left + wide + 120} ${rows.length * 26 + 8}` });
+  rows.forEach((row, k) => {
+    const y = 4 + k * 26, put = (words, x, anchor) => {
+      const text = make("text", { x, y: y + 16, "text-anchor": anchor, "font-size": 12, fill: css("--ink"), "font-family": "sans-serif" });
+      text.textContent = words;
+      svg.append(text);
+    };
+    put(row.querySelector(".label").textContent, left - 10, "end");
+    const value = row.querySelector(".value b");
+    if (value) put(value.textContent, left + wide + 10, "start");
+    for (const piece of row.querySelectorAll(".track > *")) {
+      const x = left + parseFloat(piece.style.left) / 100 * wide, style = getComputedStyle(piece);
+      if (piece.tagName === "SPAN") put(piece.textContent, x, "middle");
+      else svg.append(make("rect", { x, y: y + 2, width: piece.style.width ? parseFloat(piece.style.width) / 100 * wide : 2, height: 20, fill: style.backgroundColor }));
+    }
+  });
+  return svg;
+}
+
+function exportButtons() {
+  const button = (label, name, act) => {
+    const element = document.createElement("button");
+    element.type = "button";
+    element.className = "export";
+    element.textContent = label;
+    element.setAttribute("aria-label", `${name} as ${label}`);
+    element.addEventListener("click", act);
+    return element;
+  };
+  for (const table of document.querySelectorAll("main table")) {
+    const name = table.caption ? table.caption.textContent : "table";
+    table.parentElement.after(button("CSV", name, () => download(fileName(name, "csv"), "text/csv", csvOf(table))));
+  }
+  for (const canvas of document.querySelectorAll("main canvas")) {
+    const name = canvas.dataset.name || canvas.getAttribute("aria-label");
+    canvas.parentElement.after(button("PNG", name, () => canvas.toBlob((blob) => blob && download(fileName(name, "png"), "image/png", blob))));
+  }
+  for (const svg of document.querySelectorAll("main .figure svg")) {
+    const name = svg.id || "figure";
+    svg.parentElement.after(button("SVG", name, () => download(fileName(name, "svg"), "image/svg+xml", svgOf(svg))));
+  }
+  const bars = document.querySelector("main .joules");
+  if (bars) {
+    const save = () => download("energy_of_movements.svg", "image/svg+xml", new XMLSerializer().serializeToString(barsToSvg(bars)));
+    bars.after(button("SVG", "energy of each movement", save));
+  }
+}

@@ -1,0 +1,191 @@
+"""The page in a real browser: every control operated, at a desk, on a tablet, on a phone and on paper.
+
+Needs Chromium. Without it these tests say `not checked: browser`; where CI=true it has to be there.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from ir_recorder import analyse, findings, read_recording
+from ir_recorder.report import report_html
+
+TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
+CONTROLS = Path(__file__).with_name("page_controls.js").read_text().strip().split("\n\n")
+DESK, TABLET, PHONE = (1400, 600), (768, 1024), (390, 844)
+WAIT_SECONDS = 30.0  # a busy machine
+EVIL = "</script><img src=x onerror=document.title='EVIL'><b>&quot;</b>"
+
+
+def _tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("_chromium", TOOL)
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules["_chromium"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    tool = _tool()
+    if tool.chromium() is None:
+        assert os.environ.get("CI") != "true", "no Chromium: these tests must run here"
+        sys.stderr.write("not checked: browser\n")
+        yield None
+        return
+    with tool.Browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def file(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(page)
+    return path
+
+
+def wait_for(find: Callable[[], list[Path]], page: Any) -> list[Path]:
+    """What is found at last; the browser goes on meanwhile."""
+    deadline = time.monotonic() + WAIT_SECONDS
+    while not (found := find()):
+        assert time.monotonic() < deadline, "nothing was found"
+        page.frame()
+    return found
+
+
+def clean(page: Any) -> None:
+    """No error was reported and nothing was asked of a network."""
+    assert page.faults == []
+    assert page.requests == []
+
+
+def test_every_control_of_the_page_works(browser: Any, file: Path, tmp_path: Path) -> None:
+    if browser is None:
+        return
+    page = browser.open(file, *DESK)
+    page.downloads(tmp_path)
+    for script in CONTROLS:
+        assert page.run(script) is True, script
+    tables = page.run("document.querySelectorAll('main table').length")
+    page.run("document.querySelectorAll('button.export').forEach((button) => button.click())")
+    saved = wait_for(lambda: sorted(tmp_path.glob("what_a_cycle_costs.csv")), page)
+    assert "full" in saved[0].read_text() or "this run" in saved[0].read_text()
+    assert saved[0].read_text().count("\n") == 5
+    charts = page.run("document.querySelectorAll('main canvas, main .figure svg, main .joules').length")
+    assert page.run("document.querySelectorAll('button.export').length") == tables + charts
+    assert tables >= 10
+    clean(page)
+    page.close()
+
+
+def test_charts_zoom_together_and_say_their_values_right_after(browser: Any, file: Path) -> None:
+    if browser is None:
+        return
+    page = browser.open(file, *DESK)
+    x, y, wide, _ = page.middle("#power")
+    label = "document.getElementById('tip').textContent"
+    before = page.run("document.querySelector('#power').toDataURL()")
+    page.drag((x - wide / 5, y + 60), (x + wide / 5, y + 60))
+    assert page.run("!document.getElementById('tip').hidden") is True
+    zoomed = float(page.run(label).split(" s")[0])
+    page.frame()
+    assert page.run("document.querySelector('#power').toDataURL()") != before
+    page.pointer("mouseMoved", x - wide / 4, y + 60)
+    start = float(page.run(label).split(" s")[0])
+    page.pointer("mouseMoved", x + wide / 4, y + 60)
+    assert start < float(page.run(label).split(" s")[0]) <= zoomed + 4.0
+    page.run("document.querySelector('#clearance').focus()")
+    page.key("0")  # by the keyboard, in another chart
+    page.pointer("mouseMoved", x - wide / 4, y + 60)
+    page.middle("#power")
+    page.pointer("mouseMoved", x - wide / 4, y + 60)
+    assert float(page.run(label).split(" s")[0]) < start
+    page.key("ArrowRight")
+    clean(page)
+    page.close()
+
+
+@pytest.mark.parametrize(("size", "dark"), [(TABLET, True), (PHONE, False)])
+def test_nothing_is_cut_off_and_fingers_find_the_controls(
+    browser: Any, file: Path, size: tuple[int, int], dark: bool
+) -> None:
+    if browser is None:
+        return
+    page = browser.open(file, *size, dark=dark, touch=size == PHONE)
+    assert page.run("document.documentElement.scrollWidth") == size[0]
+    wider = """[...document.querySelectorAll('main *')]
+        .filter((e) => !e.closest('.scroll, .unseen, .stage, svg'))
+        .filter((e) => e.getBoundingClientRect().right > innerWidth + 1)
+        .map((e) => e.outerHTML.slice(0, 80))"""
+    assert page.run(wider) == []
+    if size == PHONE:
+        small = """[...document.querySelectorAll('button:not(.go), select')].filter((b) => b.offsetParent)
+            .map((b) => b.getBoundingClientRect()).filter((b) => b.height < 43 || b.width < 43).length"""
+        assert page.run(small) == 0
+        over = """(() => { const stage = document.querySelector('.stage').getBoundingClientRect();
+            return [...document.querySelectorAll('#motion button, #motion input')]
+            .map((b) => b.getBoundingClientRect())
+            .filter((c) => c.top < stage.bottom && c.bottom > stage.top).length; })()"""
+        assert page.run(over) == 0
+        assert page.run("getComputedStyle(document.getElementById('view')).touchAction") == "pan-y"
+    clean(page)
+    page.close()
+
+
+def test_what_a_cell_is_called_is_never_executed(browser: Any, demo_file: Path, tmp_path: Path) -> None:
+    if browser is None:
+        return
+    recording = read_recording(demo_file)
+    cell = recording.cell_yaml.replace("name: gripper", f"name: {EVIL!r}").replace(
+        "name: press\n", f"name: {EVIL!r}\n"
+    )
+    events = tuple(
+        replace(event, note=EVIL, movement=replace(event.movement, from_station=EVIL, load=EVIL))
+        for event in recording.events
+    )
+    texts = (replace(recording.loads[0], text=EVIL, name=EVIL),)
+    evil = replace(
+        recording,
+        cell_yaml=cell.replace("test_cell", f"'{EVIL.replace(chr(39), chr(39) * 2)}'"),
+        events=events,
+        facts=((EVIL, EVIL),),
+        loads=texts,
+        warnings=texts,
+        problems=(EVIL,),
+        hardware=EVIL,
+        path=Path(EVIL.replace("/", "")),
+    )
+    analysis = analyse(evil)
+    path = tmp_path / "evil.html"
+    path.write_text(report_html(analysis, findings(analysis)))
+    page = browser.open(path, *DESK)
+    page.frame()
+    assert page.run("document.title === 'EVIL'") is False
+    assert page.run("document.querySelectorAll('img').length") == 0
+    assert page.run("document.body.textContent.includes('onerror')") is True
+    clean(page)
+    page.close()
+
+
+def test_a_page_of_an_empty_recording_has_no_error(browser: Any, demo_file: Path, tmp_path: Path) -> None:
+    if browser is None:
+        return
+    recording = read_recording(demo_file)
+    bare = replace(recording, power=None, joints=None, controller=None, events=(), loads=(), cell_yaml="")
+    path = tmp_path / "empty.html"
+    path.write_text(report_html(analyse(bare), ()))
+    page = browser.open(path, *TABLET)
+    assert page.run("document.getElementById('no-motion').hidden") is False
+    clean(page)
+    page.close()
