@@ -72,9 +72,7 @@ def test_places_that_cannot_be_written_are_named(demo_file: Path) -> None:
 
 def brackets_left_open(script: str) -> str:
     """Brackets that don't close, outside of strings and comments."""
-    code = re.sub(
-        r"/\*.*?\*/|//[^\n]*|\"(?:\\\\.|[^\"\\\\\n])*\"|'(?:\\\\.|[^'\\\\\n])*'", "", script, flags=re.S
-    )
+    code = re.sub(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'", "", script, flags=re.S)
     pairs, stack = {")": "(", "]": "[", "}": "{"}, []
     for character in code:
         if character in "([{":

@@ -13,12 +13,14 @@ function download(name, type, content) {
 
 const fileName = (words, ending) => `${words.toLowerCase().replace(/[^a-z0-9]+/g, "_").replace(/^_|_$/g, "") || "figure"}.${ending}`;
 
+const QUOTE = String.fromCharCode(34);
+
 /* A spreadsheet takes a text that begins with = + - @ for a formula: such a text gets an apostrophe, a number none. */
 function csvCell(cell) {
   const parts = [...cell.childNodes].map((node) => node.textContent.trim()).filter(Boolean);
   const words = parts.join("; ").replace(/\s+/g, " ");
   const safe = /^[=+\-@\t]/.test(words) && !/^[+-]?[\d.]/.test(words) ? `'${words}` : words;
-  return `"${safe.split('"').join('""')}"`;
+  return QUOTE + safe.split(QUOTE).join(QUOTE + QUOTE) + QUOTE;
 }
 const csvOf = (table) => [...table.rows].map((row) => [...row.cells].map(csvCell).join(",")).join("\r\n") + "\r\n";
 
