@@ -60,6 +60,16 @@ def test_every_check_of_the_demonstration_held(run: Run) -> None:
     assert re.search(r"checks: all \d{3} checks hold", run.output)
 
 
+def test_the_recorded_requests_are_planned_again_with_equal_ids(run: Run) -> None:
+    file = str(run.folder / "demo.mcap")
+    command = [sys.executable, "-m", "ir_cli.main", "replan", file, "--root", str(run.folder)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (plan,) = re.findall(r"/ir_planner/plan +equal +(\d+)", done.stdout)
+    assert int(plan) >= 20
+    assert "1 of 1 requests planned again with equal ids" in done.stdout
+
+
 def test_all_eight_values_of_table_2_are_in_the_recording_within_one_percent(run: Run) -> None:
     power = np.array([(stamp(m), m.mode, m.power) for _, m in run.messages["/ir_sim_driver/power_state"]])
     program = run.messages["/ir_program_runner/program_state"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -12,10 +13,11 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
+from ir_description import DescriptionError, load_power_parameters
 from ir_msgs.srv import GetCell
 from ir_msgs_py import names
 from ir_msgs_py.status import StatusCode
-from ir_recorder.format.contents import PARAMETERS
+from ir_recorder.format.contents import PARAMETERS, POWER_PARAMETERS
 from ir_recorder.write.session import CellFiles
 
 ASKED = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER)
@@ -104,11 +106,22 @@ class ParameterRequests:
     def _valued(self, name: str, known: list[str]) -> Callable[[GetParameters.Response], bool]:
         def take(answer: GetParameters.Response) -> bool:
             values = {key: _plain(value) for key, value in zip(known, answer.values, strict=False)}
+            self._attach_power_parameters(str(values.get("power_parameters") or ""))
             page = {f"{self._namespace}/{name}": {"ros__parameters": values}}
             self._attach(PARAMETERS.format(node=name), yaml.safe_dump(page, sort_keys=True))
             return True
 
         return take
+
+    def _attach_power_parameters(self, path: str) -> None:
+        """The file of power parameters that a node names, where it is one and can be read here."""
+        if not path:
+            return
+        try:
+            load_power_parameters(path)
+            self._attach(POWER_PARAMETERS, Path(path).read_text(encoding="utf-8"))
+        except (DescriptionError, OSError):
+            return  # on another machine: its name is in the parameters
 
 
 def _plain(value: Any) -> object:

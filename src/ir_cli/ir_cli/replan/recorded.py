@@ -1,0 +1,214 @@
+"""What a planner had when it planned, as a recording holds it: cell, settings, what it heard, requests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import yaml
+from rclpy.parameter import parameter_value_to_python
+from rclpy.serialization import deserialize_message
+
+from ir_description import DescriptionError
+from ir_description.files import power_from_yaml
+from ir_msgs.msg import RecordedCall
+from ir_msgs_py import names
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.ros.conversions import carried_load_from_msg, controller_timers_from_msg
+from ir_msgs_py.ros.types import interface_type
+from ir_msgs_py.settings import changed, tree
+from ir_planner import Planner, PlannerSettings
+from ir_recorder.errors import ReadError
+from ir_recorder.format import contents
+from ir_recorder.read.cells import chosen_namespace
+from ir_recorder.read.raw import RawRecording
+from ir_recorder.write.data_files import data_of_cell
+from ir_recorder.write.session import PACKAGES, installed_version
+
+_OWN_PLACE = ("cell", "roots")  # settings of the place where it was recorded, not of planning
+_ALWAYS = -1  # ns: what is latched was there before
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something that the planner knew from `time` on [ns]: `make` it known to another planner."""
+
+    time: int
+    make: Callable[[Planner], None]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A request that the planner took at `time` [ns]: the service's name, its type, both as messages.
+
+    response is None where it was too long to be recorded.
+    """
+
+    time: int
+    service: str
+    type: str
+    request: Any
+    response: Any
+
+
+class RecordedPlanner:
+    """The planner of one cell in a recording. namespace: of the cell; None: the first."""
+
+    def __init__(self, raw: RawRecording, namespace: str | None = None) -> None:
+        self._raw = raw
+        self._prefix = chosen_namespace(raw, namespace)[0].rstrip("/") + "/"
+        self._cells = list(self._heard(names.CELL))
+        first = str(self._cells[0][1].cell_yaml) if self._cells else ""
+        self.cell_yaml = first or (raw.attachment(contents.CELL) or b"").decode(errors="replace")
+
+    def planner(self, clock: Callable[[], float]) -> Planner:
+        """A planner with the recorded data and settings, and its first cell."""
+        if not self.cell_yaml:
+            raise ReadError(f"{self._raw.path} holds no cell: nothing can be planned again")
+        power = self._raw.attachment(contents.POWER)
+        data = power_from_yaml(power.decode(), contents.POWER) if power is not None else None
+        planner = Planner(clock, self._settings(), data)
+        planner.set_cell(self.cell_yaml, "")
+        return planner
+
+    def calls(self) -> Iterator[Call]:
+        """What the planner was asked, in the order in which it took the requests."""
+        taken = [message for _, message in self._heard(f"{names.PLANNER}/{names.CALLS}")]
+        for call in sorted(taken, key=lambda call: _nanoseconds(call.header.stamp)):
+            kind = interface_type(call.type, "action" if "/action/" in call.type else "srv")
+            ask, answer = (
+                (kind.Goal, kind.Result) if "/action/" in call.type else (kind.Request, kind.Response)
+            )
+            if len(call.request):
+                response = _decoded(bytes(call.response), answer) if len(call.response) else None
+                request = _decoded(bytes(call.request), ask)
+                yield Call(_nanoseconds(call.header.stamp), call.service, call.type, request, response)
+
+    def changes(self) -> list[Change]:
+        """What the planner learnt meanwhile, in the order of time."""
+        found = [
+            Change(_nanoseconds(message.header.stamp), _set_cell(message.cell_yaml))
+            for _, message in self._cells[1:]
+        ]
+        for name, learn in ((names.CONTROLLER_TIMERS, _hear_timers), (names.CARRIED_LOAD, _hear_load)):
+            for number, (time, message) in enumerate(self._heard(name)):
+                found.append(Change(time if number else _ALWAYS, learn(message)))
+        for time, event in self._heard(names.PARAMETER_EVENTS):
+            if event.node == self._prefix + names.PLANNER:
+                pairs = (*event.new_parameters, *event.changed_parameters)
+                values = {each.name: parameter_value_to_python(each.value) for each in pairs}
+                found.append(Change(time, _set_parameters(values)))
+        return sorted(found, key=lambda change: change.time)
+
+    def states(self) -> list[tuple[int, Any]]:
+        """The robot's states with their times of arrival [ns], still encoded."""
+        channel = self._raw.channel(self._prefix + names.JOINT_STATES)
+        if channel is None:
+            return []
+        return list(zip(channel.log_time.tolist(), channel.messages, strict=True))
+
+    def differences(self) -> list[str]:
+        """What is other here than where it was recorded: versions, and data of robot and controller."""
+        found = []
+        for entry in self._raw.fact(contents.PACKAGES).split(", "):
+            name, _, version = entry.partition(" ")
+            if name in PACKAGES and version != (here := installed_version(name)):
+                found.append(f"{name} {version} there, {here} here")
+        for name, text in data_of_cell(self.cell_yaml).items():
+            recorded = self._raw.attachment(name)
+            if recorded is not None and recorded.decode(errors="replace") != text:
+                found.append(f"{name} is another than the installed one")
+        return found
+
+    def _settings(self) -> PlannerSettings:
+        attached = self._raw.attachment(contents.PARAMETERS.format(node=names.PLANNER))
+        settings = _with(PlannerSettings(), _parameters(attached or b""))
+        text = self._raw.attachment(contents.POWER_PARAMETERS)
+        if not settings.power_parameters or text is None:
+            return _with(settings, {"power_parameters": ""})
+        with NamedTemporaryFile("wb", suffix=".yaml", delete=False) as file:
+            file.write(text)
+        try:
+            settings = _with(settings, {"power_parameters": file.name})
+            _ = settings.drives  # read now, and once
+            return settings
+        finally:
+            Path(file.name).unlink()
+
+    def _heard(self, name: str) -> Iterator[tuple[int, Any]]:
+        channel = self._raw.channel(name if name.startswith("/") else self._prefix + name)
+        if channel is None:
+            return
+        kind = RecordedCall if channel.type.endswith("/RecordedCall") else interface_type(channel.type, "msg")
+        for time, data in zip(channel.log_time.tolist(), channel.messages, strict=True):
+            yield time, _decoded(data, kind)
+
+
+def _decoded(data: bytes, kind: Any) -> Any:
+    try:
+        return deserialize_message(data, kind)
+    except Exception as error:  # damaged bytes: the middleware raises what it likes
+        raise ReadError(f"a message of type {kind.__name__} can't be read: {error}") from error
+
+
+def _parameters(page: bytes) -> dict[str, Any]:
+    """Values by name of a file as `--params-file` takes it."""
+    try:
+        nodes = yaml.safe_load(page) or {}
+        return {name: value for node in nodes.values() for name, value in node["ros__parameters"].items()}
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError, UnicodeDecodeError) as error:
+        raise ReadError(f"the planner's parameters can't be read: {error}") from error
+
+
+def _with(settings: PlannerSettings, values: dict[str, Any]) -> PlannerSettings:
+    known = tree(settings)
+    own = {name: value for name, value in values.items() if name in known and name not in _OWN_PLACE}
+    plain = {name: tuple(value) if isinstance(value, list) else value for name, value in own.items()}
+    return changed(settings, plain)
+
+
+def _set_cell(text: str) -> Callable[[Planner], None]:
+    def learn(planner: Planner) -> None:
+        planner.set_cell(text, "")
+
+    return learn
+
+
+def _hear_timers(message: Any) -> Callable[[Planner], None]:
+    def learn(planner: Planner) -> None:
+        planner.heard.timers = controller_timers_from_msg(message)
+
+    return _unless_refused(learn)
+
+
+def _hear_load(message: Any) -> Callable[[Planner], None]:
+    def learn(planner: Planner) -> None:
+        planner.heard.load = carried_load_from_msg(message)
+
+    return _unless_refused(learn)
+
+
+def _set_parameters(values: dict[str, Any]) -> Callable[[Planner], None]:
+    def learn(planner: Planner) -> None:
+        planner.settings = _with(planner.settings, values)
+
+    return _unless_refused(learn)
+
+
+def _unless_refused(learn: Callable[[Planner], None]) -> Callable[[Planner], None]:
+    """The recorded planner ignored what makes no sense, so this one does."""
+
+    def learn_or_ignore(planner: Planner) -> None:
+        try:
+            learn(planner)
+        except (MsgsError, DescriptionError):
+            return
+
+    return learn_or_ignore
+
+
+def _nanoseconds(stamp: Any) -> int:
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
