@@ -28,9 +28,10 @@ from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import PathError, ReadError, WriteError
 from ir_recorder.listen.topics import GLOBAL
-from ir_recorder.node import FLUSH_PERIOD, RecorderNode
+from ir_recorder.node import POLL_PERIOD, RecorderNode
 from ir_recorder.read.raw import read_raw
 from ir_recorder.settings import RecorderSettings
+from ir_recorder.write.worker import FLUSH_PERIOD
 from ir_recorder.write.writer import RecordingWriter
 
 LATCHED = QoSProfile(
@@ -146,7 +147,6 @@ def test_only_the_recorders_own_cell_is_recorded(
     rosout.publish(Log(name="cell_1.ir_planner", msg="last"))
 
     def last_has_come() -> bool:
-        ros_executor.run(recorder._flush)
         return any(b"last" in message for message in so_far(tmp_path / "own.mcap", "/rosout"))
 
     wait_for(last_has_come)
@@ -161,7 +161,27 @@ def test_only_the_recorders_own_cell_is_recorded(
     assert {name.split("/")[1] for name in nodes} == {"cell_1"}
 
 
-def test_a_slow_message_reaches_the_disk_within_two_seconds(
+def test_a_recording_goes_on_in_further_files(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    refused = start(call, tmp_path / "s.mcap", split_size=10)
+    assert "split_size is 10 bytes" in refused.status.message
+    talker = ros_node.create_publisher(String, "/ir_planner/long", 100)
+    assert start(call, tmp_path / "s.mcap", split_size=1_000_000).status.code == StatusCode.SUCCESS
+    wait_for(talker.get_subscription_count)
+    texts = [np.random.default_rng(k).bytes(50_000).hex() for k in range(50)]
+    for text in texts:
+        talker.publish(String(data=text))
+    wait_for(lambda: recorder.messages >= 50)
+    stopped = stop(call)
+    assert stopped.paths[0] == stopped.path == str(tmp_path / "s.mcap")
+    assert stopped.paths[1] == str(tmp_path / "s_1.mcap")
+    assert stopped.dropped == 0
+    found = read_raw(tmp_path / "s.mcap").channel("/ir_planner/long").messages
+    assert [deserialize_message(data, String).data for data in found] == texts
+
+
+def test_a_slow_message_reaches_the_disk_within_a_second(
     recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
 ) -> None:
     slow = ros_node.create_publisher(String, "/ir_planner/slow", 10)
@@ -170,7 +190,7 @@ def test_a_slow_message_reaches_the_disk_within_two_seconds(
     slow.publish(String(data="once"))
     wait_for(lambda: recorder.messages == 1)
     wait_for(lambda: so_far(tmp_path / "slow.mcap", "/ir_planner/slow"))
-    assert FLUSH_PERIOD < 2.0  # a figure of the clock is no test on a busy machine
+    assert FLUSH_PERIOD + POLL_PERIOD < 1.0  # a figure of the clock is no test on a busy machine
     stop(call)
 
 

@@ -73,7 +73,6 @@ def recording(
     call(PlanServiceMovement, "plan_service_movement", station=station, direction="exit", max_candidates=1)
 
     def arrived() -> int:
-        ros_executor.run(recorder._flush)
         channel = read_raw(tmp_path / "a.mcap").channel(calls)
         kinds = [deserialize_message(m, RecordedCall).type for m in channel.messages] if channel else []
         return sum("Plan" in kind or "Optimize" in kind for kind in kinds)

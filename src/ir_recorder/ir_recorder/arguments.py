@@ -21,5 +21,8 @@ def record_parser() -> argparse.ArgumentParser:
     parser.add_argument("--topics", nargs="+", default=[], help='names or patterns; "*": all visible')
     parser.add_argument("--cell", default="", help="cell to attach, name or file; none: ask the planner")
     parser.add_argument("--namespace", default="", help="of the cell to record (none)")
+    further = "after which a further file begins: PATH_1.mcap (0: one file)"
+    parser.add_argument("--split-size", type=int, default=0, metavar="BYTES", help=further)
+    parser.add_argument("--split-duration", type=float, default=0.0, metavar="S", help=further)
     add_roots(parser)
     return parser

@@ -6,6 +6,7 @@
     ├── PathError        the file asked for can't be written there, or is taken
     ├── WriteError       the disk refused while recording: full, read-only, gone
     ├── SchemaError      no definition of a message type is installed
+    ├── SplitError       files so small that there would be thousands
     ├── TopicsError      names of topics that are none, or too many
     ├── NothingRecordedError   a recording was asked to end, and none is in progress
     ├── ReadError        not a recording at all, or nothing in it that could be read
@@ -29,6 +30,10 @@ class WriteError(RecorderError):
 
 class SchemaError(RecorderError):
     """A message type whose definition isn't installed."""
+
+
+class SplitError(RecorderError):
+    """A size or a duration of files that makes no sense."""
 
 
 class TopicsError(RecorderError):

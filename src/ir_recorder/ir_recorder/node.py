@@ -8,7 +8,8 @@ the node.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
@@ -20,10 +21,12 @@ from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.command_line import CommandLineError, own_words
 from ir_msgs_py.ros.running import run_node
 from ir_recorder.arguments import record_parser
-from ir_recorder.diagnose.node import RecorderDiagnostics
+from ir_recorder.diagnose.node import RecorderDiagnostics, State
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError
 from ir_recorder.format import contents
+from ir_recorder.format.parts import Split
 from ir_recorder.format.qos import QosOffer
+from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.gather.node import CellRequest, ParameterRequests
 from ir_recorder.listen.node import Listener, is_own
 from ir_recorder.listen.topics import TopicSelection, checked_topics, single_type
@@ -32,10 +35,17 @@ from ir_recorder.serve.node import Services, without_publisher
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.write.cell_files import files_of_cell
 from ir_recorder.write.session import CellFiles, RecordingSession
-from ir_recorder.write.writer import OpenWriter, RecordingSummary, open_writer
+from ir_recorder.write.split import check_free
+from ir_recorder.write.worker import Act, Message, RecordingWorker
+from ir_recorder.write.writer import (
+    OpenWriter,
+    RecordingSummary,
+    RecordingWriter,
+    checked_path,
+    open_writer,
+)
 
 COMMAND_NODE = "ir_record"  # beside the cell's own recorder
-FLUSH_PERIOD = 1.5  # s that messages stay in memory; those of a whole cell fill a chunk in that time
 POLL_PERIOD = 0.02  # s: 10 joint states at a time; waking for each takes a third of a core
 
 
@@ -51,7 +61,8 @@ class RecorderNode(Node):
     ) -> None:
         super().__init__(name, **options)
         self._settings, self._open_writer = settings or declared_settings(self), writer
-        self._session: RecordingSession | None = None
+        self._recording: RecordingWorker | None = None
+        self._schemas = SchemaLibrary()
         self._selection = TopicSelection()
         self._listener = Listener(self, self._settings.depth)
         self._passed_over: set[str] = set()
@@ -66,14 +77,13 @@ class RecorderNode(Node):
         self.create_timer(self._settings.discovery_period, self._discover)
         self.create_timer(POLL_PERIOD, self._collect)
         self.create_timer(1.0, self._each_second)
-        self.create_timer(FLUSH_PERIOD, self._flush)
         if self._settings.path:
-            self.start(self._settings.path, self._settings.overwrite)
+            self.start(self._settings.path, self._settings.overwrite, split=self._settings.split)
 
     @property
     def messages(self) -> int:
         """How many messages the running recording holds."""
-        return self._session.messages if self._session is not None else 0
+        return self._recording.session.messages if self._recording is not None else 0
 
     @property
     def cell_attached(self) -> bool:
@@ -82,12 +92,12 @@ class RecorderNode(Node):
 
     def attached(self, name: str) -> bool:
         """Whether the running recording holds an attachment of that name."""
-        return self._session is not None and self._session.holds(name)
+        return self._recording is not None and self._recording.session.holds(name)
 
     @property
     def unmet(self) -> tuple[str, ...]:
         """Wanted topics and patterns of the running recording without a publisher so far."""
-        if self._session is None:
+        if self._recording is None:
             return ()
         return self._selection.unmet((*self._listener, *self._passed_over))
 
@@ -103,18 +113,28 @@ class RecorderNode(Node):
         topics: Sequence[str] = (),
         cell: str = "",
         roots: FileRoots | None = None,
+        split: Split | None = None,
     ) -> str:
         """Opens a recording below `roots` (None: those of the settings) and returns its absolute path.
 
-        PathError or WriteError when it can't.
+        PathError, SplitError or WriteError when it can't.
         """
-        if self._session is not None:
-            raise PathError(f"already recording into {self._session.path}; stop first")
+        if self._recording is not None:
+            raise PathError(f"already recording into {self._recording.session.path}; stop first")
         wanted = checked_topics(topics) or self._settings.wanted_topics
         name = cell or self._settings.cell
         files = files_of_cell(name) if name else None
-        writer = self._open_writer(path, overwrite, roots or self._settings.file_roots)
-        self._session = RecordingSession(writer, self._settings.named_facts, self._now())
+        within = roots or self._settings.file_roots
+        if split is not None and not overwrite:
+            check_free(checked_path(path), split)
+
+        def open_file(path: str | Path) -> RecordingWriter:
+            return self._open_writer(str(path), overwrite, within)
+
+        writer = open_file(path)
+        facts = self._settings.named_facts
+        session = RecordingSession(writer, facts, self._now(), split, open_file)
+        self._recording = RecordingWorker(session, self._settings.queue_megabytes * 1_000_000)
         self._selection = TopicSelection(wanted, self.get_namespace())
         self._passed_over.clear()
         self._listener.lost, self._failure = 0, ""
@@ -132,18 +152,18 @@ class RecorderNode(Node):
     def finish(self) -> RecordingSummary | None:
         """Ends the recording and returns its summary, or None when there was none."""
         self._collect()
-        session, self._session = self._session, None
+        recording, self._recording = self._recording, None
         self._listener.close()
-        if session is None:
+        if recording is None:
             return None
         try:
-            summary = session.finish()
+            summary = recording.finish()
         except WriteError as error:
             self._failure = str(error)
             raise
         self.get_logger().info(
             f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, "
-            f"{self._listener.lost} lost"
+            f"{self._listener.lost} lost, {summary.dropped} dropped"
         )
         return summary
 
@@ -156,7 +176,7 @@ class RecorderNode(Node):
 
     def _discover(self) -> None:
         """Subscribes to topics that are new and belong to the recording."""
-        if self._session is None:
+        if self._recording is None:
             return
         for topic, types in self.get_topic_names_and_types():
             if topic in self._listener or topic in self._passed_over or topic not in self._selection:
@@ -169,10 +189,11 @@ class RecorderNode(Node):
                 self._listen(topic, type_name, offers)
 
     def _listen(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
-        if self._session is None:
+        if self._recording is None:
             return
         try:
-            self._session.open_topic(topic, type_name, offers)
+            self._schemas.schema(type_name)
+            self._recording.do(lambda session: session.open_topic(topic, type_name, offers))
             self._listener.open(topic, type_name, offers)
         except SchemaError as error:
             self._pass_over(topic, str(error))
@@ -180,28 +201,38 @@ class RecorderNode(Node):
             self._abandon(error)
 
     def _collect(self) -> None:
-        """Writes what has arrived since the last time."""
-        self._write(self._write_arrivals)
-
-    def _write_arrivals(self, session: RecordingSession) -> None:
-        for arrival in self._listener.take():
-            if not self._selection.wanted and not is_own(arrival, self.get_namespace()):
-                continue
-            session.message(arrival.topic, arrival.data, arrival.time)
-
-    def _flush(self) -> None:
-        self._write(RecordingSession.flush)
+        """Hands on what has arrived since the last time."""
+        if self._recording is None:
+            return
+        own, everything = self.get_namespace(), bool(self._selection.wanted)
+        arrivals = self._listener.take()
+        try:
+            self._recording.write(
+                Message(each.topic, each.data, each.time)
+                for each in arrivals
+                if everything or is_own(each, own)
+            )
+        except WriteError as error:
+            self._abandon(error)
 
     def _each_second(self) -> None:
         self._ask()
-        path = self._session.path if self._session is not None else ""
+        recording = self._recording
         self._diagnostics.publish(
-            self._failure, path, self.messages, len(self._listener), self._listener.lost
+            State(
+                self._failure,
+                recording.session.path if recording is not None else "",
+                self.messages,
+                len(self._listener),
+                self._listener.lost,
+                recording.dropped if recording is not None else 0,
+                recording.waiting if recording is not None else 0,
+            )
         )
 
     def _ask(self) -> None:
         """Asks the planner for its cell and the nodes for their parameters, until they have answered."""
-        if self._session is None:
+        if self._recording is None:
             return
         self._parameters.each()
         if not self.cell_attached:
@@ -210,18 +241,18 @@ class RecorderNode(Node):
     def _attach(self, files: CellFiles) -> None:
         self._write(lambda session: session.attach_cell(files, self._now()))
 
-    def _write(self, act: Callable[[RecordingSession], None]) -> None:
+    def _write(self, act: Act) -> None:
         """Acts on the running recording, if there is one; a storage that refuses ends it."""
-        if self._session is None:
+        if self._recording is None:
             return
         try:
-            act(self._session)
+            self._recording.do(act)
         except WriteError as error:
             self._abandon(error)
 
     def _abandon(self, error: WriteError) -> None:
         self._failure = str(error)
-        self._session = None
+        self._recording = None
         self._listener.close()
         self.get_logger().error(self._failure)
 
@@ -250,7 +281,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             if options.path:
                 roots = FileRoots.of(options.roots) if options.roots else None
-                node.start(options.path, options.overwrite, options.topics, options.cell, roots)
+                split = Split(options.split_size, options.split_duration)
+                node.start(options.path, options.overwrite, options.topics, options.cell, roots, split)
         except BaseException:
             node.destroy_node()
             raise

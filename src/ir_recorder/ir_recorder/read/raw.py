@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -17,61 +16,16 @@ from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
-from ir_msgs_py.arrays import IntArray
 from ir_msgs_py.errors import FileRefusedError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.errors import ReadError
 from ir_recorder.read.chunks import ChunkReader, ReadLimits, TooLargeError
+from ir_recorder.read.parts import with_further_parts
+from ir_recorder.read.raw_values import RawAttachment, RawChannel, RawRecording
+
+__all__ = ["LATEST", "RawAttachment", "RawChannel", "RawRecording", "read_raw"]
 
 LATEST = 2**63 - 1  # ns: the last time that an int64 holds
-
-
-@dataclass(frozen=True)
-class RawChannel:
-    """One topic's messages as bytes; log_time (N,) [ns] in the order of the file."""
-
-    topic: str
-    type: str
-    message_encoding: str
-    schema_encoding: str
-    schema_text: str
-    qos: str
-    log_time: IntArray
-    messages: tuple[bytes, ...]
-
-
-@dataclass(frozen=True)
-class RawAttachment:
-    """A file beside the messages."""
-
-    name: str
-    media_type: str
-    data: bytes
-
-
-@dataclass(frozen=True)
-class RawRecording:
-    """Everything readable in a file; `problems` says what wasn't, `facts` are the metadata records' texts
-    by key.
-    """
-
-    path: Path
-    channels: tuple[RawChannel, ...]
-    attachments: tuple[RawAttachment, ...]
-    facts: tuple[tuple[str, str], ...]
-    problems: tuple[str, ...]
-
-    def channel(self, topic: str) -> RawChannel | None:
-        """The first channel of a topic that has messages."""
-        return next((c for c in self.channels if c.topic == topic and c.messages), None)
-
-    def attachment(self, name: str) -> bytes | None:
-        """Content of the last attachment of that name."""
-        return next((a.data for a in reversed(self.attachments) if a.name == name), None)
-
-    def fact(self, key: str) -> str:
-        """A fact of the metadata records, "" where it is missing."""
-        return next((value for name, value in reversed(self.facts) if name == key), "")
 
 
 class _Collector:
@@ -129,12 +83,19 @@ class _Collector:
 def read_raw(path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits | None = None) -> RawRecording:
     """Everything readable in an MCAP file; ReadError when there is nothing, or it isn't one.
 
-    The file is a regular one below `roots`; what it holds takes no more memory than `limits`.
+    Of a recording in several files the first gives all, any other only what it holds. They are regular ones
+    below `roots`; what they hold takes no more memory than `limits`.
     """
-    path = Path(path)
+    chunks = ChunkReader(limits or ReadLimits())
+    return with_further_parts(
+        _read_file(Path(path), roots, chunks), lambda part: _read_file(part, roots, chunks)
+    )
+
+
+def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecording:
     try:
         with roots.open_to_read(path) as stream:
-            found = _collect(stream, limits or ReadLimits())
+            found = _collect(stream, chunks)
     except FileRefusedError as error:
         raise ReadError(str(error)) from error
     except OSError as error:
@@ -155,8 +116,8 @@ def read_raw(path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits |
     )
 
 
-def _collect(stream: BinaryIO, limits: ReadLimits) -> _Collector:
-    found, chunks = _Collector(), ChunkReader(limits)
+def _collect(stream: BinaryIO, chunks: ChunkReader) -> _Collector:
+    found = _Collector()
     size = os.fstat(stream.fileno()).st_size  # no record is longer than its file
     records = StreamReader(stream, emit_chunks=True, record_size_limit=size).records
     while True:

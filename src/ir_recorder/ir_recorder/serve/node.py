@@ -13,13 +13,14 @@ from ir_msgs_py.ros.refusals import answered
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.errors import NothingRecordedError, RecorderError
+from ir_recorder.format.parts import Split
 from ir_recorder.write.writer import RecordingSummary
 
 
 class Recorder(Protocol):
     """What the services ask for."""
 
-    def start(self, path: str, overwrite: bool, topics: Sequence[str]) -> str:
+    def start(self, path: str, overwrite: bool, topics: Sequence[str], *, split: Split) -> str:
         """Begin a recording and return its path."""
 
     def finish(self) -> RecordingSummary | None:
@@ -45,7 +46,9 @@ class Services:
 
     def _on_start(self, request: Any, response: Any) -> Any:
         def start() -> str:
-            response.path = self._recorder.start(request.path, request.overwrite, request.topics)
+            split = Split(request.split_size, request.split_duration)
+            start = self._recorder.start
+            response.path = start(request.path, request.overwrite, request.topics, split=split)
             return f"recording into {response.path}{without_publisher(self._recorder.unmet, 'is seen yet')}"
 
         return self._answer(response, start)
@@ -57,8 +60,12 @@ class Services:
             if summary is None:
                 raise NothingRecordedError(self._recorder.failure or "nothing is being recorded")
             response.path = str(summary.path)
+            response.paths = [str(path) for path in summary.paths]
             response.messages, response.seconds = summary.messages, summary.seconds
+            response.dropped = summary.dropped
             seconds = f"{summary.messages} messages over {summary.seconds:.1f} s"
+            if summary.dropped:
+                seconds += f", {summary.dropped} dropped: the disk was too slow"
             return f"{seconds}{without_publisher(unmet, 'was seen')}"
 
         return self._answer(response, stop)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from ir_recorder.format import contents
+from ir_recorder.format.parts import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.write.data_files import data_of_cell
+from ir_recorder.write.split import LatchedMessages
 from ir_recorder.write.writer import RecordingSummary, RecordingWriter
 
 # those whose numbers a recording holds, and whose versions decide them
@@ -27,28 +30,44 @@ class CellFiles:
 
 
 class RecordingSession:
-    """Feeds a writer; every method may raise WriteError, after which the session is over."""
+    """Feeds a writer, and the next one where `split` says so (`open_next` opens it).
 
-    def __init__(self, writer: RecordingWriter, facts: Mapping[str, str], time: int) -> None:
-        self._writer = writer
+    Every method may raise WriteError, after which the session is over.
+    """
+
+    def __init__(
+        self,
+        writer: RecordingWriter,
+        facts: Mapping[str, str],
+        time: int,
+        split: Split | None = None,
+        open_next: Callable[[Path], RecordingWriter] = RecordingWriter,
+    ) -> None:
+        self._writer, self._open_next = writer, open_next
+        self._split, self._latched = split or Split(), LatchedMessages()
+        self._first, self._part, self._begun = writer.path, 0, time
+        self._name = f"{writer.path.stem} {time}"
+        self._topics: dict[str, tuple[str, Sequence[QosOffer]]] = {}
         self._channels: dict[str, int] = {}
-        self._attached: set[str] = set()
+        self._attached: dict[str, tuple[str, bytes]] = {}
+        self._messages, self._span = 0, (0, 0)
         own = {
             contents.VERSION: installed_version("ir_recorder"),
             contents.STARTED: str(time),
             contents.PACKAGES: ", ".join(f"{name} {installed_version(name)}" for name in PACKAGES),
         }
-        writer.facts(contents.FACTS, {**own, **facts})
+        self._facts = {**own, **facts}
+        self._head()
 
     @property
     def path(self) -> str:
-        """Where the file grows."""
-        return str(self._writer.path)
+        """Where the first file grows."""
+        return str(self._first)
 
     @property
     def messages(self) -> int:
-        """How many messages were written."""
-        return self._writer.messages
+        """How many messages were written, those that further files repeat not counted."""
+        return self._messages
 
     def holds(self, name: str) -> bool:
         """Whether an attachment of that name is in."""
@@ -58,10 +77,18 @@ class RecordingSession:
         """Opens the channel of a topic; SchemaError when its type isn't installed."""
         if topic not in self._channels:
             self._channels[topic] = self._writer.register(topic, type_name, offers)
+            self._topics[topic] = type_name, offers
+            self._latched.open(topic, offers)
 
     def message(self, topic: str, data: bytes, time: int) -> None:
         """Appends a message of an open topic, received at `time` [ns]."""
+        if self._split.wanted and self._split.due(self._writer.size, (time - self._begun) * 1e-9):
+            self._next_file(time)
         self._writer.write(self._channels[topic], time, data)
+        self._latched.keep(topic, data)
+        first, last = self._span if self._messages else (time, time)
+        self._span = min(first, time), max(last, time)
+        self._messages += 1
 
     def attach_cell(self, files: CellFiles, time: int) -> None:
         """Puts cell, URDF and the data of robot and controller beside the messages, once."""
@@ -77,8 +104,8 @@ class RecordingSession:
         """Puts a text beside the messages; the first of a name stays."""
         if name not in self._attached:
             media = "application/xml" if name == contents.URDF else "application/yaml"
+            self._attached[name] = media, text.encode()
             self._writer.attach(name, media, text.encode(), time)
-            self._attached.add(name)
 
     def flush(self) -> None:
         """Leaves no message in memory."""
@@ -86,7 +113,30 @@ class RecordingSession:
 
     def finish(self) -> RecordingSummary:
         """Closes the file with its indexes."""
-        return self._writer.finish()
+        self._writer.finish()
+        paths = tuple(part_path(self._first, part) for part in range(self._part + 1))
+        first, last = self._span
+        return RecordingSummary(self._first, self._messages, (last - first) * 1e-9, paths)
+
+    def _head(self) -> None:
+        """What every file begins with."""
+        self._writer.facts(contents.FACTS, self._facts)
+        if self._split.wanted:
+            record = part_facts(self._name, self._part, self._latched.counts())
+            self._writer.facts(contents.PARTS, record)
+
+    def _next_file(self, time: int) -> None:
+        """Ends the file and begins another that can be read alone."""
+        self._writer.finish()
+        self._part, self._begun = self._part + 1, time
+        self._writer = self._open_next(part_path(self._first, self._part))
+        self._head()
+        for name, (media, data) in self._attached.items():
+            self._writer.attach(name, media, data, time)
+        for topic, (type_name, offers) in self._topics.items():
+            self._channels[topic] = self._writer.register(topic, type_name, offers)
+        for topic, data in self._latched.all():
+            self._writer.write(self._channels[topic], time, data)
 
 
 def installed_version(package: str) -> str:

@@ -30,11 +30,15 @@ _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """What a finished recording holds: its file, the number of messages, and the time they span [s]."""
+    """What a finished recording holds: its file (the first, where `paths` has several), the number of
+    messages, the time they span [s], and how many messages the disk was too slow for.
+    """
 
     path: Path
     messages: int
     seconds: float
+    paths: tuple[Path, ...] = ()
+    dropped: int = 0
 
 
 class RecordingWriter:
@@ -71,6 +75,11 @@ class RecordingWriter:
     def messages(self) -> int:
         """How many messages were written."""
         return self._messages
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file, without the chunk that is being filled."""
+        return self._file.tell()
 
     def register(self, topic: str, type_name: str, offers: Sequence[QosOffer] = ()) -> int:
         """Opens a channel and returns its number; SchemaError when the type isn't installed."""
