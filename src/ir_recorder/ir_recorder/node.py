@@ -37,13 +37,7 @@ from ir_recorder.write.cell_files import files_of_cell
 from ir_recorder.write.session import CellFiles, RecordingSession
 from ir_recorder.write.split import check_free
 from ir_recorder.write.worker import Act, Message, RecordingWorker
-from ir_recorder.write.writer import (
-    OpenWriter,
-    RecordingSummary,
-    RecordingWriter,
-    checked_path,
-    open_writer,
-)
+from ir_recorder.write.writer import OpenWriter, RecordingSummary, RecordingWriter, open_writer
 
 COMMAND_NODE = "ir_record"  # beside the cell's own recorder
 POLL_PERIOD = 0.02  # s: 10 joint states at a time; waking for each takes a third of a core
@@ -124,17 +118,7 @@ class RecorderNode(Node):
         wanted = checked_topics(topics) or self._settings.wanted_topics
         name = cell or self._settings.cell
         files = files_of_cell(name) if name else None
-        within = roots or self._settings.file_roots
-        if split is not None and not overwrite:
-            check_free(checked_path(path), split)
-
-        def open_file(path: str | Path) -> RecordingWriter:
-            return self._open_writer(str(path), overwrite, within)
-
-        writer = open_file(path)
-        facts = self._settings.named_facts
-        session = RecordingSession(writer, facts, self._now(), split, open_file)
-        self._recording = RecordingWorker(session, self._settings.queue_megabytes * 1_000_000)
+        into = self._open(path, overwrite, roots or self._settings.file_roots, split)
         self._selection = TopicSelection(wanted, self.get_namespace())
         self._passed_over.clear()
         self._listener.lost, self._failure = 0, ""
@@ -146,8 +130,19 @@ class RecorderNode(Node):
         if self._failure:
             raise WriteError(self._failure)
         missing = without_publisher(self.unmet, "is seen yet")
-        self.get_logger().info(one_line(f"recording into {writer.path}{missing}"))
-        return str(writer.path)
+        self.get_logger().info(one_line(f"recording into {into}{missing}"))
+        return into
+
+    def _open(self, path: str, overwrite: bool, roots: FileRoots, split: Split | None) -> str:
+        def open_file(path: str | Path) -> RecordingWriter:
+            return self._open_writer(str(path), overwrite, roots)
+
+        if split is not None and not overwrite:
+            check_free(path, split)
+        facts = self._settings.named_facts
+        session = RecordingSession(open_file(path), facts, self._now(), split, open_file)
+        self._recording = RecordingWorker(session, self._settings.queue_megabytes * 1_000_000)
+        return session.path
 
     def finish(self) -> RecordingSummary | None:
         """Ends the recording and returns its summary, or None when there was none."""

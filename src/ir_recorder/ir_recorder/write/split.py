@@ -9,11 +9,12 @@ from pathlib import Path
 from ir_recorder.errors import PathError
 from ir_recorder.format.parts import Split, part_path
 from ir_recorder.format.qos import QosOffer
+from ir_recorder.write.writer import checked_path
 
 
-def check_free(first: Path, split: Split) -> None:
+def check_free(path: str | Path, split: Split) -> None:
     """PathError where the second file of a recording would meet another one."""
-    second = part_path(first, 1)
+    second = part_path(checked_path(path), 1)
     if split.wanted and second.exists():
         raise PathError(f"{second} is there already; choose another path or set overwrite")
 
