@@ -91,7 +91,12 @@ def test_the_scripts_close_what_they_open(page: str) -> None:
 
 def test_every_element_that_the_scripts_ask_for_is_in_the_page(page: str) -> None:
     body, script = page.rsplit("<script>", 1)
-    asked = set(re.findall(r'find\("([\w-]+)"\)', script)) | {"show-zones", "show-trail", "show-nearest"}
+    asked = set(re.findall(r'find\("([\w-]+)"\)', script)) | {
+        "show-zones",
+        "show-trail",
+        "show-nearest",
+        "show-capsules",
+    }
     assert len(asked) > 10
     assert [name for name in asked if f'id="{name}"' not in body] == []
 

@@ -8,6 +8,7 @@ from ir_description import Cell, PartPlaces
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import places_after
+from ir_recorder.report.robot_shapes import robot_parts
 from ir_recorder.report.series import Json, floats, indices, quantised
 from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh
 
@@ -61,9 +62,14 @@ def _power(analysis: Analysis, time: FloatArray) -> FloatArray:
 
 
 def _robot_shapes(cell: Cell) -> list[dict[str, Json]]:
+    """The robot twice: as its collision capsules, and as a robot looks."""
+    capsules = [
+        (c.link, "base" if c.link == 0 else "link", "capsules", capsule_mesh(c)) for c in cell.robot.capsules
+    ]
+    looks = [(part.link, part.kind, "robot", part.mesh) for part in robot_parts(cell.robot)]
     return [
-        {"link": c.link, "kind": "base" if c.link == 0 else "link", "owner": "", **_mesh(capsule_mesh(c))}
-        for c in cell.robot.capsules
+        {"link": link, "kind": kind, "look": look, "owner": "", **_mesh(mesh)}
+        for link, kind, look, mesh in (*looks, *capsules)
     ]
 
 
@@ -76,7 +82,7 @@ def _load_shapes(cell: Cell) -> list[dict[str, Json]]:
         for capsule in load.capsules:
             kind = "tool" if load.kind == "tool" else "part"
             mesh = _mesh(capsule_mesh(capsule))
-            shapes.append({"link": capsule.link, "kind": kind, "owner": load.name, **mesh})
+            shapes.append({"link": capsule.link, "kind": kind, "look": "", "owner": load.name, **mesh})
     return shapes
 
 

@@ -43,7 +43,7 @@ def capsule_mesh(capsule: Capsule) -> Mesh:
     axis = capsule.p1 - capsule.p0
     length = float(np.linalg.norm(axis))
     mesh = _rounded(capsule.radius, length)
-    rotation = _to_axis(axis / length) if length > 0.0 else np.eye(3)
+    rotation = to_axis(axis / length) if length > 0.0 else np.eye(3)
     centre = (capsule.p0 + capsule.p1) / 2.0
     return Mesh(mesh.points @ rotation.T + centre, mesh.normals @ rotation.T, mesh.triangles)
 
@@ -117,7 +117,7 @@ def _hull(vertices: FloatArray) -> Mesh:
     return Mesh(corners.reshape(-1, 3), np.repeat(outward, 3, axis=0), np.arange(3 * count).reshape(-1, 3))
 
 
-def _to_axis(axis: FloatArray) -> FloatArray:
+def to_axis(axis: FloatArray) -> FloatArray:
     """A rotation (3, 3) that takes z to the axis."""
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = np.cross(other, axis)

@@ -72,7 +72,7 @@
 
   if (motion) {
     for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => motion.look(button.dataset.view));
-    for (const name of ["zones", "trail", "nearest"]) {
+    for (const name of ["zones", "trail", "nearest", "capsules"]) {
       find(`show-${name}`).addEventListener("change", (e) => { motion.show[name] = e.target.checked; motion.schedule(); });
     }
   }

@@ -13,7 +13,7 @@ class Motion {
     this.power = shorts(scene.power);
     this.n = scene.jointOrigins.length;
     this.frames = scene.frames;
-    this.show = { zones: false, trail: true, nearest: true };
+    this.show = { zones: false, trail: true, nearest: true, capsules: false };
     this.shapes = scene.shapes.map((s) => ({ ...s, mesh: this.upload(s) }));
     this.bodies = scene.bodies.map((b) => ({ ...b, mesh: this.upload(b) }));
     this.parts = scene.parts.map((p) => ({ ...p, meshes: p.meshes.map((m) => ({ pose: m.pose, mesh: this.upload(m) })) }));
@@ -182,9 +182,11 @@ class Motion {
   items(time, frame) {
     const poses = this.linkPoses(frame), load = this.load(time).split("+"), items = [];
     for (const { mesh, pose } of this.bodies) items.push({ mesh, model: pose, tint: this.tints.machine });
-    for (const { mesh, link, kind, owner } of this.shapes) {
+    const look = this.show.capsules ? "robot" : "capsules";
+    for (const { mesh, link, kind, owner, look: own } of this.shapes) {
+      if (own === look) continue;
       if (owner && !load.includes(owner)) continue;
-      const tint = this.tints[{ link: "robot", base: "robot-base", tool: "tool", part: "part" }[kind]];
+      const tint = this.tints[{ link: "robot", base: "robot-base", joint: "robot-base", tool: "tool", part: "part" }[kind]];
       items.push({ mesh, model: poses[link], tint });
     }
     for (const part of this.parts) {
