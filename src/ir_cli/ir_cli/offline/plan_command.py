@@ -7,8 +7,9 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
-from ir_planner import ProgramPlan
+from ir_planner import Planner, ProgramPlan
 
 from .asking import (
     add_cell,
@@ -51,6 +52,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     plan.add_argument(
         "--saving", action="store_true", help="hold it against a common program in equal time as well"
     )
+    words = "also write the plan as a recording, for ir report and ir replan (needs ROS's Python packages)"
+    plan.add_argument("--record", default="", metavar="FILE.mcap", help=words)
     add_options(plan)
     add_parameters(plan)
     add_formats(plan)
@@ -69,6 +72,8 @@ def run_plan(arguments: argparse.Namespace) -> int:
         )
     if not plan.status.ok:
         return failed(plan.status.message)
+    if arguments.record:
+        _record(arguments, plan, planner, options)
     rows = rows_of(plan.movements)
     if arguments.json:
         saving = asdict(plan.savings) if plan.savings.available else None
@@ -79,6 +84,16 @@ def run_plan(arguments: argparse.Namespace) -> int:
         print_table(rows, COLUMNS)
         sys.stdout.write("\n".join(sentences_of(plan)) + "\n")
     return 0
+
+
+def _record(arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, options: PlanOptions) -> None:
+    """Write the recording; only here ROS is imported."""
+    from .plan_recording import ProgramRequest, write_plan
+
+    stations = tuple(arguments.stations)
+    request = ProgramRequest(stations, arguments.cycle_time, options, arguments.saving)
+    path = write_plan(arguments.record, plan, request, planner)
+    sys.stderr.write(f"ir: {path}\n")
 
 
 def rows_of(movements: Sequence[PlannedMovement]) -> list[Row]:
