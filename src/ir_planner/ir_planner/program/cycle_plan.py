@@ -22,7 +22,7 @@ _ROUNDING = 1e-6  # s: durations are whole nanoseconds, stretched by millionths
 _SAME_CHAIN = 1  # rungs from the request's own value, over which its chain is taken to stay the best
 
 
-_CUT = "no program of {:g} s found within planning_time and max_iterations: more of both may help"
+_CUT = "no program of {:g} s found"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +68,8 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
         if rung != FASTEST:
             bound = max(bound, best.bound(other.chain, LADDER[rung], seconds))
     if best.timed is None:
+        best = _fastest(best, seconds, standing, progress)
+    if best.timed is None:
         if choice.movements.context.work.exhausted:
             raise StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
         shortest = best.values.seconds(FASTEST)
@@ -107,6 +109,17 @@ def _tried(choice: Choice, seconds: float, standing: float, rung: int | None) ->
         timed = shared_out(values, task_of(choice, seconds, standing))
         notes.append("too short for the chain" if timed is None else f"{timed.energy:.0f} J")
     return _Tried(choice, values, found, timed)
+
+
+def _fastest(best: _Tried, seconds: float, standing: float, progress: Progress) -> _Tried:
+    """The chain that is fastest of all, where that is faster than the best so far, which is too slow; once
+    work has ended, the one of straight segments.
+    """
+    other = _cheapest_at(FASTEST, best.choice, progress)
+    if other is None or other.chain.chosen == best.choice.chain.chosen:
+        return best
+    tried = _tried(other, seconds, standing, FASTEST)
+    return tried if tried.values.seconds(FASTEST) < best.values.seconds(FASTEST) else best
 
 
 def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None:

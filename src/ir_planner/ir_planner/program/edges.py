@@ -7,6 +7,7 @@ exact where that is free; else the path found.
 
 import numpy as np
 
+from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.program.bounds import least_cost
@@ -69,7 +70,7 @@ class CostEdges:
 
     def _hurried(self, parts: list[Part]) -> list[Settled]:
         """Where time or work have ended: a straight segment that isn't free is none; the others are planned
-        when all are free.
+        when all are free. Looking whether they are free needs no work left.
         """
         route, context = self.movements.route, self.movements.context
         blocked: list[Part] = []
@@ -77,7 +78,7 @@ class CostEdges:
             if part.kind == ACROSS:
                 first, second = self.movements.ends(part)
                 space = FreeSpace.of(route.arriving(part.hop), context.safety_distance, context.work)
-                blocked += [] if space.edges_free(first[None], second[None])[0] else [part]
+                blocked += [] if space.certificates(first[None], second[None]).verdict[0] == FREE else [part]
         if not blocked:
             return self._planned(parts)
         self.movements.plan(blocked[:1], self.improvement)  # says what it is that time was too short for

@@ -16,24 +16,18 @@ from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
-from ir_planner.program.chain import cheapest_chain, layers_of
-from ir_planner.program.choice import Choice, Steps
+from ir_planner.program.choice import Steps
 from ir_planner.program.comparison import held_against_common
-from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.front import front_of
-from ir_planner.program.gap import cycle_gap, free_gap
-from ir_planner.program.ladder import Ladder
-from ir_planner.program.movements import Movements
+from ir_planner.program.more_work import best_answer
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
 from ir_planner.program.route import Route
 from ir_planner.program.savings import named
-from ir_planner.program.station_graph import ACROSS
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.request import Context, Journal, Work
-from ir_planner.service import exit_searches
 from ir_planner.timing import at_the_mains
 
-_CHOOSING = 2_500  # work of a movement while configurations are chosen; more of it improves the chosen ones
+_ENDED = "{}; {} ended before all was tried: more of it may help"
 
 
 def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobody) -> ProgramPlan:
@@ -43,7 +37,7 @@ def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobod
     try:
         answer = _answered(request, route, context, progress)
     except StageError as failed:
-        return ProgramPlan(failed.status, _info(request, context))
+        return ProgramPlan(_with_reason(failed.status, work), _info(request, context))
     # the record of the whole request, savings and front included
     return replace(answer, info=_info(request, context))
 
@@ -52,7 +46,8 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
     """The program, what it saves, and its front, as they were asked for. Raises StageError where a stage
     finds nothing.
     """
-    choice = chosen(request, route, context, progress)
+    answer = best_answer(request, route, context, progress)
+    choice, steps, standing = answer.choice, answer.steps, answer.standing
     cycle = request.cycle_time
     if not choice.parts and (cycle > 0.0 or request.front_points):
         raise RequestError(
@@ -60,19 +55,7 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
             f"the program has no movement: cycle_time (is {cycle:g} s) and front_points "
             f"(is {request.front_points}) must be 0",
         )
-    if cycle <= 0.0:
-        _improve(choice)
-    found = choice.found(progress)
-    standing, steps = choice.standing(found), choice.steps(found)
-    if cycle <= 0.0:
-        gap = free_gap(choice, found, steps)
-    else:
-        timed = timed_choice(choice, cycle, standing, progress)
-        pauses = [step for step in timed.steps if step.is_pause][: sum(step.is_pause for step in steps)]
-        steps = timed.steps
-        spent = sum(step.report.energy for step in steps) - sum(pause.report.energy for pause in pauses)
-        gap = cycle_gap(timed.choice, len(timed.timed.movements), spent, timed.bound)
-    plan = replace(_planned(steps), gap=gap)
+    plan = replace(_planned(steps), gap=answer.gap)
     if request.savings:
         comparison = held_against_common(choice, steps, cycle, standing, progress)
         if isinstance(comparison, str):
@@ -86,6 +69,14 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
             front = front_of(choice, request.front_points, standing, progress)
         plan = replace(plan, front=tuple(_planned(point.steps) for point in front))
     return plan
+
+
+def _with_reason(status: Status, work: Work) -> Status:
+    """The status of a refusal, with what it was that ended first."""
+    if status.code != StatusCode.PLANNING_FAILED or not work.exhausted:
+        return status
+    ended = "planning_time" if work.truncated else "max_iterations"
+    return replace(status, message=_ENDED.format(status.message, ended))
 
 
 def _planned(steps: Steps) -> ProgramPlan:
@@ -121,24 +112,3 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
         handling = (m.attach, m.detach, m.load, *m.wait_for, "|", *m.set_signals)
         digest.update("\0".join(str(value) for value in (*texts, *handling)).encode() + b"\n")
     return digest.hexdigest()[:16]
-
-
-def chosen(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Choice:
-    """The cheapest chain of configurations. Raises StageError where there is none."""
-    layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
-    movements = Movements(route, layers, context, request.settings.searches)
-    improvement = min(context.work.improvement, _CHOOSING)
-    chain = cheapest_chain(movements, improvement, progress)
-    return Choice(request, Ladder(movements, improvement), chain)
-
-
-def _improve(choice: Choice) -> None:
-    """Plan the regional movements of a chain again where the request has more work than the choice took."""
-    movements, improvement = choice.movements, choice.ladder.improvement
-    work = movements.context.work
-    across = [part for part in choice.parts if part.kind == ACROSS]
-    more = min(work.improvement, (work.max_iterations - work.iterations) // max(len(across), 1))
-    if across and more > improvement and not work.exhausted:
-        with movements.context.journal.stage("improve"):
-            movements.plan(across, improvement)
-            movements.better(across, more)

@@ -1,0 +1,132 @@
+"""What more work buys: one program first, then better ones while work is left.
+
+The first program is looked for with the same effort whatever the request allows, so that a request with more
+work knows everything that one with less knows. Then the chain is chosen again with more withdrawals and a
+finer tolerance, and the regional movements of the best chain are planned again with more work, both in steps
+of fixed size. What is cheaper is kept: more work never costs more.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from ir_planner.errors import RequestError
+from ir_planner.program.chain import cheapest_chain, layers_of
+from ir_planner.program.choice import Choice, Steps
+from ir_planner.program.cycle_plan import timed_choice
+from ir_planner.program.gap import cycle_gap, free_gap
+from ir_planner.program.ladder import Ladder
+from ir_planner.program.movements import Movements, cost_of, rates_of
+from ir_planner.program.request import ProgramRequest, Progress, StageError
+from ir_planner.program.route import Route
+from ir_planner.program.station_graph import ACROSS
+from ir_planner.request import Context, Work
+from ir_planner.service import exit_searches
+
+_CHOOSING = 2_500  # work of a movement while configurations are chosen; more of it improves the chosen ones
+_FIRST = 8_000  # max_iterations of a stop that buy no more than the first program
+_DEEPER = tuple(16_000 * 4**k for k in range(9))  # that buy a chain chosen with more effort
+_MORE = tuple(8_000 * 4**k for k in range(9))  # work of a movement of the chosen chain
+_HALF = 0.5  # of what is left: for the chain again; the rest is for its movements
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A program along a chain. standing: seconds of the pauses in it; gap [%]: as in the answer."""
+
+    choice: Choice
+    steps: Steps
+    standing: float
+    gap: float
+
+    @property
+    def cost(self) -> float:
+        """By the objective: of the movements, carried charge included; in a cycle time the joules of all."""
+        context = self.choice.movements.context
+        if self.choice.request.cycle_time > 0.0:
+            return sum(step.report.energy for step in self.steps)
+        moving, rates = [step.report for step in self.steps if not step.is_pause], rates_of(context)
+        if context.options.objective == "movement_cost":
+            return sum(report.movement_cost for report in moving)
+        return sum(cost_of(report, rates) for report in moving)
+
+
+def best_answer(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
+    """The best program that the work of a request buys. Raises StageError where none is found, RequestError
+    where the cycle is too short.
+    """
+    work = context.work
+    with _limited(work, work.left, min(work.improvement, _FIRST)):
+        best = planned(chosen(request, route, context, progress), progress)
+    followed = request.savings or request.front_points > 0
+    with _limited(work, int(_HALF * work.left) if followed else work.left, work.improvement):
+        for improvement in _DEEPER:
+            if improvement > work.improvement or work.exhausted:
+                break
+            again = _again(request, route, context, progress, improvement)
+            if again is None:
+                break
+            best = min(best, again, key=lambda answer: answer.cost)
+        return best if request.cycle_time > 0.0 else _with_better_movements(best, progress)
+
+
+def chosen(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Choice:
+    """The cheapest chain of configurations. Raises StageError where there is none."""
+    layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
+    movements = Movements(route, layers, context, request.settings.searches)
+    improvement = min(request.settings.improvement_iterations, _CHOOSING)
+    chain = cheapest_chain(movements, improvement, progress)
+    return Choice(request, Ladder(movements, improvement), chain)
+
+
+def planned(choice: Choice, progress: Progress) -> Answer:
+    """The program along a chain, within the cycle time of its request."""
+    cycle, found = choice.request.cycle_time, choice.found(progress)
+    standing, steps = choice.standing(found), choice.steps(found)
+    if cycle <= 0.0 or not choice.parts:
+        return Answer(choice, steps, standing, free_gap(choice, found, steps))
+    timed = timed_choice(choice, cycle, standing, progress)
+    pauses = [step for step in timed.steps if step.is_pause][: sum(step.is_pause for step in steps)]
+    spent = sum(step.report.energy for step in timed.steps) - sum(pause.report.energy for pause in pauses)
+    gap = cycle_gap(timed.choice, len(timed.timed.movements), spent, timed.bound)
+    return Answer(choice, timed.steps, standing, gap)
+
+
+def _again(
+    request: ProgramRequest, route: Route, context: Context, progress: Progress, improvement: int
+) -> Answer | None:
+    """The program along a chain chosen with more effort; None where that isn't done with half of what is
+    left.
+    """
+    work = context.work
+    with _limited(work, int(_HALF * work.left), improvement):
+        try:
+            answer = planned(chosen(request, route, context, progress), progress)
+        except (StageError, RequestError):
+            return None
+        return None if work.exhausted else answer
+
+
+def _with_better_movements(best: Answer, progress: Progress) -> Answer:
+    """The program with its regional movements planned again, with more work at every turn."""
+    movements, work = best.choice.movements, best.choice.movements.context.work
+    across = [part for part in best.choice.parts if part.kind == ACROSS]
+    for more in _MORE:
+        if not across or more > work.improvement or more * len(across) > work.left or work.exhausted:
+            break
+        with movements.context.journal.stage("improve"):
+            movements.better(across, more)
+        again = planned(best.choice, progress)
+        best = again if again.cost < best.cost else best
+    return best
+
+
+@contextmanager
+def _limited(work: Work, most: int, improvement: int) -> Iterator[None]:
+    """With at most so much more work, of which `improvement` goes into better answers."""
+    whole = work.max_iterations, work.improvement
+    work.max_iterations, work.improvement = work.iterations + most, improvement
+    try:
+        yield
+    finally:
+        work.max_iterations, work.improvement = whole

@@ -1,0 +1,80 @@
+"""More work never turns an answer into a refusal and never makes it cost more; a refusal says why."""
+
+from __future__ import annotations
+
+import time
+from functools import cache
+
+import numpy as np
+import pytest
+
+from ir_msgs_py.options import PlanOptions
+from ir_planner import Planner, ProgramPlan, RequestError
+
+WORK = (100, 2_000, 16_000, 64_000)  # max_iterations: too little, cut, and with all of it
+SAME = 1e-9  # of the cost: rounding of sums
+
+
+@cache
+def asked(cell: str) -> tuple[Planner, tuple[str, ...], float]:
+    """A cell with two stations drawn and back to park, and the shortest time that takes [s]."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", cell)
+    rng = np.random.default_rng([2, *cell.encode()])
+    names = [station.name for station in planner.cell.stations]
+    stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
+    fastest = planned(planner, stops, 0.0, PlanOptions(objective="time", planning_time=100.0))
+    assert isinstance(fastest, ProgramPlan)
+    return planner, stops, fastest.report.duration
+
+
+@pytest.mark.parametrize(("cell", "longer"), [("demo", 0.0), ("demo", 1.5)])
+def test_more_work_never_refuses_and_never_costs_more(cell: str, longer: float) -> None:
+    keeps_its_answers(cell, longer)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cell", ["cnc_door", "deep_box", "open", "table_columns"])
+@pytest.mark.parametrize("longer", [0.0, 1.02, 1.5])
+def test_more_work_never_refuses_and_never_costs_more_in_any_cell(cell: str, longer: float) -> None:
+    keeps_its_answers(cell, longer)
+
+
+def keeps_its_answers(cell: str, longer: float) -> None:
+    """longer: cycle time over the shortest; 0: free."""
+    planner, stops, shortest = asked(cell)
+    found, least = False, np.inf
+    for most in WORK:
+        options = PlanOptions(max_iterations=most, planning_time=100.0)
+        plan = planned(planner, stops, longer * shortest, options)
+        if isinstance(plan, str):
+            assert not found, f"{most}: {plan}"
+            assert "max_iterations ended before all was tried" in plan
+            assert not plan.split("; max_iterations")[0].rstrip().endswith(":")
+            continue
+        found = True
+        if plan.info.iterations < most * len(stops):  # nothing was left out for lack of work
+            assert cost(plan, options, longer) <= least * (1.0 + SAME)
+            least = cost(plan, options, longer)
+    assert found
+    assert np.isfinite(least)
+
+
+def planned(
+    planner: Planner, stops: tuple[str, ...], cycle: float, options: PlanOptions
+) -> ProgramPlan | str:
+    """The program, or the sentence of the refusal."""
+    try:
+        plan = planner.plan_program(stops, cycle, options, np.array(planner.cell.park))
+    except RequestError as error:
+        return str(error)
+    assert not plan.info.truncated
+    return plan if plan.status.ok else plan.status.message
+
+
+def cost(plan: ProgramPlan, options: PlanOptions, longer: float) -> float:
+    """J of the movements; in a cycle time the joules of all."""
+    if longer:
+        return plan.report.energy
+    reports = [step.report for step in plan.movements if not step.is_pause]
+    return sum(r.energy - r.base_energy + options.time_value * r.duration for r in reports)
