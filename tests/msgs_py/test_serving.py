@@ -6,6 +6,7 @@ import threading
 import time
 from typing import Any
 
+import pytest
 import rclpy
 
 from ir_msgs.srv import SetPlcInput
@@ -89,3 +90,58 @@ def test_a_client_that_is_never_discovered_costs_a_second_and_no_more() -> None:
     middleware.lost = middleware.sent + 1
     sender.send("response", "header")
     assert middleware.sent == middleware.lost + 1
+
+
+class Unsendable:
+    """No response at all."""
+
+
+def fails(error: BaseException) -> Any:
+    def handler(_request: Any, _response: Any) -> Any:
+        raise error
+
+    return handler
+
+
+def unsendable(_request: Any, response: Any) -> Any:
+    response.status.message = "\udcff"  # as a file name that is no UTF-8 gives
+    return response
+
+
+@pytest.mark.parametrize(
+    "handler",
+    [
+        fails(SystemExit(3)),
+        fails(MemoryError()),
+        fails(RecursionError("deep")),
+        fails(KeyError("\x1b[2J" * 5_000)),
+        lambda _request, _response: None,
+        lambda _request, _response: Unsendable(),
+        unsendable,
+    ],
+)
+def test_whatever_a_handler_does_its_client_is_answered_and_the_next_one_too(
+    handler: Any, ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    """By a failure with a sentence that can be printed; the node goes on."""
+    said: list[str] = []
+    server = BackgroundExecutor(ros_context)
+    try:
+        node = server.add_node(rclpy.create_node("clumsy", context=ros_context))
+        service = server.run(lambda: BoundedService(node, SetPlcInput, "~/ask", handler))
+        service._log = said.append
+        client = ros_executor.run(
+            lambda: ros_node.create_client(SetPlcInput, "/clumsy/ask", qos_profile=SERVICE)
+        )
+        wait_for(client.service_is_ready, what="the service is offered")
+        futures = [
+            ros_executor.run(lambda: client.call_async(SetPlcInput.Request(name="0"))) for _ in range(2)
+        ]
+        wait_for(lambda: all(future.done() for future in futures), what="both are answered")
+    finally:
+        server.close()
+    statuses = [future.result().status for future in futures]
+    assert [status.code for status in statuses] == [StatusCode.FAILURE] * 2
+    assert all(status.message.isprintable() and len(status.message) < 5_000 for status in statuses)
+    assert all("unexpected" in status.message for status in statuses)
+    assert len(said) == 2

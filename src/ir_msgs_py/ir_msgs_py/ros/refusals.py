@@ -14,6 +14,9 @@ from ir_msgs_py.status import Status, StatusCode
 
 StatusOf = Callable[[Exception], Status | None]
 
+ANY = (Exception, SystemExit)
+"""What must not end a node. SystemExit: somebody's registered search may call exit()."""
+
 
 def answered(
     response: Any,
@@ -29,8 +32,8 @@ def answered(
     """
     try:
         status = work()
-    except Exception as error:  # whatever it is: one request must not end the node for all others
-        known = status_of(error)
+    except ANY as error:  # whatever it is: one request must not end the node for all others
+        known = None if isinstance(error, SystemExit) else status_of(error)
         if known is None:
             log(traceback.format_exc())
         status = known or unexpected(error)
@@ -38,6 +41,6 @@ def answered(
     return response
 
 
-def unexpected(error: Exception) -> Status:
+def unexpected(error: BaseException) -> Status:
     """The status of an error that nobody thought of."""
     return Status(StatusCode.FAILURE, f"unexpected {type(error).__name__}: {error}")

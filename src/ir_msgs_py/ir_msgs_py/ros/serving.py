@@ -8,6 +8,7 @@ What was answered is published for recordings (calls.py).
 from __future__ import annotations
 
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -22,6 +23,7 @@ from ir_msgs_py.ros.calls import Calls, type_text
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.polled import PolledGroup
 from ir_msgs_py.ros.quality import REQUESTS_WAITING, SERVICE
+from ir_msgs_py.ros.refusals import ANY, unexpected
 from ir_msgs_py.status import Status, StatusCode
 
 Handler = Callable[[Any, Any], Any]
@@ -38,6 +40,7 @@ class BoundedService(Waitable):
     """A service of `node` whose responses have a `status`; at most `waiting` requests wait in it.
 
     handler: from request and response to the response; requests are answered in the order in which they came.
+    What it raises, and a response that can't be sent, is answered as a failure and logged.
     """
 
     def __init__(
@@ -51,7 +54,7 @@ class BoundedService(Waitable):
     ) -> None:
         super().__init__(group or node.default_callback_group)
         self._type, self._handler, self._most = service_type, handler, waiting
-        self._source = node.get_name()
+        self._source, self._log = node.get_name(), node.get_logger().error
         untouched = PolledGroup()  # the executor does not take from the service, this does
         self._service = node.create_service(
             service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
@@ -100,17 +103,25 @@ class BoundedService(Waitable):
 
     async def execute(self, taken_data: tuple[Any, Any] | None) -> None:
         """Answer it."""
-        if taken_data is not None:
-            request, header = taken_data
+        if taken_data is None:
+            return
+        request, header = taken_data
+        try:
             answered = self._calls.taken(self._service.service_name, type_text(self._type), request)
             response = self._handler(request, self._type.Response())
             answered(response)
             self._sender.send(response, header)
+        except ANY as error:
+            self._log(traceback.format_exc())
+            self._say(unexpected(error), header)
 
     def _refuse(self, header: Any) -> None:
         sentence = f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
+        self._say(Status(StatusCode.FAILURE, sentence), header)
+
+    def _say(self, status: Status, header: Any) -> None:
         response = self._type.Response()
-        response.status = status_to_msg(Status(StatusCode.FAILURE, sentence, self._source))
+        response.status = status_to_msg(Status(status.code, status.message, self._source))
         self._sender.send(response, header)
 
 
