@@ -15,6 +15,7 @@ SCRIPTS = sorted((ROOT / "benchmarks").glob("[!_]*.py"))
 OPTIONS = {"--cell", "--seeds", "--quick", "--json"}
 OTHERS = {
     "compare": {"--before", "--after", "--quick", "--json"},  # its requests name cells and seeds
+    "soak": {"--minutes", "--quick", "--json"},  # one cell for an hour
     "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
 }
 

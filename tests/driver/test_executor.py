@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.diagnostics import report
 from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.goal import ErrorCode, JointTolerance
+from ir_sim_driver.notices import Level
 
 EXACT = 1e-9  # rad; the ideal robot is where it was commanded
 DT = 0.001
@@ -129,6 +131,8 @@ def test_move_enable_0_holds_too(make, plan, start, home, there):
     simulation.run(1.0)
     assert simulation.executor.path_speed == 0.0
     assert simulation.executor.active
+    executor = report(simulation, 0.0)[2]
+    assert (executor.level, executor.sentence.endswith("move_enable is 0")) == (Level.WARN, True)
 
 
 @pytest.mark.parametrize("factor", [float("nan"), -1.0])

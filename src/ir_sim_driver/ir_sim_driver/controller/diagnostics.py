@@ -79,6 +79,9 @@ def _controller(simulation: Simulation) -> Entry:
 def _executor(simulation: Simulation) -> Entry:
     executor, load = simulation.executor, simulation.load_checks.last
     level, sentence = Level.OK, f"executing {executor.label}" if executor.active else "holding"
+    held = simulation.speed_scaling.holds()
+    if executor.active and held:
+        level, sentence = Level.WARN, f"{sentence}, which stands: {held}"
     if load is not None and load.noticed:
         level, sentence = Level.WARN, load.sentence
     return Entry(

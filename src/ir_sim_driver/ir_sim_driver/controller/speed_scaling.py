@@ -23,6 +23,12 @@ class SpeedScaling:
             self.factor = min(factor, 1.0)
         return self.factor
 
+    def holds(self) -> str:
+        """Why path time stands; "" where it may pass."""
+        if not self._plc.levels.move_enable:
+            return "the PLC's move_enable is 0"
+        return "" if self.factor > 0.0 else "the speed scaling is 0"
+
     def now(self) -> float:
         """The factor that counts now."""
         if not self._plc.levels.move_enable:

@@ -13,7 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 from ir_msgs_py.ros.serving import RecordedActionServer
+from ir_sim_driver.node.goal_clients import participant_of
 
+_CLIENTS_KEPT = 1000
 _Convert = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
 _api = ctypes.pythonapi
 _api.PyCapsule_GetName.restype, _api.PyCapsule_GetName.argtypes = ctypes.c_char_p, [ctypes.py_object]
@@ -92,11 +94,16 @@ class BoundedActionServer(RecordedActionServer):
     def __init__(self, node: Any, action_type: Any, *arguments: Any, most: Callable[[], int], **options: Any):
         self._counted = _CountedRequest(action_type.Impl.SendGoalService.Request, most)
         self._points: dict[bytes, int] = {}
+        self._clients: dict[bytes, bytes] = {}
         super().__init__(node, action_type, *arguments, **options)
 
     def points_of(self, goal_id: bytes) -> int:
         """How many points a goal had that were left out; 0 for one that is whole. Asked once."""
         return self._points.pop(goal_id, 0)
+
+    def client_of(self, goal_id: bytes) -> bytes:
+        """Participant of who has sent a goal; b"" where it can't be told. Asked once."""
+        return self._clients.pop(goal_id, b"")
 
     def take_data(self) -> dict[str, Any]:
         """Take what has come, goals by the counting class."""
@@ -108,6 +115,9 @@ class BoundedActionServer(RecordedActionServer):
         data: dict[str, Any] = super().take_data()
         if goal is not None and all(goal):
             data["goal"] = goal
+            while len(self._clients) >= _CLIENTS_KEPT:  # of goals that rclpy has not accepted
+                del self._clients[next(iter(self._clients))]
+            self._clients[bytes(goal[1].goal_id.uuid)] = participant_of(goal[0])
             if self._counted.left_out:
                 self._points[bytes(goal[1].goal_id.uuid)] = self._counted.left_out
         return data

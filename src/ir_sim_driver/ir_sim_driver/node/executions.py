@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, Protocol
 
 from ir_msgs.msg import LoadCheck
@@ -12,6 +11,7 @@ from ir_msgs_py.ros.conversions import contact_to_msg
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Outcome
+from ir_sim_driver.node.goal_clients import ClientWatch
 from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
 
 
@@ -27,24 +27,11 @@ class Executing(Protocol):
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""
 
-    def count_subscribers(self, topic: str) -> int:
-        """Subscriptions to a topic in the graph."""
+    def subscribers(self, topic: str) -> Sequence[bytes]:
+        """Identities of the subscriptions to a topic in the graph."""
 
     def now_msg(self) -> Any:
         """Present time of the node's clock, as a message."""
-
-
-class ClientWatch:
-    """Whether the clients of an action have been gone for `timeout` [s]; 0: never."""
-
-    def __init__(self, timeout: float) -> None:
-        self._timeout, self._seen = timeout, time.monotonic()
-
-    def gone(self, clients: int) -> bool:
-        """Look at the number of clients now."""
-        if clients > 0:
-            self._seen = time.monotonic()
-        return 0.0 < self._timeout < time.monotonic() - self._seen
 
 
 FEEDBACK_PERIOD = 0.05  # s: 20 Hz, enough for a person or a progress bar
@@ -53,7 +40,7 @@ FEEDBACK_PERIOD = 0.05  # s: 20 Hz, enough for a person or a progress bar
 class Executions:
     """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, called `name`, on `driver`.
 
-    client_timeout [s]: how long a movement goes on when the action has no client any more; 0: to its end.
+    client_timeout [s]: how long a movement goes on when its client is gone; 0: to its end.
     """
 
     def __init__(
@@ -65,6 +52,7 @@ class Executions:
         self._tickets: dict[bytes, int] = {}
         self._canceled: set[bytes] = set()
         self.points_of: Callable[[bytes], int] = lambda goal_id: 0  # that the server has left out
+        self.client_of: Callable[[bytes], bytes] = lambda goal_id: b""  # its participant
 
     async def execute(self, handle: Any) -> Any:
         """Carry a goal out; the action's result."""
@@ -80,13 +68,13 @@ class Executions:
         self._tickets[key] = ticket
         if key in self._canceled:  # before it was submitted
             self._driver.cancel(ticket)
-        watch = ClientWatch(self._client_timeout)
+        watch = ClientWatch(self._client_timeout, self.client_of(key))
 
         def report() -> None:
             self._publish_feedback(handle, ticket)
-            if watch.gone(self._node.count_subscribers(self._feedback_topic)):
+            if watch.gone(self._node.subscribers(self._feedback_topic)):
                 seconds = self._client_timeout
-                self._driver.abandon(ticket, f"the action has had no client for {seconds:g} s")
+                self._driver.abandon(ticket, f"the goal has had no client for {seconds:g} s")
 
         end_feedback = self._node.every(FEEDBACK_PERIOD, report)
         outcome: Outcome = await _awaitable(done)

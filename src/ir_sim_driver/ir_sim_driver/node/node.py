@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -147,7 +147,7 @@ class SimDriver(Node):
             result_timeout=_RESULT_KEPT,
             **ACTION_SERVICES,
         )
-        executions.points_of = server.points_of
+        executions.points_of, executions.client_of = server.points_of, server.client_of
         return server
 
     # what executions borrow
@@ -160,6 +160,10 @@ class SimDriver(Node):
         """Let the executor look at its futures."""
         if self.executor is not None:
             self.executor.wake()
+
+    def subscribers(self, topic: str) -> Sequence[bytes]:
+        """Identities of the subscriptions to a topic in the graph."""
+        return [bytes(each.endpoint_gid) for each in self.get_subscriptions_info_by_topic(topic)]
 
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""

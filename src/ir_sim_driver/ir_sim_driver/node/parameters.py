@@ -45,7 +45,7 @@ class NodeSettings:
     )
     client_timeout: float = setting(
         2.0,
-        "How long a movement goes on when no client of its action is left in the graph; 0: to its end.",
+        "How long a movement goes on when the client that asked for it has left the graph; 0: to its end.",
         unit="s",
         minimum=0.0,
         maximum=3600.0,
