@@ -102,7 +102,7 @@ class BoundedActionServer(RecordedActionServer):
         return self._points.pop(goal_id, 0)
 
     def client_of(self, goal_id: bytes) -> bytes:
-        """Participant of who has sent a goal; b"" where it can't be told. Asked once."""
+        """Participant of who has sent a goal; b"" where it is not known. Asked once."""
         return self._clients.pop(goal_id, b"")
 
     def take_data(self) -> dict[str, Any]:

@@ -23,7 +23,7 @@ class _RequestId(ctypes.Structure):
 
 
 def participant_of(request_id: Any) -> bytes:
-    """Participant of who wrote a request; b"" where it can't be told."""
+    """Participant of who wrote a request; b"" where it is not known."""
     value = ctypes.c_void_p.from_address(id(request_id) + _VALUE).value
     if not value:
         return b""
