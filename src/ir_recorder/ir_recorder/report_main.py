@@ -1,51 +1,93 @@
-"""`ir-report FILE [-o out/report.html]`: explains a recording as one HTML page."""
+"""`ir-report FILE [-o out/report.html]`: explains a recording as one HTML page, compares several on one."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
-from ir_recorder.analysis import analyse, findings
+from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.arguments import add_roots
-from ir_recorder.errors import RecorderError
+from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.read.reader import read_recording
 from ir_recorder.report import write_report
+from ir_recorder.report.compare import MOST, write_comparison
 from ir_recorder.report.costs import read_costs
 from ir_recorder.report.picture import write_picture
+from ir_recorder.report.step_table import write_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds what `run` reads."""
-    parser.add_argument("file", help="recording (.mcap)")
+    parser.add_argument(
+        "files", nargs="+", help="recordings (.mcap), or folders of them; several are compared"
+    )
     parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
     parser.add_argument("--namespace", help="of the cell, where the recording holds several")
     add_roots(parser)
     parser.add_argument("--costs", default="", help="prices, shifts and CO2 (YAML); else as assumed")
-    parser.add_argument("--picture", default="", help="picture to write as well (.png)")
+    parser.add_argument("--table", default="", help="steps as a table to write as well (.csv or .parquet)")
+    parser.add_argument("--picture", default="", help="picture to write as well (.png), of one recording")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Writes the page and prints its path; RecorderError when the file can't be read or the page not be
-    written.
-    """
+    """Writes the page and prints its path; RecorderError when nothing can be read or written."""
     roots = FileRoots.of(options.roots)
-    analysis = analyse(read_recording(options.file, roots, namespace=options.namespace))
-    for problem in analysis.problems:
-        sys.stderr.write(f"{options.file}: {problem}\n")
     costs = read_costs(options.costs, roots) if options.costs else None
-    page = write_report(analysis, findings(analysis), options.output, roots=roots, costs=costs)
+    analyses = _analyses(options, roots)
+    compared = [(analysis, findings(analysis)) for analysis in analyses]
+    if len(compared) > 1:
+        page = write_comparison(compared, options.output, roots, costs)
+    else:
+        page = write_report(*compared[0], options.output, roots=roots, costs=costs)
     sys.stdout.write(f"{page}\n")
+    if options.table:
+        sys.stdout.write(f"{write_table(analyses, options.table, roots)}\n")
     if options.picture:
-        sys.stdout.write(f"{write_picture(analysis, options.picture, roots)}\n")
+        sys.stdout.write(f"{write_picture(analyses[0], options.picture, roots)}\n")
     return 0
+
+
+def _analyses(options: argparse.Namespace, roots: FileRoots) -> list[Analysis]:
+    """The recordings asked for; one of a folder that can't be read is named and left out."""
+    analyses = []
+    for path, named in _paths(options.files, roots):
+        try:
+            analysis = analyse(read_recording(path, roots, namespace=options.namespace))
+        except ReadError as error:
+            if named:
+                raise
+            sys.stderr.write(f"{path}: left out: {error}\n")
+            continue
+        analyses.append(analysis)
+        for problem in analysis.problems:
+            sys.stderr.write(f"{path}: {problem}\n")
+    if not analyses:
+        raise ReadError(f"no recording could be read below {', '.join(map(str, options.files))}")
+    return analyses
+
+
+def _paths(files: Sequence[str], roots: FileRoots) -> list[tuple[Path, bool]]:
+    """Files to read, and whether each was named itself; a folder stands for its recordings, by name."""
+    paths: list[tuple[Path, bool]] = []
+    for name in files:
+        if Path(name).is_dir():
+            paths += [(path, False) for path in sorted(roots.inside(name).glob("*.mcap"))]
+        else:
+            paths.append((Path(name), True))
+    if len(paths) > MOST:
+        raise ReadError(f"{len(paths)} recordings are too many to compare: at most {MOST}")
+    return paths
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Returns 0 when the page was written, 1 with a sentence when not."""
-    parser = argparse.ArgumentParser(prog="ir-report", description="Explains a recording as one HTML page.")
+    parser = argparse.ArgumentParser(
+        prog="ir-report", description="Explains a recording as one HTML page, compares several."
+    )
     add_arguments(parser)
     try:
         return run(parser.parse_args(arguments))

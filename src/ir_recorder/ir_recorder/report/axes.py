@@ -31,7 +31,7 @@ class Curves:
 
 def axis_curves(analysis: Analysis) -> list[dict[str, Json]]:
     """What axes.js draws."""
-    return [_packed(curves) for curves in _curves(analysis) if len(curves.time) > 1 and _seen(curves.value)]
+    return [packed(curves) for curves in _curves(analysis) if len(curves.time) > 1 and _seen(curves.value)]
 
 
 def _seen(value: FloatArray) -> bool:
@@ -76,7 +76,8 @@ def _readable(error: FloatArray) -> tuple[FloatArray, str]:
     return (error * 1e3, "mrad") if most >= 1e-3 else (error * 1e6, "µrad")
 
 
-def _packed(curves: Curves) -> dict[str, Json]:
+def packed(curves: Curves) -> dict[str, Json]:
+    """Curves as the page's scripts read them: peaks kept, int16."""
     value = np.nan_to_num(curves.value)
     shape = envelope(curves.time, value, MOST)
     step = max(float(np.abs(value).max()), 1e-9) / _STEPS

@@ -103,7 +103,7 @@ def _mark(style: str, value: float, words: str, scale: _Scale) -> str:
 
 
 def _axis(scale: _Scale) -> str:
-    step = _tick_step(scale.high - scale.low)
+    step = tick_step(scale.high - scale.low)
     first, last = int(np.ceil(scale.low / step)), int(scale.high / step)
     ticks = [
         f'<span style="left:{scale.at(k * step):.2f}%">{text(joules(k * step))}</span>'
@@ -113,7 +113,8 @@ def _axis(scale: _Scale) -> str:
     return f'<div class="row axis"><span class="label"></span>{track}<span class="value"></span></div>'
 
 
-def _tick_step(span: float) -> float:
+def tick_step(span: float) -> float:
+    """A round step (1, 2 or 5 times a power of ten) that divides a span into about TICKS."""
     raw = span / TICKS
     power = 10.0 ** np.floor(np.log10(raw))
     return float(next(power * m for m in (1, 2, 5, 10) if power * m >= raw))

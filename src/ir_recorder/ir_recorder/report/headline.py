@@ -52,6 +52,12 @@ def subtitle(analysis: Analysis) -> str:
     )
 
 
+def plant_of(analysis: Analysis) -> str:
+    """Whether the figures are simulated or measured, and the plant's name."""
+    plant = analysis.recording.plant
+    return f"{analysis.recording.origin}, plant {plant}" if plant else analysis.recording.origin
+
+
 def source(analysis: Analysis) -> str:
     """Whether the figures are simulated, and by which plant."""
     hardware = analysis.recording.hardware

@@ -67,13 +67,14 @@ def report_html(
         "costs": costs_section(analysis, costs or Costs()),
         "levers": lever_section(analysis, costs or Costs()),
         "checks": check_table(checks),
-        "style": _asset("page.css"),
+        "style": asset("page.css"),
         "data": page_data(analysis, drawn),
-        "script": "\n".join(_asset(script) for script in SCRIPTS),
+        "script": "\n".join(asset(script) for script in SCRIPTS),
         **{name: chart(analysis) for name, chart in CHARTS.items()},
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _asset("page.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("page.html"))
 
 
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """A file of the page's parts as text."""
     return (_ASSETS / name).read_text(encoding="utf-8")

@@ -1,8 +1,8 @@
 """A robot's surface made from its data: housings about its axes, beams and tubes between them, a pedestal.
 
 The collision capsules say how thick and how long a link is, the joints' axes which of them turn. A capsule
-along an axis of its link becomes a turned part, another one a beam with a waist; each joint gets a housing. All
-lies within the capsules but for rims of a few centimetres: it is a picture, clearance is of the capsules.
+along an axis of its link becomes a turned part, another one a beam with a waist; each joint gets a housing.
+All lies within the capsules but for rims of a few centimetres: it is a picture, clearance is of the capsules.
 """
 
 from __future__ import annotations

@@ -13,7 +13,10 @@ class AxesChart extends TimeChart {
     this.top = 8;
     this.right = 14;
   }
-  names() { return this.curves.series === "tool" ? ["tool"] : Array.from({ length: this.curves.count }, (_, k) => `A${k + 1}`); }
+  names() {
+    if (this.curves.names) return this.curves.names;
+    return this.curves.series === "tool" ? ["tool"] : Array.from({ length: this.curves.count }, (_, k) => `A${k + 1}`);
+  }
   used() { return this.names().map((_, k) => k).filter((k) => this.curves.series === "tool" || this.shown.axes[k]); }
   draw() {
     const g = this.begin();
@@ -31,7 +34,7 @@ class AxesChart extends TimeChart {
     this.valueAxis(g, low, high, this.curves.unit, y);
     this.plot(g);
     for (const k of axes) {
-      g.strokeStyle = css(this.curves.series === "tool" ? "--accent" : `--a${k + 1}`);
+      g.strokeStyle = css(this.curves.series === "tool" ? "--accent" : `--a${k % 6 + 1}`);
       if (limits) {
         g.setLineDash([6, 4]);
         for (const bound of limits[k]) line(g, this.left, y(bound), this.width - this.right, y(bound));
@@ -54,7 +57,8 @@ class AxesChart extends TimeChart {
     };
     g.lineWidth = 1.3;
     g.beginPath();
-    for (let i = first; i <= until; i++) {
+    const last = this.curves.ends ? Math.min(until, floorIndex(this.times, this.curves.ends[k])) : until;
+    for (let i = first; i <= last; i++) {
       const x = Math.round(this.x(this.times[i]) * 2) / 2;
       if (x === column) { low = Math.min(low, this.low[i * n + k]); high = Math.max(high, this.high[i * n + k]); continue; }
       put();
@@ -85,21 +89,22 @@ function axesSection(place, timeline, tip, list) {
     box.append(label);
     bar.append(box);
   };
-  for (let k = 0; k < most; k++) toggle(`A${k + 1}`, true, (on) => { shown.axes[k] = on; }, `a${k + 1}`);
-  toggle("limits", false, (on) => { shown.limits = on; });
+  const names = list.length && list[0].names;
+  for (let k = 0; k < most; k++) toggle(names ? names[k] : `A${k + 1}`, true, (on) => { shown.axes[k] = on; }, `a${k % 6 + 1}`);
+  if (list.some((c) => c.limits)) toggle("limits", false, (on) => { shown.limits = on; });
   for (const curves of list) {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption"), canvas = document.createElement("canvas");
     figure.className = "chart axis-chart";
     caption.textContent = `${curves.name} [${curves.unit}]`;
     canvas.tabIndex = 0;
     canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", `${curves.name} of the axes over time`);
+    canvas.setAttribute("aria-label", `${curves.name} over time`);
     canvas.dataset.name = curves.name;
     figure.append(caption, canvas);
     figure.hidden = !curves.shown;
     place.append(figure);
     charts.push(new AxesChart(canvas, timeline, tip, curves, shown));
-    toggle(curves.name, curves.shown, (on) => { figure.hidden = !on; });
+    if (list.length > 1) toggle(curves.name, curves.shown, (on) => { figure.hidden = !on; });
   }
   return charts;
 }

@@ -1,0 +1,199 @@
+"""Two or more recordings side by side: figures, steps, and powers over time, each against the first."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_recorder.analysis import Analysis, Finding, StepResult, summary
+from ir_recorder.analysis.flows import energy_flows
+from ir_recorder.report.axes import Curves, packed
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.files import write_output
+from ir_recorder.report.front import Point, front_chart
+from ir_recorder.report.headline import plant_of
+from ir_recorder.report.money import cycle_of, money
+from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.series import Json
+from ir_recorder.report.tables import table
+from ir_recorder.report.words import DASH, joules, millimetres, percent, seconds, text, watts
+
+MOST = 12  # recordings on one page: more columns than that are not read
+SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
+_POINTS = 4000  # of a power curve
+Compared = tuple[Analysis, Sequence[Finding]]
+
+
+def write_comparison(
+    compared: Sequence[Compared], path: str | Path, roots: FileRoots = ANYWHERE, costs: Costs | None = None
+) -> Path:
+    """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
+    return write_output(path, comparison_html(compared, costs).encode(), PAGE_START, roots)
+
+
+def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) -> str:
+    """The page as text: the first recording is what the others are held against."""
+    analyses, names = [each for each, _ in compared], _names([each for each, _ in compared])
+    data = {"end": _longest(analyses), "axes": [_powers(analyses, names)] if _longest(analyses) else []}
+    parts = {
+        "title": text(f"{len(analyses)} recordings compared"),
+        "subtitle": text(f"{names[0]} is what the others are held against"),
+        "problems": _problems(analyses, names),
+        "figures": _figures(compared, names, costs or Costs()),
+        "front": front_chart(_points(analyses, names)),
+        "steps": _steps(analyses, names),
+        "style": asset("page.css"),
+        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        "script": "\n".join(asset(script) for script in SCRIPTS),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("compare.html"))
+
+
+def _names(analyses: Sequence[Analysis]) -> list[str]:
+    """File names; with their folders where two are alike."""
+    short = [analysis.recording.path.stem for analysis in analyses]
+    long = [f"{a.recording.path.parent.name}/{a.recording.path.stem}" for a in analyses]
+    return [name if short.count(name) == 1 else other for name, other in zip(short, long, strict=True)]
+
+
+def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
+    items = [
+        f"<li>{text(name)}: {text(problem)}</li>"
+        for analysis, name in zip(analyses, names, strict=True)
+        for problem in analysis.problems
+    ]
+    if len({a.cell.name for a in analyses if a.cell is not None}) > 1:
+        items.append("<li>These recordings are of different cells.</li>")
+    if len({(a.recording.origin, a.recording.plant) for a in analyses}) > 1:
+        items.append("<li>These recordings are of different plants: not only the programs differ.</li>")
+    return f'<div class="problems"><b>Mind</b><ul>{"".join(items)}</ul></div>' if items else ""
+
+
+def _figures(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
+    rows = [_measured_row(name, unit, value, compared) for name, unit, value in _VALUES]
+    rows.insert(0, ("plant", *(text(plant_of(a)) for a, _ in compared)))
+    rows.append(("checks", *(text(summary(tuple(checks))[1]) for _, checks in compared)))
+    rows.append(("energy of a year", *(_yearly(analysis, costs) for analysis, _ in compared)))
+    return table(("", *(f">{name}" for name in names)), rows, "Figures")
+
+
+def _measured_row(
+    name: str, unit: Callable[[float], str], value: Callable[[Analysis], float], compared: Sequence[Compared]
+) -> tuple[str, ...]:
+    values = [value(analysis) for analysis, _ in compared]
+    return (name, *(_against(each, values[0], unit, k == 0) for k, each in enumerate(values)))
+
+
+def _against(value: float, first: float, unit: Callable[[float], str], own: bool) -> str:
+    shown = f"<b>{unit(value)}</b>"
+    if own or not math.isfinite(value) or not math.isfinite(first) or first == 0.0:
+        return shown
+    return f"{shown}<small>{percent(value / first - 1.0)}</small>"
+
+
+def _yearly(analysis: Analysis, costs: Costs) -> str:
+    cycle = cycle_of(analysis)
+    if cycle is None:
+        return DASH
+    return text(money(costs.money(cycle.energy * costs.cycles_per_year(cycle.seconds)), costs.currency))
+
+
+def _of_cycle(of: Callable[[Analysis], float]) -> Callable[[Analysis], float]:
+    return lambda analysis: of(analysis) if analysis.program is not None else math.nan
+
+
+def _flow(name: str) -> Callable[[Analysis], float]:
+    def value(analysis: Analysis) -> float:
+        flows = energy_flows(analysis)
+        return float(getattr(flows, name)) if flows is not None else math.nan
+
+    return value
+
+
+def _least(analysis: Analysis) -> float:
+    return min((r.clearance.least for r in analysis.movements if r.clearance is not None), default=math.nan)
+
+
+_VALUES: tuple[tuple[str, Callable[[float], str], Callable[[Analysis], float]], ...] = (
+    ("program", joules, _of_cycle(lambda a: a.program.whole.energy if a.program else math.nan)),
+    ("its time", seconds, _of_cycle(lambda a: a.program.whole.seconds if a.program else math.nan)),
+    ("movements", joules, _of_cycle(lambda a: a.program.movements.energy if a.program else math.nan)),
+    (
+        "time of movements",
+        seconds,
+        _of_cycle(lambda a: a.program.movements.seconds if a.program else math.nan),
+    ),
+    ("pauses", joules, _of_cycle(lambda a: a.program.pauses.energy if a.program else math.nan)),
+    (
+        "waiting between steps",
+        joules,
+        _of_cycle(lambda a: a.program.waiting.energy if a.program else math.nan),
+    ),
+    ("returned by braking axes", joules, _flow("returned")),
+    ("brake resistor", joules, _flow("resistor")),
+    ("motors and inverters", joules, _flow("motors")),
+    ("friction", joules, _flow("friction")),
+    ("peak power", watts, lambda a: a.peak_power),
+    ("least clearance", millimetres, _least),
+)
+
+
+def _points(analyses: Sequence[Analysis], names: Sequence[str]) -> list[Point]:
+    """Each program as it ran, and the common program where a recording names it."""
+    points = []
+    for analysis, name in zip(analyses, names, strict=True):
+        if analysis.program is not None and math.isfinite(analysis.program.whole.energy):
+            whole = analysis.program.whole
+            points.append(Point(name, whole.seconds, whole.energy, analysis.recording.origin))
+    return points
+
+
+def _steps(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
+    """Energy of every step; steps are matched by their label and its number of times before."""
+    held = [dict(_keyed(analysis.steps)) for analysis in analyses]
+    keys = list(dict.fromkeys(key for own in held for key in own))
+    rows = []
+    for key in keys:
+        found = [own.get(key) for own in held]
+        first = found[0].energy if found[0] is not None else math.nan
+        cells = (_step(result, first, k == 0) for k, result in enumerate(found))
+        rows.append((text(key[0]), *cells))
+    return table(("step", *(f">{name}" for name in names)), rows, "Steps")
+
+
+def _keyed(steps: Sequence[StepResult]) -> Iterator[tuple[tuple[str, int], StepResult]]:
+    times: dict[str, int] = {}
+    for result in steps:
+        label = result.step.label
+        times[label] = times.get(label, 0) + 1
+        yield (label, times[label]), result
+
+
+def _step(result: StepResult | None, first: float, own: bool) -> str:
+    if result is None:
+        return DASH
+    return f"{_against(result.energy, first, joules, own)}<small>{seconds(result.seconds)}</small>"
+
+
+def _longest(analyses: Sequence[Analysis]) -> float:
+    return max((a.program.whole.seconds for a in analyses if a.program is not None), default=0.0)
+
+
+def _powers(analyses: Sequence[Analysis], names: Sequence[str]) -> dict[str, Json]:
+    """Mains power from the start of each program on one grid: means, so that its joules are the meter's."""
+    edges = np.linspace(0.0, _longest(analyses), _POINTS + 1)
+    value = np.zeros((_POINTS, len(analyses)))
+    for k, analysis in enumerate(analyses):
+        power = analysis.recording.power
+        if power is not None and analysis.steps and len(power.time) > 1:
+            spent = np.interp(edges + analysis.steps[0].step.start, power.time, power.energy)
+            value[:, k] = np.diff(spent) / np.diff(edges)
+    curves = Curves("power at the mains", "W", (edges[1:] + edges[:-1]) / 2.0, value)
+    ends = [analysis.program.whole.seconds if analysis.program is not None else 0.0 for analysis in analyses]
+    return {**packed(curves), "names": list(names), "ends": ends}

@@ -1,0 +1,112 @@
+"""Energy over cycle time as a drawing: programs as points, those that no other one beats joined by a line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ir_recorder.analysis import Analysis
+from ir_recorder.report.bars import tick_step
+from ir_recorder.report.words import joules, seconds, text
+
+WIDTH, HEIGHT = 720.0, 300.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 84.0, 190.0, 18.0, 44.0
+
+
+@dataclass(frozen=True)
+class Point:
+    """A program: cycle time [s], energy [J] at the mains, and whether that is simulated or predicted."""
+
+    name: str
+    seconds: float
+    energy: float
+    source: str
+
+
+def front_section(analysis: Analysis) -> str:
+    """Section of the page: this run, the plan in the common program's time, and the common program."""
+    savings, program = analysis.savings, analysis.program
+    if savings is None or program is None:
+        return ""
+    total = savings.total
+    points = [
+        Point("this run", program.whole.seconds, program.whole.energy, analysis.recording.origin),
+        Point("common program", total.seconds, total.common, "predicted"),
+        Point("planned in its time", total.seconds, total.planned, "predicted"),
+    ]
+    hint = "Left is faster, down is cheaper; the line joins programs that no other one beats in both."
+    head = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>'
+    return f'<section id="front">{head}{front_chart(points)}</section>'
+
+
+def pareto(points: Sequence[Point]) -> list[Point]:
+    """Points that no other one beats, by their time."""
+    best: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.seconds, p.energy)):
+        if not best or point.energy < best[-1].energy:
+            best.append(point)
+    return best
+
+
+def front_chart(points: Sequence[Point]) -> str:
+    """The drawing as SVG; "" for fewer than two points."""
+    if len(points) < 2:
+        return ""
+    times, energies = [p.seconds for p in points], [p.energy for p in points]
+    x = _Axis(min(times), max(times), _LEFT, WIDTH - _RIGHT)
+    y = _Axis(min(energies), max(energies), HEIGHT - _BOTTOM, _TOP)
+    line = " ".join(f"{x.at(p.seconds):.1f},{y.at(p.energy):.1f}" for p in pareto(points))
+    marks = "".join(_mark(point, k, x, y) for k, point in enumerate(points))
+    said = "; ".join(f"{p.name} {seconds(p.seconds)}, {joules(p.energy)}, {p.source}" for p in points)
+    return (
+        '<div class="figure scroll"><svg class="front" id="energy_over_cycle_time" '
+        f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{text(said)}">'
+        f'{_grid(x, y)}<polyline class="line" points="{line}"/>{marks}</svg></div>'
+    )
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """From values to drawing units, with a margin of a tenth."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def at(self, value: float) -> float:
+        span = (self.high - self.low) or max(abs(self.high), 1.0)
+        share = (value - self.low + 0.1 * span) / (1.2 * span)
+        return self.start + share * (self.end - self.start)
+
+    def ticks(self) -> list[float]:
+        span = (self.high - self.low) or max(abs(self.high), 1.0)
+        low, step = self.low - 0.1 * span, tick_step(1.2 * span)
+        first = math.ceil(low / step)
+        return [k * step for k in range(first, math.floor((low + 1.2 * span) / step) + 1)]
+
+
+def _grid(x: _Axis, y: _Axis) -> str:
+    right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
+    parts = []
+    for value in y.ticks():
+        at = y.at(value)
+        parts.append(f'<path class="grid" d="M{_LEFT:g} {at:.1f}H{right:g}"/>')
+        parts.append(f'<text x="{_LEFT - 8:g}" y="{at + 4:.1f}" text-anchor="end">{joules(value)}</text>')
+    for value in x.ticks():
+        at = x.at(value)
+        parts.append(f'<path class="grid" d="M{at:.1f} {_TOP:g}V{bottom:g}"/>')
+        parts.append(f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{seconds(value)}</text>')
+    middle = (_LEFT + right) / 2.0
+    return "".join(parts) + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">cycle time</text>'
+
+
+def _mark(point: Point, index: int, x: _Axis, y: _Axis) -> str:
+    at, high = x.at(point.seconds), y.at(point.energy)
+    words = f"{point.name}, {point.source}: {seconds(point.seconds)}, {joules(point.energy)}"
+    filled = "hollow" if point.source == "predicted" else f"a{index % 6 + 1}"
+    return (
+        f'<circle class="{filled}" cx="{at:.1f}" cy="{high:.1f}" r="6"><title>{text(words)}</title></circle>'
+        f'<text x="{at + 10:.1f}" y="{high + 4:.1f}" class="name">{text(point.name)}</text>'
+    )

@@ -1,0 +1,138 @@
+"""Recordings side by side: figures against the first, steps matched by label, files out."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ir_recorder import Analysis, analyse, findings
+from ir_recorder.report.compare import comparison_html
+from ir_recorder.report.front import Point, front_chart, front_section, pareto
+from ir_recorder.report.step_table import step_columns, write_table
+from ir_recorder.report_main import main
+
+
+@pytest.fixture
+def other(analysis: Analysis) -> Analysis:
+    """The same run on a meter that reads a tenth more."""
+    power = analysis.recording.power
+    assert power is not None
+    more = replace(power, power=power.power * 1.1, energy=power.energy * 1.1, plant="typical, seed 1")
+    return analyse(replace(analysis.recording, power=more, path=Path("other.mcap")))
+
+
+def page_of(*analyses: Analysis) -> str:
+    return comparison_html([(each, findings(each)) for each in analyses])
+
+
+def test_a_tenth_more_is_ten_percent(analysis: Analysis, other: Analysis) -> None:
+    page = page_of(analysis, other)
+    assert page.count("+10.00 %") >= 1 + len(analysis.steps)
+    assert "demo is what the others are held against" in page
+    assert "different plants" in page
+    assert "different plants" not in page_of(analysis, analysis)
+
+
+def test_power_on_the_common_grid_has_the_joules_of_the_meter(
+    analysis: Analysis, other: Analysis, data_of: Any
+) -> None:
+    (curves,) = data_of(page_of(analysis, other))["axes"]
+    time = np.frombuffer(base64.b64decode(curves["time"]), "<f4")
+    watts = np.frombuffer(base64.b64decode(curves["high"]), "<i2").reshape(-1, 2) * curves["step"]
+    joules = watts.sum(axis=0) * float(time[1] - time[0])
+    for k, each in enumerate((analysis, other)):
+        assert each.program is not None
+        assert joules[k] == pytest.approx(each.program.whole.energy, rel=2e-3)
+
+
+def test_steps_that_one_recording_lacks_are_a_dash(analysis: Analysis) -> None:
+    short = analyse(replace(analysis.recording, events=analysis.recording.events[:4]))
+    assert '<td class="n">–</td>' in page_of(analysis, short).split('id="steps"')[1]
+
+
+def test_names_in_recordings_stay_text(analysis: Analysis) -> None:
+    evil = replace(analysis.recording, path=Path("<img src=x>.mcap"), problems=("<b>x</b>",))
+    page = page_of(analyse(evil), analysis)
+    assert "<img" not in page
+    assert "<b>x" not in page
+
+
+def test_columns_are_the_figures_of_the_steps(analysis: Analysis, tmp_path: Path) -> None:
+    columns = step_columns([analysis, analysis])
+    assert columns["energy_j"] == [r.energy for r in analysis.steps] * 2
+    path = write_table([analysis], tmp_path / "steps.csv")
+    rows = list(csv.DictReader(io.StringIO(path.read_text())))
+    assert [float(row["seconds_s"]) for row in rows] == [r.seconds for r in analysis.steps]
+    assert {row["origin"] for row in rows} == {"simulated"}
+
+
+def test_a_spreadsheet_takes_no_text_for_a_formula(analysis: Analysis, tmp_path: Path) -> None:
+    evil = replace(analysis.recording, path=Path("=1+1.mcap"))
+    text = write_table([analyse(evil)], tmp_path / "steps.csv").read_text()
+    assert "\n=1" not in text
+    assert "'=1+1.mcap" in text
+
+
+def test_a_table_of_another_kind_is_a_sentence(demo_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = demo_file.parent
+    out = ["-o", str(folder / "table_page.html"), "--root", str(folder)]
+    assert main([str(demo_file), *out, "--table", str(folder / "steps.xlsx")]) == 1
+    assert "ends in .csv or .parquet" in capsys.readouterr().err
+
+
+def test_a_folder_is_compared_and_what_is_no_recording_left_out(
+    demo_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["-o", str(tmp_path / "out.html"), "--root", str(tmp_path)]
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.mcap").write_bytes(demo_file.read_bytes())
+    (tmp_path / "c.mcap").write_text("not a recording")
+    assert main([str(tmp_path), *out]) == 0
+    assert "c.mcap: left out" in capsys.readouterr().err
+    assert "<h1>2 recordings compared</h1>" in (tmp_path / "out.html").read_text()
+    (tmp_path / "empty").mkdir()
+    assert main([str(tmp_path / "empty"), *out]) == 1
+    assert "no recording could be read" in capsys.readouterr().err
+    assert main([str(tmp_path / "c.mcap"), *out]) == 1
+
+
+POINTS = st.lists(
+    st.builds(Point, st.just("p"), st.floats(1.0, 1e4), st.floats(1.0, 1e7), st.just("measured")),
+    min_size=2,
+    max_size=9,
+)
+
+
+@given(POINTS)
+def test_no_point_beats_one_of_the_front_and_each_other_one_is_beaten(points: list[Point]) -> None:
+    best = pareto(points)
+    for point in points:
+        beaten = any(
+            b.seconds <= point.seconds
+            and b.energy <= point.energy
+            and (b.seconds, b.energy) != (point.seconds, point.energy)
+            for b in points
+        )
+        assert beaten != any((b.seconds, b.energy) == (point.seconds, point.energy) for b in best)
+    drawn = front_chart(points)
+    assert "nan" not in drawn
+    numbers = [float(x) for x in re.findall(r'c[xy]="([-\d.]+)"', drawn)]
+    assert all(math.isfinite(x) and 0.0 <= x <= 720.0 for x in numbers)
+
+
+def test_the_run_stands_beside_the_common_program(analysis: Analysis) -> None:
+    section = front_section(analysis)
+    for words in ("this run", "common program", "planned in its time"):
+        assert words in section
+    assert front_section(replace(analysis, recording=replace(analysis.recording, savings=()))) == ""
