@@ -8,19 +8,26 @@ from typing import Any
 
 import pytest
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
 
 from ir_msgs.msg import Status
 from ir_msgs_py import names
 from ir_msgs_py.ros.types import interface_type
 from ir_msgs_py.ros.yaml_messages import message_from_yaml
 from ir_recorder.node import RecorderNode
+from ir_recorder.play.node import PlayNode
+from ir_recorder.play.schedule import PlaySettings
+from ir_recorder.read.raw import RawRecording, read_raw
 from ir_recorder.settings import RecorderSettings
+from ir_recorder.write.session import RecordingSession
+from ir_recorder.write.writer import RecordingWriter
 from ir_sim_driver.node import SimDriver
 
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs" / "srv"
 LINE = re.compile(r'# ros2 service call (\S+) (\S+) "(.*)"')
 UNKNOWN = "0123456789abcdef"  # the id that examples give
-LATER = {"ControlPlayback", "ExportProgram"}  # defined before a node offers it
+LATER = {"ExportProgram"}  # defined before a node offers it
 DRIVER = {"cell": "demo", "backend": "ideal", "wake_port": 0, "transitions.stand_on_brakes_minimum_stay": 0.1}
 
 # in this order: a pause ends before a bit is set, a recording starts before it stops; code and a word of the
@@ -61,6 +68,15 @@ def example(name: str) -> tuple[str, str, str]:
     return found[1], found[2], found[3]
 
 
+def recorded(path: Path) -> RawRecording:
+    """Something to play that nobody listens to."""
+    session = RecordingSession(RecordingWriter(path), {}, 0)
+    session.open_topic("/played", "std_msgs/msg/String", [])
+    for second in range(60):
+        session.message("/played", serialize_message(String(data="text")), second * 1_000_000_000)
+    return read_raw(session.finish().path)
+
+
 def test_an_answer_is_expected_of_every_service() -> None:
     assert set(EXPECTED) == {file.stem for file in SRV_FOLDER.glob("*.srv")}
 
@@ -79,6 +95,8 @@ def test_the_examples_are_answered_as_they_should(
     overrides = [Parameter(name, value=value) for name, value in DRIVER.items()]
     ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
     ros_executor.add_node(RecorderNode(RecorderSettings(), context=ros_context))
+    player = PlayNode(recorded(tmp_path / "played.mcap"), PlaySettings(loop=True), context=ros_context)
+    ros_executor.add_node(player).start()
     wait_for(lambda: ros_node.count_publishers(f"/{names.JOINT_STATES}"), what="joint_states come")
 
     def offered() -> set[str]:

@@ -17,6 +17,7 @@ PLANNER: Final = "ir_planner"
 SIM_DRIVER: Final = "ir_sim_driver"
 PROGRAM_RUNNER: Final = "ir_program_runner"
 RECORDER: Final = "ir_recorder"
+PLAY: Final = "ir_play"
 CALLS: Final = "calls"  # topic of every node that answers: its requests and answers, for recordings
 
 # of nobody in particular
@@ -86,6 +87,9 @@ PROGRAM_STATE: Final = f"{PROGRAM_RUNNER}/program_state"
 # ir_recorder: services
 START_RECORDING: Final = f"{RECORDER}/start"
 STOP_RECORDING: Final = f"{RECORDER}/stop"
+
+# ir_play: service
+CONTROL_PLAYBACK: Final = f"{PLAY}/control"
 
 # load texts: names of the cell's loads joined by LOAD_SEPARATOR, or nothing attached
 LOAD_SEPARATOR: Final = "+"

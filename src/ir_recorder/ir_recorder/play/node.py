@@ -19,18 +19,24 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
+from ir_msgs.srv import ControlPlayback
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError, UnknownTypeError
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.command_line import CommandLineError, own_words
+from ir_msgs_py.ros.refusals import answered
 from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.types import interface_type
+from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.arguments import add_roots
 from ir_recorder.errors import RecorderError, SchemaError
 from ir_recorder.format.qos import offers_from_yaml
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.play.commands import is_command
+from ir_recorder.play.keys import HELP, keys_of_terminal, press
 from ir_recorder.play.player import Player
+from ir_recorder.play.playhead import Playhead
 from ir_recorder.play.schedule import DueMessage, PlaySettings
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 
@@ -49,11 +55,12 @@ class PlayNode(Node):
         delay: float = 0.5,
         **options: Any,
     ) -> None:
-        super().__init__("ir_play", **options)
+        super().__init__(names.PLAY, **options)
         self._settings = settings
-        self._stop = threading.Event()
+        self._stop, self._wake = threading.Event(), threading.Event()
+        self._latched: set[str] = set()
         self._feeds: dict[str, Publisher] = {}
-        self._clock = self.create_publisher(Clock, "/clock", 10) if clock else None
+        self._ticks = self.create_publisher(Clock, "/clock", 10) if clock else None
         self._delay = delay
         self.published = 0
         self._schemas = SchemaLibrary()
@@ -63,7 +70,11 @@ class PlayNode(Node):
         self._messages: list[tuple[int, str, bytes]] = []
         for channel in recording.channels:
             self._add(channel)
+        times = [message[0] for message in self._messages]
+        duration = (max(times) - min(times)) * 1e-9 if times else 0.0
+        self.head = Playhead(time.monotonic, duration, settings.rate)
         self._thread = threading.Thread(target=self._play, name="ir_play", daemon=True)
+        BoundedService(self, ControlPlayback, names.CONTROL_PLAYBACK, self._on_control)
 
     def start(self) -> None:
         """Begins to play, after `delay` seconds in which subscribers find the publishers."""
@@ -72,6 +83,7 @@ class PlayNode(Node):
     def stop(self) -> None:
         """Ends playback before the next message."""
         self._stop.set()
+        self._wake.set()
         if self._thread.is_alive():
             self._thread.join()
 
@@ -84,6 +96,28 @@ class PlayNode(Node):
     def playing(self) -> bool:
         """Whether messages are still to come."""
         return self._thread.is_alive()
+
+    def press(self, key: bytes) -> None:
+        """A key of the terminal."""
+        press(key, self.head)
+        self._wake.set()
+
+    def _on_control(self, request: Any, response: Any) -> Any:
+        def control() -> Status:
+            self.head.control(request.pause, request.rate, request.seek)
+            self._wake.set()
+            state = self.head.state
+            response.paused, response.rate = state.paused, state.rate
+            response.position, response.duration = state.position, state.duration
+            return Status.success()
+
+        return answered(response, self.get_name(), control, _known, self.get_logger().error)
+
+    def _wait(self, seconds: float) -> bool:
+        """Wait, no longer than until somebody controls playback; whether it shall end."""
+        self._wake.wait(seconds)
+        self._wake.clear()
+        return self._stop.is_set()
 
     def _add(self, channel: RawChannel) -> None:
         """Opens a channel's topic and takes its messages, where it can and may be played."""
@@ -120,14 +154,18 @@ class PlayNode(Node):
         except (InvalidTopicNameException, ValueError) as error:
             self.get_logger().warning(f"{topic[:200]!r} isn't played: {error}")
             return
+        if latched:
+            self._latched.add(topic)
         if is_command(topic, type_name):
             self._commands.append(topic)
 
     def _play(self) -> None:
         if self._stop.wait(self._delay) or self._refused():
             return
-        tick = self._tick if self._clock is not None else None
-        player = Player(time.monotonic, self._stop.wait, self._publish, tick)
+        tick = self._tick if self._ticks is not None else None
+        player = Player(
+            time.monotonic, self._wait, self._publish, tick, head=self.head, latched=self._latched
+        )
         self.published = player.play(self._messages, self._settings)
 
     def _refused(self) -> bool:
@@ -152,10 +190,14 @@ class PlayNode(Node):
         self._feeds[message.topic].publish(message.data)
 
     def _tick(self, recorded_ns: int) -> None:
-        if self._clock is not None:
+        if self._ticks is not None:
             clock = Clock()
             clock.clock.sec, clock.clock.nanosec = divmod(recorded_ns, 1_000_000_000)
-            self._clock.publish(clock)
+            self._ticks.publish(clock)
+
+
+def _known(error: Exception) -> Status | None:
+    return Status(StatusCode.FAILURE, str(error)) if isinstance(error, RecorderError) else None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -188,7 +230,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         node.start()
         return node
 
-    code = run_node("ir-play", start, everything, goes_on=lambda node: node.playing)
+    def pressed(key: bytes) -> None:
+        for player in players:
+            player.press(key)
+
+    with keys_of_terminal(pressed) as terminal:
+        if terminal:
+            sys.stderr.write(f"{HELP}\n")
+        code = run_node("ir-play", start, everything, goes_on=lambda node: node.playing)
     for player in players:
         if player.failure:
             sys.stderr.write(f"ir-play: {player.failure}\n")

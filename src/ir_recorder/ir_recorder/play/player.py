@@ -1,20 +1,25 @@
-"""Plays messages at their due times; the clock and the waiting come from outside."""
+"""Plays messages when they are due; the clock and the waiting come from outside."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from bisect import bisect_left
+from collections.abc import Callable, Collection, Sequence
 
+from ir_recorder.play.playhead import Playhead
 from ir_recorder.play.schedule import DueMessage, PlaySettings, schedule
 
 Publish = Callable[[DueMessage], None]
 Tick = Callable[[int], None]
+_PAUSED = 1.0  # s between two looks while nothing is due
 
 
 class Player:
     """Hands messages to `publish` when they are due.
 
-    now() [s] is a clock that never jumps; wait(seconds) returns True when playback shall end.
-    tick(recorded_ns) is called at least every `tick_period` seconds of waiting, for /clock.
+    now() [s] is a clock that never jumps; wait(seconds) returns True when playback shall end, and may return
+    early. tick(recorded_ns) is called at least every `tick_period` seconds of waiting, for /clock. head: by
+    which others control it. latched: topics whose last message is published again after a seek.
     """
 
     def __init__(
@@ -24,36 +29,57 @@ class Player:
         publish: Publish,
         tick: Tick | None = None,
         tick_period: float = 0.01,
+        head: Playhead | None = None,
+        latched: Collection[str] = (),
     ) -> None:
         self._now, self._wait, self._publish = now, wait, publish
-        self._tick, self._period = tick, tick_period
-        self._next_tick = 0.0
+        self._tick, self._period, self._next_tick = tick, tick_period, -math.inf
+        self._head, self._latched = head, latched
 
     def play(self, messages: Sequence[tuple[int, str, bytes]], settings: PlaySettings) -> int:
         """Plays to the end, or for ever where `loop`; returns how many messages were published."""
-        count = 0
+        ordered = list(schedule(messages, settings))
+        if not ordered:
+            return 0
+        head = self._head or Playhead(self._now, ordered[-1].at, settings.rate)
+        head.begin()
+        count, index, jumps = 0, 0, 0
         while True:
-            start, before = self._now(), count
-            self._next_tick = 0.0
-            for message in schedule(messages, settings):
-                if not self._until(message, start, settings.rate):
+            if jumps != head.jumps:
+                jumps = head.jumps
+                index = bisect_left(ordered, head.state.position, key=lambda message: message.at)
+                count += self._restore(ordered[:index])
+            if index == len(ordered):
+                if not settings.loop:
                     return count
-                self._publish(message)
-                count += 1
-            if not settings.loop or count == before:
+                head.control(pause=False, seek=0.0)
+                index, jumps = 0, head.jumps
+            due = self._until(ordered[index], ordered[0].recorded_ns, head, jumps)
+            if due is None:
                 return count
+            if due:
+                self._publish(ordered[index])
+                index, count = index + 1, count + 1
 
-    def _until(self, message: DueMessage, start: float, rate: float) -> bool:
-        """Waits until the message is due; False when playback shall end."""
-        while True:
-            passed = self._now() - start
-            if self._tick is not None and passed >= self._next_tick:
-                self._tick(message.recorded_ns - round(max(message.due - passed, 0.0) * rate * 1e9))
-                self._next_tick = passed + self._period
-            left = message.due - passed
+    def _until(self, message: DueMessage, start_ns: int, head: Playhead, jumps: int) -> bool | None:
+        """Waits until the message is due: True; False after a seek, None when playback shall end."""
+        while jumps == head.jumps:
+            now, left = self._now(), head.left(message.at)
+            if self._tick is not None and now >= self._next_tick:
+                self._tick(start_ns + round(min(head.state.position, message.at) * 1e9))
+                self._next_tick = now + self._period
             if left <= 0.0:
-                return not self._wait(0.0)
+                return None if self._wait(0.0) else True
+            left = min(left, _PAUSED) if math.isinf(left) else left
             if self._tick is not None:
-                left = min(left, max(self._next_tick - passed, 0.0))
+                left = min(left, max(self._next_tick - now, 0.0))
             if self._wait(left):
-                return False
+                return None
+        return False
+
+    def _restore(self, before: Sequence[DueMessage]) -> int:
+        """What was latched when the recording came to a place; how many messages."""
+        last = {message.topic: message for message in before if message.topic in self._latched}
+        for message in last.values():
+            self._publish(message)
+        return len(last)

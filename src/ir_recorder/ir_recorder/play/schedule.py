@@ -1,6 +1,4 @@
-"""When each message of a recording is due in playback: recorded distances divided by the rate. No ROS, no
-clock here.
-"""
+"""What of a recording is played, and where in it. No ROS, no clock here."""
 
 from __future__ import annotations
 
@@ -25,8 +23,7 @@ class PlaySettings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "topics", tuple(self.topics))
-        if not 0.001 <= self.rate <= 1000.0:
-            raise RecorderError(f"rate is {self.rate:g}, must be 0.001 to 1000")
+        checked_rate(self.rate)
 
     def plays(self, topic: str, type_name: str = "") -> bool:
         """Whether a topic is played; hidden ones and commands only by name, commands by the full one."""
@@ -39,9 +36,9 @@ class PlaySettings:
 
 @dataclass(frozen=True)
 class DueMessage:
-    """A message with the time it is due [s after the start of playback] and its recorded time [ns]."""
+    """A message with its place [s after the first] and its recorded time [ns]."""
 
-    due: float
+    at: float
     recorded_ns: int
     topic: str
     data: bytes
@@ -54,4 +51,11 @@ def schedule(messages: Sequence[tuple[int, str, bytes]], settings: PlaySettings)
         return
     first = ordered[0][0]
     for time, topic, data in ordered:
-        yield DueMessage((time - first) * 1e-9 / settings.rate, time, topic, data)
+        yield DueMessage((time - first) * 1e-9, time, topic, data)
+
+
+def checked_rate(rate: float) -> float:
+    """A rate in the range; RecorderError for another."""
+    if not 0.001 <= rate <= 1000.0:
+        raise RecorderError(f"rate is {rate:g}, must be 0.001 to 1000")
+    return rate
