@@ -26,3 +26,17 @@ def record_parser() -> argparse.ArgumentParser:
     parser.add_argument("--split-duration", type=float, default=0.0, metavar="S", help=further)
     add_roots(parser)
     return parser
+
+
+def play_parser() -> argparse.ArgumentParser:
+    """Arguments of `ir-play`."""
+    parser = argparse.ArgumentParser(prog="ir-play", description="Publishes a recording's messages again.")
+    parser.add_argument("file")
+    parser.add_argument("--rate", type=float, default=1.0, help="2 plays twice as fast")
+    parser.add_argument("--loop", action="store_true", help="start again at the end")
+    which = "names or patterns; none: all visible topics; commands only by full name, never beside a driver"
+    parser.add_argument("--topics", nargs="+", default=[], help=which)
+    parser.add_argument("--clock", action="store_true", help="publish recorded time on /clock")
+    parser.add_argument("--delay", type=float, default=0.5, help="s before the first message")
+    add_roots(parser)
+    return parser

@@ -6,7 +6,6 @@ a robot or a machine are left out unless asked for by their full name, and then 
 
 from __future__ import annotations
 
-import argparse
 import sys
 import threading
 import time
@@ -29,7 +28,7 @@ from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.types import interface_type
 from ir_msgs_py.status import Status, StatusCode
-from ir_recorder.arguments import add_roots
+from ir_recorder.arguments import play_parser
 from ir_recorder.errors import RecorderError, SchemaError
 from ir_recorder.format.qos import offers_from_yaml
 from ir_recorder.format.schemas import SchemaLibrary
@@ -203,17 +202,8 @@ def _known(error: Exception) -> Status | None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """`ir-play FILE [--rate R] [--loop] [--topics ...] [--clock]`."""
     everything = sys.argv[1:] if arguments is None else list(arguments)
-    parser = argparse.ArgumentParser(prog="ir-play", description="Publishes a recording's messages again.")
-    parser.add_argument("file")
-    parser.add_argument("--rate", type=float, default=1.0, help="2 plays twice as fast")
-    parser.add_argument("--loop", action="store_true", help="start again at the end")
-    which = "names or patterns; none: all visible topics; commands only by full name, never beside a driver"
-    parser.add_argument("--topics", nargs="+", default=[], help=which)
-    parser.add_argument("--clock", action="store_true", help="publish recorded time on /clock")
-    parser.add_argument("--delay", type=float, default=0.5, help="s before the first message")
-    add_roots(parser)
     try:
-        options = parser.parse_args(own_words("ir-play", everything))
+        options = play_parser().parse_args(own_words("ir-play", everything))
         settings = PlaySettings(options.rate, options.loop, tuple(options.topics))
         recording = read_raw(options.file, FileRoots.of(options.roots))
     except (CommandLineError, RecorderError, MsgsError) as error:
