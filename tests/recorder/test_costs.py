@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from ir_msgs_py.settings import settings_table
 from ir_recorder import Analysis, analyse
 from ir_recorder.errors import CostsError
 from ir_recorder.report.costs import NAMES, Costs, read_costs
@@ -80,6 +81,12 @@ def test_the_cycle_is_the_one_with_full_pauses(analysis: Analysis) -> None:
 def test_markup_in_a_currency_stays_text(analysis: Analysis) -> None:
     costs = replace(Costs(), currency="<b>x</b>")
     assert "<b>x" not in costs_section(analysis, costs) + lever_section(analysis, costs)
+
+
+def test_the_documentation_has_the_table_of_the_settings() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
+    rows = [row for row in settings_table(Costs()).splitlines() if not row.startswith("| `given`")]
+    assert "\n".join(rows) in page
 
 
 def test_without_a_program_there_is_nothing_to_pay(analysis: Analysis) -> None:

@@ -1,0 +1,79 @@
+"""Draw the pictures of docs/report.md: a report at a desk, on a tablet, on a phone and on paper.
+
+    make demo && python tools/report_pictures.py [--recording out/demo.mcap] [--folder docs/images]
+
+Chromium draws them without a screen; a fault of the page ends the script.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from _chromium import Browser
+
+from ir_recorder import analyse, findings, read_recording
+from ir_recorder.report import write_report
+
+PAPER = (740, 1094)  # px at 96 dpi: A4 less the margins of the page's style
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A picture: width and height of the window [px], the place that is scrolled to, and how it is shown."""
+
+    name: str
+    size: tuple[int, int]
+    at: str = "header"
+    dark: bool = False
+    touch: bool = False
+    media: str = "screen"
+
+
+SHOTS = (
+    Shot("report.png", (1400, 1730)),
+    Shot("report_axes.png", (1400, 1500), at="#over-time"),
+    Shot("report_tablet.png", (768, 1024), at="#motion", dark=True),
+    Shot("report_phone.png", (390, 844), touch=True),
+    Shot("report_print.png", PAPER, media="print"),
+)
+
+
+def main() -> int:
+    """Writes all pictures; returns 1 where the page has a fault."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--recording", type=Path, default=Path("out/demo.mcap"), help="default: out/demo.mcap"
+    )
+    parser.add_argument("--folder", type=Path, default=Path("docs/images"), help="default: docs/images")
+    asked = parser.parse_args()
+    asked.folder.mkdir(parents=True, exist_ok=True)
+    analysis = analyse(read_recording(asked.recording))
+    with tempfile.TemporaryDirectory() as folder, Browser() as browser:
+        file = write_report(analysis, findings(analysis), Path(folder) / "report.html")
+        faults = [fault for shot in SHOTS for fault in _draw(browser, file, shot, asked.folder)]
+    sys.stdout.write("".join(f"{asked.folder / shot.name}\n" for shot in SHOTS))
+    sys.stderr.write("".join(f"{fault}\n" for fault in faults))
+    return 1 if faults else 0
+
+
+def _draw(browser: Browser, file: Path, shot: Shot, folder: Path) -> list[str]:
+    """Writes one picture; returns what was wrong with the page."""
+    page = browser.open(file, *shot.size, dark=shot.dark, touch=shot.touch)
+    if shot.media == "print":
+        page.call("Emulation.setEmulatedMedia", media="print")
+        page.run("dispatchEvent(new Event('beforeprint'))")
+    page.run(f"document.querySelector('{shot.at}').scrollIntoView({{behavior: 'instant'}})")
+    page.picture(folder / shot.name, whole=False)
+    wrong = [*page.faults, *page.requests]
+    page.close()
+    return wrong
+
+
+if __name__ == "__main__":
+    sys.exit(main())
