@@ -27,7 +27,6 @@ from ir_sim_driver.node import SimDriver
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs" / "srv"
 LINE = re.compile(r'# ros2 service call (\S+) (\S+) "(.*)"')
 UNKNOWN = "0123456789abcdef"  # the id that examples give
-LATER = {"ExportProgram"}  # defined before a node offers it
 DRIVER = {"cell": "demo", "backend": "ideal", "wake_port": 0, "transitions.stand_on_brakes_minimum_stay": 0.1}
 
 # in this order: a pause ends before a bit is set, a recording starts before it stops; code and a word of the
@@ -102,13 +101,11 @@ def test_the_examples_are_answered_as_they_should(
     def offered() -> set[str]:
         return {service for service, _ in ros_node.get_service_names_and_types()}
 
-    now = {name: example(name)[0] for name in EXPECTED if name not in LATER}
+    now = {name: example(name)[0] for name in EXPECTED}
     wait_for(lambda: set(now.values()) <= offered(), what="the services are offered")
     wrong = []
     for name, (code, word) in EXPECTED.items():
         service, type_text, text = example(name)
-        if name in LATER and service not in offered():
-            continue
         kind = interface_type(type_text, "srv")
         client = ros_executor.run(lambda kind=kind, service=service: ros_node.create_client(kind, service))
         wait_for(client.service_is_ready, what=f"{service} is ready")

@@ -17,14 +17,17 @@ BASE_KNOWS: dict[str, set[str]] = {
     "ir_description": {"ir_msgs_py"},
 }
 BASE = set(BASE_KNOWS)
+LANGUAGE = {"ir_krl": {"ir_msgs_py", "ir_description"}}
 ROOMS = {"ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder"}
 KNOWS = {
     **BASE_KNOWS,
+    **LANGUAGE,
     **dict.fromkeys(ROOMS, BASE),
-    "ir_cli": BASE | ROOMS,
+    "ir_planner": BASE | set(LANGUAGE),
+    "ir_cli": BASE | ROOMS | set(LANGUAGE),
 }
 PROJECT = set(KNOWS)
-CORE_READS_NO_CLOCK = {"ir_kernels", "ir_description", "ir_planner"}
+CORE_READS_NO_CLOCK = {"ir_kernels", "ir_description", "ir_krl", "ir_planner"}
 
 
 def modules(package: str) -> list[Path]:

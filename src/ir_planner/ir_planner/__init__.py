@@ -12,6 +12,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError
+from ir_planner.krl import EvaluatedProgram, KrlExport, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
@@ -23,9 +24,11 @@ from ir_planner.trajectories import OptimizationPlan, Reference
 
 __all__ = [
     "CancelledError",
+    "EvaluatedProgram",
     "Evaluation",
     "Goal",
     "IkAnswer",
+    "KrlExport",
     "MovementPlan",
     "OptimizationPlan",
     "PlanOptions",
@@ -41,5 +44,8 @@ __all__ = [
     "StoredProgram",
     "TimingError",
     "UnknownNameError",
+    "evaluate_krl",
+    "export_krl",
     "parse_goal",
+    "tool_in_flange",
 ]

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 from ir_description import DescriptionError, UnknownNameError, load_cell
+from ir_krl import KrlError
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import OBJECTIVES, PlanOptions
@@ -29,7 +30,7 @@ def sentences() -> Iterator[None]:
     """Refusals of the description and the planner inside the block become an InputError."""
     try:
         yield
-    except (DescriptionError, InvalidValueError, RequestError) as error:
+    except (DescriptionError, InvalidValueError, KrlError, RequestError) as error:
         raise InputError(str(error)) from error
 
 

@@ -27,6 +27,7 @@ from ir_msgs_py.status import Status
 from ir_planner.asked_states import StatesCheck
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
+from ir_planner.krl import KrlExport
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
 from ir_planner.service import ServicePlan
@@ -130,6 +131,13 @@ def fill_stored_program(response: Any, program: StoredProgram, include_points: b
     """get_program."""
     response.movements = [planned_movement_to_msg(movement, include_points) for movement in program.movements]
     response.report = report_to_msg(program.report)
+
+
+def fill_export(response: Any, export: KrlExport) -> None:
+    """export_program."""
+    response.text, response.data = export.source, export.data
+    response.deviation = export.deviation
+    response.planned, response.exported = report_to_msg(export.planned), report_to_msg(export.exported)
 
 
 def fill_evaluation(response: Any, evaluation: Evaluation) -> None:

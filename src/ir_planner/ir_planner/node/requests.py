@@ -19,8 +19,10 @@ from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import CancelledError, PlannerError, RequestError
+from ir_planner.krl import export_krl, one_movement
 from ir_planner.node.answers import (
     fill_evaluation,
+    fill_export,
     fill_ik,
     fill_movement,
     fill_optimization,
@@ -44,6 +46,7 @@ from ir_planner.node.inputs import (
 )
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, lengths_of
+from ir_planner.request import chosen
 from ir_planner.service import ServicePlan
 
 
@@ -238,6 +241,18 @@ class Requests:
     def get_program(self, request: Any, response: Any) -> Status:
         """A program planned before."""
         fill_stored_program(response, self.planner.programs.get(request.program_id), request.include_points)
+        return Status.success()
+
+    def export_program(self, request: Any, response: Any) -> Status:
+        """A program or a trajectory planned before, as KRL."""
+        chosen(request.language, ("krl",), "language")
+        if bool(request.program_id) == bool(request.trajectory_id):
+            raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, "give a program_id or a trajectory_id")
+        if request.program_id:
+            movements = self.planner.programs.get(request.program_id).movements
+        else:
+            movements = one_movement(self.planner, request.trajectory_id)
+        fill_export(response, export_krl(self.planner, movements, request.name))
         return Status.success()
 
     def evaluate_trajectory(self, request: Any, response: Any) -> Status:

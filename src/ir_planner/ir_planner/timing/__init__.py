@@ -1,7 +1,7 @@
 """Time scaling: seven-phase laws, straight movements (PTP), blended corners, the best duration."""
 
 from ir_planner.timing.baseline import baseline, baseline_costs_at_least
-from ir_planner.timing.blending import TimedPath, blended, stretched
+from ir_planner.timing.blending import TimedPath, blended, standing, stretched
 from ir_planner.timing.durations import DURATION_SLACK, at_best_duration, check_duration, check_requested
 from ir_planner.timing.level_timing import fastest
 from ir_planner.timing.limit_use import lasting_longer
@@ -15,17 +15,21 @@ from ir_planner.timing.objective import (
     objective_weights,
     request_cost,
 )
+from ir_planner.timing.ptp import free_law
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import distinct, straight_steps
-from ir_planner.timing.time_law import StepLaws
+from ir_planner.timing.time_law import GRID_NS, GRID_S, StepLaws, TimeLaw
 from ir_planner.timing.torque_shares import TORQUE_SHARES, within_torque
 
 __all__ = [
     "DURATION_SLACK",
+    "GRID_NS",
+    "GRID_S",
     "TORQUE_SHARES",
     "Movement",
     "ObjectiveWeights",
     "StepLaws",
+    "TimeLaw",
     "TimedPath",
     "at_best_duration",
     "at_the_mains",
@@ -38,10 +42,12 @@ __all__ = [
     "coarse_energy_cost",
     "distinct",
     "fastest",
+    "free_law",
     "lasting_longer",
     "objective_value",
     "objective_weights",
     "request_cost",
+    "standing",
     "straight_steps",
     "stretched",
     "time_spline",

@@ -1,0 +1,5 @@
+"""The language: texts of .src and .dat files to routines and data, with places for every complaint."""
+
+from ir_krl.language.parse import Parameter, Routine, Source, Tree, Word, parse, place_of
+
+__all__ = ["Parameter", "Routine", "Source", "Tree", "Word", "parse", "place_of"]

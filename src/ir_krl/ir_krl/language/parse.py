@@ -1,0 +1,182 @@
+"""From the texts of a program to its routines and its data.
+
+KRL doesn't distinguish upper and lower case, and one statement is one line: the text is brought into upper
+case outside of strings, comments and header lines are blanked, and lines and columns stay as they were.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from lark import Lark, Token
+from lark import Tree as ParseTree
+from lark.exceptions import UnexpectedCharacters, UnexpectedInput
+
+from ir_krl.errors import KrlSyntaxError, Place
+
+TEXT_MAX = 4_000_000
+"""Characters of one file that are read: a program of this size has some 100,000 lines."""
+
+_COMMENT = re.compile(r"\"[^\"\n]*\"|;[^\n]*|^&[^\n]*", re.MULTILINE)
+_SPELLED = {  # what a user calls the parser's terminals
+    "_NL": "the end of the line",
+    "NAME": "a name",
+    "NUMBER": "a number",
+    "STRING": "a text",
+    "ENUM_VALUE": "a value such as #BASE",
+    "$END": "the end of the file",
+    "EQUAL": "=",
+    "LPAR": "(",
+    "RPAR": ")",
+    "LSQB": "[",
+    "RSQB": "]",
+    "LBRACE": "{",
+    "RBRACE": "}",
+    "COMMA": ",",
+    "COLON": ":",
+    "DOT": ".",
+}
+_EXPECTED_MAX = 6  # alternatives that a sentence names
+_KNOWN_ELSEWHERE = {  # constructs of KRL that aren't read: named, so that nobody looks for a typing error
+    "ANIN": "cyclic analog input",
+    "ANOUT": "analog output",
+    "ASYPTP": "asynchronous axes",
+    "CWRITE": "channels",
+    "CREAD": "channels",
+    "COPEN": "channels",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """A piece of the program: the grammar's rule, and its children: trees, words, None for what lacks."""
+
+    data: str
+    children: tuple[Any, ...]
+    line: int
+    column: int
+
+
+class Word(str):
+    """A word of the program with its place."""
+
+    line: int
+    column: int
+
+    def __new__(cls, text: str, line: int, column: int) -> Word:
+        """The text itself."""
+        word = super().__new__(cls, text)
+        word.line, word.column = line, column
+        return word
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a routine: its name, and whether its value goes back to the caller (OUT)."""
+
+    name: str
+    out: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Routine:
+    """A DEF or DEFFCT: result is the type of its value, "" for a DEF; body is a tree `body`."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    body: Tree
+    result: str
+    file: str
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One file: its routines in their order, and the bodies of its data lists."""
+
+    file: str
+    routines: tuple[Routine, ...]
+    data: tuple[Tree, ...]
+
+
+def parse(text: str, file: str) -> Source:
+    """Read the text of a .src or .dat file; `file` is the name that complaints carry.
+
+    Raises KrlSyntaxError with line and column.
+    """
+    if len(text) > TEXT_MAX:
+        raise KrlSyntaxError(f"{len(text)} characters: at most {TEXT_MAX} are read", Place(file))
+    try:
+        units = _tree(_parser().parse(_prepared(text) + "\n")).children
+    except UnexpectedInput as error:
+        raise KrlSyntaxError(_complaint(error, text), Place(file, error.line, error.column)) from None
+    routines = [_routine(unit, file) for unit in units if unit.data in ("routine", "function")]
+    data = tuple(unit.children[-1] for unit in units if unit.data == "data_list")
+    return Source(file, tuple(routines), data)
+
+
+def place_of(node: Tree | Word, file: str) -> Place:
+    """Where a tree or a word begins."""
+    return Place(file, node.line, node.column)
+
+
+def _tree(node: Any) -> Any:
+    """The parser's tree as this package's own."""
+    if isinstance(node, ParseTree):
+        meta = node.meta
+        children = tuple(_tree(child) for child in node.children)
+        return Tree(str(node.data), children, getattr(meta, "line", 0), getattr(meta, "column", 0))
+    return Word(str(node), node.line or 0, node.column or 0) if isinstance(node, Token) else node
+
+
+def _prepared(text: str) -> str:
+    def blanked(found: re.Match[str]) -> str:
+        return found[0] if found[0].startswith('"') else " " * len(found[0])
+
+    parts, end = [], 0
+    for found in _COMMENT.finditer(text):
+        parts += [text[end : found.start()].upper(), blanked(found)]
+        end = found.end()
+    return "".join([*parts, text[end:].upper()])
+
+
+@cache
+def _parser() -> Lark:
+    grammar = files(__package__).joinpath("krl.lark").read_text(encoding="utf-8")
+    return Lark(grammar, parser="lalr", propagate_positions=True, maybe_placeholders=True)
+
+
+def _routine(unit: Tree, file: str) -> Routine:
+    *head, parameters, body = unit.children
+    result, name = ("", *head) if unit.data == "routine" else head
+    found = [_parameter(one) for one in parameters.children if one is not None]
+    return Routine(str(name), tuple(found), body, str(result), file)
+
+
+def _parameter(tree: Tree) -> Parameter:
+    name, *direction = (str(token) for token in tree.children if token is not None)
+    return Parameter(name, direction == ["OUT"])
+
+
+def _complaint(error: Any, text: str) -> str:
+    """What is wrong, of the parser's untyped exceptions."""
+    lines = text.splitlines()
+    line = lines[error.line - 1] if 0 < error.line <= len(lines) else ""
+    if isinstance(error, UnexpectedCharacters):
+        character = line[error.column - 1 : error.column] or "?"
+        return f"{character!r} is no part of KRL here"
+    first = line.split()[0].upper() if line.split() else ""
+    if first in _KNOWN_ELSEWHERE:
+        return f"{first} ({_KNOWN_ELSEWHERE[first]}) isn't read"
+    word = str(error.token).strip()
+    found = f"{word[:40]!r}" if word else "the line ends, or the file"
+    expected = sorted(_spelled(name) for name in error.expected)
+    wanted = " or ".join(expected) if len(expected) <= _EXPECTED_MAX else "something else"
+    return f"{found} where {wanted} is expected"
+
+
+def _spelled(terminal: str) -> str:
+    return _SPELLED.get(terminal, terminal)

@@ -1,0 +1,34 @@
+"""A program followed without a robot: values, control structures, and the commands that come out."""
+
+from ir_krl.run.commands import (
+    Blend,
+    Command,
+    Motion,
+    Pace,
+    SetOutput,
+    SplineBlock,
+    Target,
+    TimeBlock,
+    Wait,
+    WaitFor,
+)
+from ir_krl.run.control import Note
+from ir_krl.run.frames import FRAME_NAMES
+from ir_krl.run.program import Followed, follow
+
+__all__ = [
+    "FRAME_NAMES",
+    "Blend",
+    "Command",
+    "Followed",
+    "Motion",
+    "Note",
+    "Pace",
+    "SetOutput",
+    "SplineBlock",
+    "Target",
+    "TimeBlock",
+    "Wait",
+    "WaitFor",
+    "follow",
+]

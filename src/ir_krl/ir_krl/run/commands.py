@@ -1,0 +1,128 @@
+"""What a program tells the controller, in the order in which it does: motions, waits, outputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from ir_krl.errors import Place
+from ir_msgs_py.arrays import FloatArray
+
+Kind = Literal["ptp", "lin", "circ", "spl"]
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Where a motion goes: axis angles [rad] or components of a frame [m, rad as written in degrees].
+
+    axes: A1..A6 [rad], those that are given; None for a frame. frame: X, Y, Z [mm], A, B, C [deg], those
+    that are given: the rest stays as it is. status, turn: S and T, None where not given. relative: from where
+    the robot stands; in_tool: in the directions of the tool instead of the base's. base, tool: poses (4, 4)
+    [m] of $BASE in the robot's foot and of $TOOL at the flange.
+    """
+
+    axes: dict[str, float] | None
+    frame: dict[str, float] | None
+    status: int | None
+    turn: int | None
+    relative: bool
+    in_tool: bool
+    base: FloatArray
+    tool: FloatArray
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast: shares (6,) of the axes' speeds and accelerations; velocity [m/s] and acceleration [m/s^2] of
+    the tool, turning [rad/s] and turning_acceleration [rad/s^2] of its orientation; override: share of all
+    speeds.
+    """
+
+    axis_velocity: tuple[float, ...]
+    axis_acceleration: tuple[float, ...]
+    velocity: float
+    acceleration: float
+    turning: float
+    turning_acceleration: float
+    override: float
+
+
+@dataclass(frozen=True)
+class Blend:
+    """Approximate positioning: how (C_PTP, C_DIS, C_VEL, C_ORI, C_SPL), within `distance` [m] or `share` of
+    the motion, whichever the word asks for.
+    """
+
+    how: str
+    distance: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One motion to `target`; circles pass `via` and end after `angle` [rad] where one is given.
+    keeps_orientation: the tool doesn't turn, whatever the target says ($ORI_TYPE #CONSTANT).
+    """
+
+    kind: Kind
+    target: Target
+    pace: Pace
+    place: Place
+    blend: Blend | None = None
+    via: Target | None = None
+    angle: float | None = None
+    keeps_orientation: bool = False
+
+
+@dataclass(frozen=True)
+class TimeBlock:
+    """Parts of a spline from `first` to before `last` take `seconds`; marks: before which part how many per
+    cent of them have passed since the mark before.
+    """
+
+    first: int
+    last: int
+    marks: tuple[tuple[int, float], ...]
+    seconds: float
+    place: Place
+
+
+@dataclass(frozen=True, eq=False)
+class SplineBlock:
+    """SPLINE (tool path) or PTP_SPLINE (axis path): parts that are driven through without a stop."""
+
+    axis: bool
+    parts: tuple[Motion, ...]
+    times: tuple[TimeBlock, ...]
+    place: Place
+    blend: Blend | None = None
+
+
+@dataclass(frozen=True)
+class Wait:
+    """The robot stands still for `seconds`."""
+
+    seconds: float
+    place: Place
+
+
+@dataclass(frozen=True)
+class WaitFor:
+    """The robot stands still until `condition` (as the program writes it) holds."""
+
+    condition: str
+    place: Place
+
+
+@dataclass(frozen=True)
+class SetOutput:
+    """A digital output is set; `pulse` [s] later it goes back, 0 = it stays."""
+
+    number: int
+    value: bool
+    place: Place
+    pulse: float = 0.0
+
+
+Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput

@@ -1,0 +1,180 @@
+"""Expressions: operators of KRL on values, frames composed by the geometric operator."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ir_krl.errors import KrlRunError, Place
+from ir_krl.language import Tree, place_of
+from ir_krl.run.frames import FRAME_NAMES, frame, pose
+from ir_krl.run.memory import Memory, Step
+from ir_krl.run.values import Structure, Symbol, Value, copied, integer, kind_of, number, truth
+
+_COMPARED: dict[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+_LOGICAL: dict[str, Callable[[Any, Any], Any]] = {
+    "AND": operator.and_,
+    "OR": operator.or_,
+    "EXOR": operator.xor,
+}
+
+Caller = Callable[[str, list[Any], Place], Value]
+"""Calls a function: name, trees of its arguments, place."""
+
+
+@dataclass
+class Expressions:
+    """Evaluates trees in a memory. `aliases` are the signals by name; `read_input` gives $IN[number]."""
+
+    memory: Memory
+    aliases: dict[str, tuple[Step, ...]]
+    read_input: Callable[[int, Place], bool]
+    call: Caller
+    file: str = ""
+
+    def value(self, tree: Tree) -> Value:
+        """The value of an expression. Raises KrlRunError with the place."""
+        found: Value = getattr(self, f"_{tree.data}")(tree, place_of(tree, self.file))
+        return found
+
+    def number(self, tree: Tree, what: str) -> float:
+        """A number [as written]."""
+        return number(self.value(tree), what, place_of(tree, self.file))
+
+    def truth(self, tree: Tree, what: str) -> bool:
+        """TRUE or FALSE."""
+        return truth(self.value(tree), what, place_of(tree, self.file))
+
+    def path(self, access: Tree) -> tuple[Step, ...]:
+        """Names and indices of an access; a signal's name becomes what it stands for."""
+        steps: list[Step] = []
+        for name, index in zip(access.children[::2], access.children[1::2], strict=True):
+            steps.append((str(name), None if index is None else self.index(index)))
+        return self.aliases.get(steps[0][0], tuple(steps)) if len(steps) == 1 else tuple(steps)
+
+    def index(self, tree: Tree) -> tuple[int, ...] | None:
+        """Whole numbers of an index; None for []."""
+        place = place_of(tree, self.file)
+        found = tuple(
+            integer(self.value(one), "the index", place) for one in tree.children if one is not None
+        )
+        return found or None
+
+    def _access(self, tree: Tree, place: Place) -> Value:
+        path = self.path(tree)
+        name, index = path[0]
+        if name == "$IN" and index is not None:
+            return self.read_input(index[0], place)
+        return self.memory.get(path, place)
+
+    def _call(self, tree: Tree, place: Place) -> Value:
+        name, *arguments = tree.children
+        return self.call(str(name), arguments, place)
+
+    def _number(self, tree: Tree, place: Place) -> Value:
+        text = str(tree.children[0])
+        return int(text) if text.isdigit() else float(text)
+
+    def _true(self, tree: Tree, place: Place) -> Value:
+        return True
+
+    def _false(self, tree: Tree, place: Place) -> Value:
+        return False
+
+    def _text(self, tree: Tree, place: Place) -> Value:
+        return str(tree.children[0])[1:-1]
+
+    def _enum_value(self, tree: Tree, place: Place) -> Value:
+        return Symbol(str(tree.children[0])[1:])
+
+    def _bits(self, tree: Tree, place: Place) -> Value:
+        text = str(tree.children[0])[1:-1]
+        try:
+            return int(text[1:], 2 if text[0] == "B" else 16)
+        except ValueError:
+            raise KrlRunError(f"'{text}' is no bit pattern", place) from None
+
+    def _aggregate(self, tree: Tree, place: Place) -> Value:
+        kind, *fields = tree.children
+        values: dict[str, Value] = {}
+        for field in fields:
+            name, _, expression = field.children
+            if str(name) in values:
+                raise KrlRunError(f"component {name} is given twice", place_of(field, self.file))
+            values[str(name)] = copied(self.value(expression))
+        return Structure(values, str(kind) if kind is not None else "")
+
+    def _signed(self, tree: Tree, place: Place) -> Value:
+        sign, operand = tree.children
+        value = self.value(operand)
+        number(value, "what follows the sign", place)
+        return -value if sign == "-" else value  # type: ignore[operator]
+
+    def _negated(self, tree: Tree, place: Place) -> Value:
+        word, operand = tree.children
+        value = self.value(operand)
+        if word == "B_NOT":
+            return ~integer(value, "what B_NOT is applied to", place)
+        return not truth(value, "what NOT is applied to", place)
+
+    def _added(self, tree: Tree, place: Place) -> Value:
+        left, sign, right = tree.children
+        a, b = self._numbers(left, right, str(sign))
+        return a + b if sign == "+" else a - b
+
+    def _multiplied(self, tree: Tree, place: Place) -> Value:
+        left, sign, right = tree.children
+        a, b = self._numbers(left, right, str(sign))
+        if sign == "*":
+            return a * b
+        if b == 0:
+            raise KrlRunError("division by 0", place)
+        if isinstance(a, int) and isinstance(b, int):
+            return int(a / b)  # of two INT the INT towards zero
+        return a / b
+
+    def _numbers(self, left: Tree, right: Tree, sign: str) -> tuple[int | float, int | float]:
+        values = []
+        for side in (left, right):
+            value = self.value(side)
+            number(value, f"an operand of {sign}", place_of(side, self.file))
+            values.append(value)
+        return values[0], values[1]  # type: ignore[return-value]
+
+    def _joined(self, tree: Tree, place: Place) -> Value:
+        """AND, OR, EXOR of truth values; B_AND, B_OR, B_EXOR of the bits of whole numbers."""
+        left, word, right = tree.children
+        a, b = self.value(left), self.value(right)
+        what = _LOGICAL[str(word).removeprefix("B_")]
+        wanted = int if word.startswith("B_") else bool
+        if type(a) is wanted and type(b) is wanted:
+            return wanted(what(a, b))
+        raise KrlRunError(
+            f"{word} joins {kind_of(a)} and {kind_of(b)}; a comparison is weaker: put it in brackets", place
+        )
+
+    def _compared(self, tree: Tree, place: Place) -> Value:
+        left, sign, right = tree.children
+        a, b = self.value(left), self.value(right)
+        if sign in ("==", "<>"):
+            return (a == b) is (sign == "==")
+        return _COMPARED[str(sign)](
+            number(a, f"the left of {sign}", place), number(b, f"the right of {sign}", place)
+        )
+
+    def _composed(self, tree: Tree, place: Place) -> Value:
+        first, second = tree.children
+        a, b = self.value(first), self.value(second)
+        result = frame(pose(a, "the left of :", place) @ pose(b, "the right of :", place))
+        if isinstance(b, Structure):  # S, T and the external axes are those of the right side
+            rest = {name: value for name, value in b.fields.items() if name not in FRAME_NAMES}
+            result = Structure({**result.fields, **rest}, b.kind or "FRAME")
+        return result

@@ -1,0 +1,100 @@
+"""Variables by name, as they stand while a program runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ir_krl.errors import KrlRunError, Place
+from ir_krl.run.values import Array, Structure, Value, copied
+
+Step = tuple[str, tuple[int, ...] | None]
+"""A name and, where one is written, its index."""
+
+
+@dataclass
+class Memory:
+    """`shared` holds the data lists and system variables, `scopes` the variables of the routines that run."""
+
+    shared: dict[str, Value]
+    scopes: list[dict[str, Value]] = field(default_factory=list)
+
+    def declare(self, name: str, value: Value) -> None:
+        """A variable of the routine that runs; of the data lists, where none runs."""
+        (self.scopes[-1] if self.scopes else self.shared)[name] = value
+
+    def has(self, name: str) -> bool:
+        """Whether a variable of this name has a value."""
+        return name in self._home(name)
+
+    def get(self, path: tuple[Step, ...], place: Place) -> Value:
+        """The value at a path such as XP1.X or BASE_DATA[2]. Raises KrlRunError."""
+        (name, index), *rest = path
+        home = self._home(name)
+        if name not in home:
+            raise KrlRunError(f"{name} has no value", place)
+        value = _element(home[name], name, index, place)
+        written = name if index is None else f"{name}[{', '.join(map(str, index))}]"
+        for part, part_index in rest:
+            if not isinstance(value, Structure):
+                raise KrlRunError(f"{written} has no components", place)
+            if part not in value.fields:
+                raise KrlRunError(f"{written}.{part} has no value", place)
+            written = f"{written}.{part}"
+            value = _element(value.fields[part], written, part_index, place)
+        return value
+
+    def set(self, path: tuple[Step, ...], value: Value, place: Place) -> None:
+        """Put a copy of `value` there; variables, elements and components are made where they lack."""
+        (name, index), *rest = path
+        home: dict[str, Value] = self._home(name)
+        if not rest and index is None:
+            home[name] = _merged(home.get(name), value)
+            return
+        holder = home
+        for (part, part_index), following in zip(path, [*rest, None], strict=True):
+            if part_index is not None:
+                array = holder.setdefault(part, Array())
+                if not isinstance(array, Array):
+                    raise KrlRunError(f"{part} is no array", place)
+                if following is None:
+                    array.elements[part_index] = _merged(array.elements.get(part_index), value)
+                    return
+                inner = array.elements.setdefault(part_index, Structure({}))
+            elif following is None:
+                holder[part] = _merged(holder.get(part), value)
+                return
+            else:
+                inner = holder.setdefault(part, Structure({}))
+            if not isinstance(inner, Structure):
+                raise KrlRunError(f"{part} has no components", place)
+            holder = inner.fields
+
+    def _home(self, name: str) -> dict[str, Value]:
+        if self.scopes and name in self.scopes[-1]:
+            return self.scopes[-1]
+        return self.shared
+
+
+def _merged(before: Value | None, value: Value) -> Value:
+    """The new value of a variable: components that an aggregate leaves out stay, and so does INT or REAL."""
+    new = copied(value)
+    if isinstance(new, Structure) and isinstance(before, Structure):
+        return Structure(
+            {**before.fields, **new.fields} if before.kind == new.kind or not new.kind else new.fields,
+            new.kind or before.kind,
+        )
+    if isinstance(before, float) and isinstance(new, int) and not isinstance(new, bool):
+        return float(new)
+    if isinstance(before, int) and not isinstance(before, bool) and isinstance(new, float):
+        return round(new)
+    return new
+
+
+def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Place) -> Value:
+    if index is None:
+        return value
+    if not isinstance(value, Array):
+        raise KrlRunError(f"{name} is no array", place)
+    if index not in value.elements:
+        raise KrlRunError(f"{name}[{', '.join(map(str, index))}] has no value", place)
+    return value.elements[index]

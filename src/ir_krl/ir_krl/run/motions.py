@@ -1,0 +1,119 @@
+"""Motions of a program as commands: targets, pace and approximation as the system variables stand."""
+
+from __future__ import annotations
+
+import math
+from typing import get_args
+
+from ir_krl.errors import KrlRunError, Place
+from ir_krl.language import Tree, place_of
+from ir_krl.run.commands import Blend, Kind, Motion, Pace, Target
+from ir_krl.run.expressions import Expressions
+from ir_krl.run.frames import FRAME_NAMES, axes, components, is_axis_value, pose
+from ir_krl.run.memory import Memory
+from ir_krl.run.system import AXES, FULL
+from ir_krl.run.values import Structure, Symbol, integer, kind_of, number
+
+_KINDS: dict[str, Kind] = {kind: kind for kind in get_args(Kind)}
+_MM = 1e-3  # m
+_BLEND_WORDS = {"C_PTP": "CPTP", "C_DIS": "CDIS", "C_ORI": "CORI", "C_VEL": "CVEL", "C_SPL": "CDIS"}
+
+
+class Motions:
+    """Builds motions from trees; `expressions` evaluates what stands in them."""
+
+    def __init__(self, expressions: Expressions, memory: Memory) -> None:
+        self._expressions = expressions
+        self._memory = memory
+
+    def motion(self, tree: Tree) -> Motion:
+        """One of PTP, LIN, CIRC and their relatives, SPL. Raises KrlRunError."""
+        kind: Kind = _KINDS[tree.data]
+        word = str(tree.children[0]) if kind != "spl" else "SPL"
+        place = place_of(tree, self._expressions.file)
+        relative = word.endswith("_REL")
+        frames = [child for child in tree.children if isinstance(child, Tree) and child.data not in _OTHERS]
+        in_tool = str(tree.children[-1]) == "#TOOL" if word in ("LIN_REL", "SLIN_REL") else False
+        if kind == "circ":
+            via, end = self.target(frames[0], relative, in_tool), self.target(frames[1], relative, in_tool)
+            angle = math.radians(self._expressions.number(frames[2], "CA")) if len(frames) > 2 else None
+        else:
+            via, end, angle = None, self.target(frames[0], relative, in_tool), None
+        if kind in ("lin", "circ", "spl") and end.axes is not None:
+            raise KrlRunError(f"{word} goes to a frame, not to axis angles", place)
+        blend = next((self.blend(child) for child in tree.children if _is(child, "approximation")), None)
+        return Motion(kind, end, self.pace(place), place, blend, via, angle, self._keeps_orientation())
+
+    def target(self, tree: Tree, relative: bool, in_tool: bool) -> Target:
+        """Where an expression leads to."""
+        place = place_of(tree, self._expressions.file)
+        value = self._expressions.value(tree)
+        if not isinstance(value, Structure):
+            raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
+        base, tool = (
+            pose(self._memory.get(((name, None),), place), name, place) for name in ("$BASE", "$TOOL")
+        )
+        name = str(tree.children[0]) if tree.data == "access" else ""
+        if is_axis_value(value):
+            return Target(axes(value, place), None, None, None, relative, in_tool, base, tool, name)
+        frame = components(value, FRAME_NAMES, place)
+        if not frame:
+            raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
+        status, turn = (
+            integer(value.fields[part], part, place) if part in value.fields else None for part in ("S", "T")
+        )
+        return Target(None, frame, status, turn, relative, in_tool, base, tool, name)
+
+    def pace(self, place: Place) -> Pace:
+        """How fast the system variables say; each bounded by what a controller takes."""
+        velocity, acceleration = (
+            tuple(self._share(name, (j,), place) for j in range(1, AXES + 1))
+            for name in ("$VEL_AXIS", "$ACC_AXIS")
+        )
+        return Pace(
+            velocity,
+            acceleration,
+            self._positive("$VEL", "CP", place),
+            self._positive("$ACC", "CP", place),
+            math.radians(self._positive("$VEL", "ORI1", place)),
+            math.radians(self._positive("$ACC", "ORI1", place)),
+            self._share("$OV_PRO", None, place),
+        )
+
+    def blend(self, tree: Tree) -> Blend | None:
+        """Approximate positioning as the words of `tree` ask for it; None without a word."""
+        words = [str(word) for word in tree.children]
+        if not words:
+            return None
+        place = place_of(tree, self._expressions.file)
+        how = words[-1]  # C_PTP C_DIS: the second is how a CP motion follows
+        amount = self._number("$APO", _BLEND_WORDS[how], place)
+        if how in ("C_PTP", "C_VEL"):
+            return Blend(how, 0.0, min(max(amount, 0.0), FULL) / FULL)
+        return Blend(how, max(amount, 0.0) * _MM, 1.0)
+
+    def _keeps_orientation(self) -> bool:
+        return self._memory.shared.get("$ORI_TYPE") == Symbol("CONSTANT")
+
+    def _number(self, variable: str, component: str, place: Place) -> float:
+        value = self._memory.get(((variable, None), (component, None)), place)
+        return number(value, f"{variable}.{component}", place)
+
+    def _positive(self, variable: str, component: str, place: Place) -> float:
+        value = self._number(variable, component, place)
+        if value <= 0.0:
+            raise KrlRunError(f"{variable}.{component} is {value:g}; it must be above 0", place)
+        return value
+
+    def _share(self, name: str, index: tuple[int, ...] | None, place: Place) -> float:
+        value = number(self._memory.get(((name, index),), place), name, place)
+        if not 0.0 < value <= FULL:
+            raise KrlRunError(f"{name} is {value:g} %; it must be above 0 and at most 100 %", place)
+        return value / FULL
+
+
+_OTHERS = ("settings", "approximation")
+
+
+def _is(child: object, data: str) -> bool:
+    return isinstance(child, Tree) and child.data == data

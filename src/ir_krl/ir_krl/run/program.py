@@ -1,0 +1,311 @@
+"""Follows a program statement by statement; what reaches the controller is the list of its commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ir_krl.errors import KrlRunError, Place
+from ir_krl.language import Routine, Source, Tree, place_of
+from ir_krl.run.commands import Command, Motion, SetOutput, SplineBlock, TimeBlock
+from ir_krl.run.control import Control, LoopExit, Note, Returned
+from ir_krl.run.expressions import Expressions
+from ir_krl.run.library import Library
+from ir_krl.run.memory import Memory
+from ir_krl.run.motions import Motions
+from ir_krl.run.system import system_variables
+from ir_krl.run.values import Array, Structure, Symbol, Value, copied, kind_of
+from ir_msgs_py.arrays import FloatArray
+
+DEPTH_MAX = 60
+"""Calls within calls."""
+
+_MODELLED = (
+    "$VEL_AXIS",
+    "$ACC_AXIS",
+    "$VEL",
+    "$ACC",
+    "$APO",
+    "$OV_PRO",
+    "$TOOL",
+    "$BASE",
+    "$OUT",
+    "$ORI_TYPE",
+)
+_HARMLESS = (
+    "$ADVANCE",
+    "$BWDSTART",
+    "$H_POS",
+    "$GEAR_JERK",
+    "$COLLMON_TOL_PRO",
+    "$CIRC_TYPE",
+    "$JERK",
+    "$IPO_MODE",
+)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a program does: its name, the commands in their order, and what was assumed."""
+
+    name: str
+    commands: tuple[Command, ...]
+    notes: tuple[Note, ...]
+
+
+def follow(
+    sources: Sequence[Source],
+    home: FloatArray,
+    tool: FloatArray,
+    *,
+    routine: str = "",
+    inputs: Mapping[int, bool] | None = None,
+    loop_passes: int = 1,
+) -> Followed:
+    """Run `routine` (the first of the sources where "") without moving anything.
+
+    home (6,) [rad] is XHOME; tool (4, 4) [m] stands for tools whose data the program doesn't bring. inputs:
+    what $IN[n] reads; one that isn't given and decides something is an error. A LOOP without EXIT is run
+    `loop_passes` times. Raises KrlRunError with the place.
+    """
+    routines: dict[str, Routine] = {}
+    for source in sources:
+        for one in source.routines:
+            if one.name in routines:
+                raise KrlRunError(f"{one.name} is defined twice", place_of(one.body, one.file))
+            routines[one.name] = one
+    name = routine.upper() or next(iter(routines), "")
+    if name not in routines:
+        there = ", ".join(list(routines)[:8]) or "none"
+        raise KrlRunError(f"there is no routine {name or 'at all'}; routines: {there}")
+    run = _Run(routines, Memory(system_variables(home, tool)), dict(inputs or {}), loop_passes)
+    for source in sources:
+        for body in source.data:
+            run.data(body, source.file)
+    run.routine(routines[name], [], Place(routines[name].file))
+    return Followed(name, tuple(run.commands), tuple(run.notes))
+
+
+class _Run(Control):
+    """Calls, declarations and motions, beside the control structures."""
+
+    def __init__(
+        self, routines: dict[str, Routine], memory: Memory, inputs: dict[int, bool], loop_passes: int
+    ) -> None:
+        super().__init__(memory, loop_passes)
+        self._routines, self._inputs = routines, inputs
+        self._library = Library(memory)
+        self.expressions = Expressions(memory, {}, self._input, self._called)
+        self._motions = Motions(self.expressions, memory)
+        self._triggers: list[tuple[float, Tree]] = []
+
+    def data(self, body: Tree, file: str) -> None:
+        """Declarations and values of a data list."""
+        self.expressions.file = file
+        self.body(body)
+
+    def routine(self, routine: Routine, arguments: list[Value | None], place: Place) -> Value:
+        """Run a routine; the value of its RETURN, 0 without one. OUT parameters are read by the caller."""
+        if len(self.memory.scopes) >= DEPTH_MAX:
+            raise KrlRunError(f"{routine.name} is the {DEPTH_MAX}th call within calls", place)
+        if len(arguments) > len(routine.parameters):
+            raise KrlRunError(
+                f"{routine.name} takes {len(routine.parameters)} arguments, {len(arguments)} are given", place
+            )
+        before = self.expressions.file
+        named = zip(routine.parameters, arguments, strict=False)
+        self.memory.scopes.append({one.name: copied(value) for one, value in named if value is not None})
+        self.expressions.file = routine.file
+        try:
+            self.body(routine.body)
+        except Returned as returned:
+            return 0 if returned.value is None else returned.value
+        except LoopExit:
+            raise KrlRunError("EXIT stands outside of a loop", place_of(routine.body, routine.file)) from None
+        finally:
+            self.expressions.file = before
+        return 0
+
+    # names and values
+
+    def _declare(self, tree: Tree) -> None:
+        kind, *declarators = tree.children
+        for declarator in declarators:
+            name, index, expression = declarator.children
+            if expression is not None:
+                value = _typed(str(kind), copied(self.expressions.value(expression)))
+                self.memory.declare(str(name), value)
+            elif index is not None:
+                self.memory.declare(str(name), Array(kind=str(kind)))
+
+    def _structure(self, tree: Tree) -> None:
+        """A type of structures needs no entry: components are made where they are set."""
+
+    _enumeration = _external = _structure
+
+    def _signal(self, tree: Tree) -> None:
+        name, first, last = tree.children
+        if last is not None:
+            self.note(tree, f"the group signal {name} isn't modelled")
+        self.expressions.aliases[str(name)] = self.expressions.path(first)
+
+    def _assignment(self, tree: Tree) -> None:
+        access, expression = tree.children
+        path, value = self.expressions.path(access), self.expressions.value(expression)
+        name, index = path[0]
+        if name == "$OUT" and index is not None:
+            if not isinstance(value, bool):
+                raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", self.place(tree))
+            self.commands.append(SetOutput(index[0], value, self.place(tree)))
+        elif name == "$IPO_MODE" and value != Symbol("BASE"):
+            raise KrlRunError(
+                f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", self.place(tree)
+            )
+        elif name.startswith("$") and name not in _MODELLED and name not in _HARMLESS:
+            self.note(tree, f"{name} isn't modelled")
+        self.memory.set(path, value, self.place(tree))
+
+    def _input(self, number_: int, place: Place) -> bool:
+        if number_ not in self._inputs:
+            raise KrlRunError(f"the value of $IN[{number_}] decides something here and isn't given", place)
+        return self._inputs[number_]
+
+    # calls
+
+    def _call(self, tree: Tree) -> None:
+        name, *arguments = tree.children
+        self._called(str(name), arguments, self.place(tree))
+
+    def _called(self, name: str, arguments: list[Any], place: Place) -> Value:
+        trees = [one.children[0] for one in arguments if one is not None]
+        if trees == [None]:  # ROUTINE()
+            trees = []
+        if name == "PULSE":
+            return self._pulse(trees, place)
+        if name not in self._routines and self._library.has(name):
+            values = [None if one is None else self.expressions.value(one) for one in trees]
+            return self._library.call(name, values, place)
+        if name not in self._routines:
+            raise KrlRunError(f"there is no routine {name}", place)
+        routine = self._routines[name]
+        values = [None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)]
+        result = self.routine(routine, values, place)
+        left = self.memory.scopes.pop()
+        for parameter, tree in zip(routine.parameters, trees, strict=False):
+            if parameter.out and parameter.name in left and tree is not None and tree.data == "access":
+                self.memory.set(self.expressions.path(tree), left[parameter.name], place)
+        return result
+
+    def _argument(self, tree: Tree, k: int, routine: Routine) -> Value | None:
+        """The value of an argument; one that only comes back needs none."""
+        out = k < len(routine.parameters) and routine.parameters[k].out
+        if out and tree.data == "access" and not self.memory.has(self.expressions.path(tree)[0][0]):
+            return None
+        return self.expressions.value(tree)
+
+    def _pulse(self, trees: list[Any], place: Place) -> Value:
+        if len(trees) != 3 or trees[0] is None or trees[0].data != "access":
+            raise KrlRunError("PULSE takes an output, its value and a time", place)
+        (name, index), *_ = self.expressions.path(trees[0])
+        if name != "$OUT" or index is None:
+            raise KrlRunError(f"PULSE sets outputs, not {name}", place)
+        seconds = self.expressions.number(trees[2], "the time of PULSE")
+        level = self.expressions.truth(trees[1], "the value of PULSE")
+        self.commands.append(SetOutput(index[0], level, place, seconds))
+        return 0
+
+    # interrupts
+
+    def _interrupt_declared(self, tree: Tree) -> None:
+        call = tree.children[-1]
+        if str(call.children[0]) != "IR_STOPM":
+            self.note(tree, f"the interrupt that calls {call.children[0]} isn't followed")
+
+    def _interrupt_switched(self, tree: Tree) -> None:
+        """Interrupts aren't followed: their declaration says so."""
+
+    _brake = _resume = _interrupt_switched
+
+    def _trigger(self, tree: Tree) -> None:
+        when, where, delay, action = tree.children[0], *tree.children[1:4]
+        at = self.expressions.number(where, str(when))
+        if str(when) not in ("DISTANCE", "PATH") or self.expressions.number(delay, "DELAY") != 0.0:
+            self.note(tree, "a TRIGGER acts at an end of its motion: path and delay aren't modelled")
+        self._triggers.append((at if str(when) == "DISTANCE" else 1.0, action))
+
+    # motions
+
+    def _ptp(self, tree: Tree) -> None:
+        due, self._triggers = self._triggers, []
+        for at, action in due:
+            if at == 0.0:
+                getattr(self, f"_{action.data}")(action)
+        self.commands.append(self._with_settings(tree, lambda: self._motions.motion(tree)))
+        for at, action in due:
+            if at != 0.0:
+                getattr(self, f"_{action.data}")(action)
+
+    _lin = _circ = _ptp
+
+    def _spline_block(self, tree: Tree) -> None:
+        self.commands.append(self._with_settings(tree, lambda: self._block(tree)))
+
+    def _with_settings(self, tree: Tree, build: Any) -> Any:
+        """Build with what stands after WITH; it holds for this motion only."""
+        settings = next(
+            child for child in tree.children if isinstance(child, Tree) and child.data == "settings"
+        )
+        assignments = [one for one in settings.children if one is not None]
+        if not assignments:
+            return build()
+        shared = self.memory.shared
+        before = {name: copied(value) for name, value in shared.items() if name.startswith("$")}
+        for assignment in assignments:
+            self._assignment(assignment)
+        built = build()
+        for name in [name for name in shared if name.startswith("$") and name not in before]:
+            del shared[name]
+        shared.update(before)
+        return built
+
+    def _block(self, tree: Tree) -> SplineBlock:
+        word, _, *parts, approximation = tree.children
+        motions: list[Motion] = []
+        times: list[TimeBlock] = []
+        start: int | None = None
+        marks: list[tuple[int, float]] = []
+        for part in parts:
+            match part.data:
+                case "time_start":
+                    start, marks = len(motions), []
+                case "time_part":
+                    marks.append((len(motions), self.expressions.number(part.children[0], "TIME_BLOCK PART")))
+                case "time_end":
+                    seconds = self.expressions.number(part.children[0], "TIME_BLOCK END")
+                    if start is None or seconds <= 0.0 or start == len(motions):
+                        raise KrlRunError(
+                            "TIME_BLOCK END needs a START, motions and a time above 0 s", self.place(part)
+                        )
+                    times.append(TimeBlock(start, len(motions), tuple(marks), seconds, self.place(part)))
+                    start = None
+                case "assignment" | "trigger":
+                    getattr(self, f"_{part.data}")(part)
+                case _:
+                    motions.append(self._with_settings(part, lambda part=part: self._motions.motion(part)))
+        if not motions:
+            raise KrlRunError("a spline block without motions", self.place(tree))
+        axis = str(word) == "PTP_SPLINE"
+        blend = self._motions.blend(approximation)
+        return SplineBlock(axis, tuple(motions), tuple(times), self.place(tree), blend)
+
+
+def _typed(kind: str, value: Value) -> Value:
+    """A value as its declaration calls it: REAL X=3 is 3.0, an aggregate takes the type's name."""
+    if isinstance(value, Structure) and not value.kind:
+        return Structure(value.fields, kind)
+    if kind == "REAL" and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if kind == "INT" and isinstance(value, float):
+        return round(value)
+    return value

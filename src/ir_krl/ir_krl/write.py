@@ -1,0 +1,190 @@
+"""Texts of a program: .src and .dat, as a programmer of the controller writes them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from ir_krl.errors import KrlError
+from ir_krl.run.frames import AXIS_NAMES, frame
+from ir_msgs_py.arrays import FloatArray
+
+NAME_MAX = 24
+_NAME = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{NAME_MAX - 1}}}")
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenSpline:
+    """A PTP_SPLINE: points (M, 6) [rad] after the start, the share [%] of `seconds` of each (M,)."""
+
+    comment: str
+    points: FloatArray
+    shares: FloatArray
+    seconds: float
+
+
+@dataclass(frozen=True)
+class WrittenPause:
+    """Standing for `seconds`; `ask`: the signal that asks for a power mode, "" for none."""
+
+    comment: str
+    seconds: float
+    ask: str = ""
+
+
+@dataclass(frozen=True)
+class WrittenSignals:
+    """Signals to wait for, then to set."""
+
+    wait_for: tuple[tuple[str, bool], ...] = ()
+    set_signals: tuple[tuple[str, bool], ...] = ()
+
+
+Part: TypeAlias = WrittenSpline | WrittenPause | WrittenSignals
+
+
+@dataclass(frozen=True, eq=False)
+class Attached:
+    """The tool: its frame (4, 4) in the flange [m], mass [kg], centre of mass (3,) [m] in the flange, inertia
+    (3,) about it [kg m^2].
+    """
+
+    tool: FloatArray
+    mass: float
+    centre: FloatArray
+    inertia: FloatArray
+
+
+AWAKE = "AWAKE"
+"""The signal by which the PLC says that the controller is back."""
+
+
+def written(
+    name: str, start: FloatArray, parts: Sequence[Part], attached: Attached, header: Sequence[str]
+) -> tuple[str, str]:
+    """Texts of NAME.src and NAME.dat: from `start` (6,) [rad] through the parts. Raises KrlError for a name
+    that the controller doesn't take.
+    """
+    if not _NAME.fullmatch(name):
+        raise KrlError(
+            f"the program's name is {name[:40]!r}: a letter, then letters, digits and _, "
+            f"at most {NAME_MAX} characters"
+        )
+    body = _Body()
+    for part in parts:
+        body.add(part)
+    src = [
+        "&ACCESS RVP",
+        "&REL 1",
+        f"DEF {name}( )",
+        *(f"; {line}" for line in header),
+        ";FOLD INI",
+        "GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM( )",
+        "INTERRUPT ON 3",
+        "BAS(#INITMOV,0)",
+        "BAS(#TOOL,1)",
+        "BAS(#BASE,0)",
+        ";ENDFOLD (INI)",
+        "PTP XSTART",
+        *body.lines,
+        "END",
+    ]
+    dat = [
+        "&ACCESS RVP",
+        "&REL 1",
+        f"DEFDAT {name} PUBLIC",
+        "EXT BAS(BAS_COMMAND :IN,REAL :IN)",
+        _load(attached),
+        _tool(attached),
+        *body.signals(),
+        f"DECL E6AXIS XSTART={_axes(start)}",
+        *body.points,
+        "ENDDAT",
+    ]
+    return "\n".join(src) + "\n", "\n".join(dat) + "\n"
+
+
+class _Body:
+    """Lines of the routine, and what the data list must hold for them."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.points: list[str] = []
+        self._outputs: dict[str, int] = {}
+        self._inputs: dict[str, int] = {}
+        self._movements = 0
+
+    def add(self, part: Part) -> None:
+        """Append the lines of a part."""
+        match part:
+            case WrittenSpline():
+                self._spline(part)
+            case WrittenPause():
+                self._pause(part)
+            case WrittenSignals():
+                self.lines += [
+                    f"WAIT FOR {'' if on else 'NOT '}{self._input(name)}" for name, on in part.wait_for
+                ]
+                self.lines += [f"{self._output(name)}={_truth(on)}" for name, on in part.set_signals]
+
+    def signals(self) -> list[str]:
+        """SIGNAL declarations: the numbers are to be adapted to the inputs and outputs of the cell."""
+        return [
+            *(f"SIGNAL {name} $OUT[{n}]" for name, n in self._outputs.items()),
+            *(f"SIGNAL {name} $IN[{n}]" for name, n in self._inputs.items()),
+        ]
+
+    def _spline(self, part: WrittenSpline) -> None:
+        self._movements += 1
+        names = [f"XM{self._movements}_{k + 1}" for k in range(len(part.points))]
+        self.points += [f"DECL E6AXIS {name}={_axes(q)}" for name, q in zip(names, part.points, strict=True)]
+        self.lines += [f"; {part.comment}", "PTP_SPLINE", "TIME_BLOCK START"]
+        for name, share in zip(names[:-1], part.shares, strict=False):
+            self.lines += [f"SPTP {name}", f"TIME_BLOCK PART={share:.9f}"]
+        self.lines += [f"SPTP {names[-1]}", f"TIME_BLOCK END={part.seconds:.6f}", "ENDSPLINE"]
+
+    def _pause(self, part: WrittenPause) -> None:
+        self.lines.append(f"; {part.comment}")
+        if part.ask:
+            self.lines.append(f"{self._output(part.ask)}=TRUE")
+        self.lines.append(f"WAIT SEC {part.seconds:.3f}")
+        if part.ask:
+            self.lines += [f"{self._output(part.ask)}=FALSE", f"WAIT FOR {self._input(AWAKE)}"]
+
+    def _output(self, name: str) -> str:
+        self._outputs.setdefault(name.upper(), len(self._outputs) + 1)
+        return name.upper()
+
+    def _input(self, name: str) -> str:
+        self._inputs.setdefault(name.upper(), len(self._inputs) + 1)
+        return name.upper()
+
+
+def _truth(on: bool) -> str:
+    return "TRUE" if on else "FALSE"
+
+
+def _axes(q: FloatArray) -> str:
+    return (
+        "{"
+        + ",".join(f"{name} {angle:.7f}" for name, angle in zip(AXIS_NAMES, np.degrees(q), strict=True))
+        + "}"
+    )
+
+
+def _tool(attached: Attached) -> str:
+    fields = frame(attached.tool).fields
+    return "TOOL_DATA[1]={" + ",".join(f"{name} {value:.4f}" for name, value in fields.items()) + "}"
+
+
+def _load(attached: Attached) -> str:
+    x, y, z = 1e3 * attached.centre
+    jx, jy, jz = attached.inertia
+    return (
+        f"LOAD_DATA[1]={{M {attached.mass:.3f},CM {{X {x:.2f},Y {y:.2f},Z {z:.2f},A 0,B 0,C 0}},"
+        f"J {{X {jx:.3f},Y {jy:.3f},Z {jz:.3f}}}}}"
+    )

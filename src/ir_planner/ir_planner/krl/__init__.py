@@ -1,0 +1,17 @@
+"""Programs in KUKA's language: as a KR C4 drives them in the cell, and written for it."""
+
+from ir_planner.krl.evaluated import EvaluatedProgram, EvaluatedStep
+from ir_planner.krl.export import DEVIATION_MAX, KrlExport
+from ir_planner.krl.geometry import tool_in_flange
+from ir_planner.krl.requests import evaluate_krl, export_krl, one_movement
+
+__all__ = [
+    "DEVIATION_MAX",
+    "EvaluatedProgram",
+    "EvaluatedStep",
+    "KrlExport",
+    "evaluate_krl",
+    "export_krl",
+    "one_movement",
+    "tool_in_flange",
+]

@@ -1,0 +1,171 @@
+"""What motions draw: straight lines of the axes, and lines, arcs and splines of the tool as joint curves."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.spatial.transform import Rotation, Slerp
+
+from ir_krl import KrlMotionError, Motion
+from ir_msgs_py.arrays import FloatArray
+from ir_planner.krl.geometry import Arm
+
+_STEP_M = 4e-3  # between samples of a tool path
+_STEP_RAD = np.radians(1.0)
+_SAMPLES_MIN, _SAMPLES_MAX = 17, 20_001
+_JUMP = np.radians(20.0)  # of an axis between samples: the path passes a singularity
+_STRAIGHT = 1e-6  # m: three points nearer to a line than this are no circle
+_DEGREE = 5
+
+
+class Curve(Protocol):
+    """A path of the axes over s in [0, 1]."""
+
+    @property
+    def length(self) -> float:
+        """Of the tool's path [m]; 0 where nothing bounds the tool."""
+
+    @property
+    def turning(self) -> float:
+        """Of the tool along the path [rad]."""
+
+    def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """q and its first three derivatives by s, (M, n) each, at s (M,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class AxisLine:
+    """A PTP: from start to end (n,) [rad]."""
+
+    start: FloatArray
+    end: FloatArray
+    length: float = 0.0
+    turning: float = 0.0
+
+    def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """As the protocol says."""
+        step = np.broadcast_to(self.end - self.start, (len(s), len(self.start)))
+        none = np.zeros_like(step)
+        return self.start + s[:, None] * step, step, none, none
+
+
+@dataclass(frozen=True, eq=False)
+class AxisCurve:
+    """Axes as a spline over s."""
+
+    spline: BSpline
+    length: float
+    turning: float
+
+    def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """As the protocol says."""
+        q, first, second, third = (np.asarray(self.spline(s, nu=k)) for k in range(4))
+        return q, first, second, third
+
+
+def through_axes(points: FloatArray) -> AxisCurve:
+    """The spline of the axes through points (M, n), spaced by their distance."""
+    steps = np.abs(np.diff(points, axis=0)).max(axis=1)
+    u = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-9))])
+    u /= u[-1]
+    return AxisCurve(make_interp_spline(u, points, k=min(_DEGREE, len(points) - 1)), 0.0, 0.0)
+
+
+def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
+    """A LIN or CIRC from the configuration `start` (n,). Raises KrlMotionError."""
+    first = arm.tool_pose(motion.target, start)
+    last = arm.pose(motion.target, first)
+    if motion.keeps_orientation:
+        last[:3, :3] = first[:3, :3]
+    way: _Arc | _Line = _Line(first[:3, 3], last[:3, 3])
+    if motion.via is not None:
+        way = _arc(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion)
+    ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
+    turning = float((ends[0].inv() * ends[1]).magnitude())
+    fine = np.ceil(max(way.length / _STEP_M, turning / _STEP_RAD)) + 1
+    u = np.linspace(0.0, 1.0, int(np.clip(fine, _SAMPLES_MIN, _SAMPLES_MAX)))
+    poses = np.tile(np.eye(4), (len(u), 1, 1))
+    poses[:, :3, 3] = way(u)
+    poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(u).as_matrix()
+    q = followed(poses, motion, start, arm)
+    return AxisCurve(make_interp_spline(u, q, k=_DEGREE), way.length, turning)
+
+
+def followed(poses: FloatArray, motion: Motion, start: FloatArray, arm: Arm) -> FloatArray:
+    """Configurations (N, n) along tool poses (N, 4, 4), each the nearest to the one before; the first is
+    `start`. Raises KrlMotionError where the path leaves the reach or an axis jumps.
+    """
+    q = np.empty((len(poses), len(start)))
+    q[0] = start
+    for k, found in enumerate(arm.configurations(poses[1:], motion.target), start=1):
+        where = f"{100.0 * k / (len(poses) - 1):.0f} % along"
+        if len(found) == 0:
+            raise KrlMotionError(
+                f"{_name(motion)}: the path leaves the reach or an axis limit {where}", motion.place
+            )
+        nearest = found[np.argmin(np.abs(found - q[k - 1]).max(axis=1))]
+        jump = np.abs(nearest - q[k - 1])
+        if jump.max() > _JUMP:
+            j = int(jump.argmax())
+            raise KrlMotionError(
+                f"{_name(motion)}: A{j + 1} would have to jump by {np.degrees(jump[j]):.0f} deg {where}: "
+                "a singularity, or an axis limit that asks for another configuration",
+                motion.place,
+            )
+        q[k] = nearest
+    return q
+
+
+def _name(motion: Motion) -> str:
+    return motion.kind.upper() + (f" {motion.target.name}" if motion.target.name else "")
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """From start to end, (3,) each [m]."""
+
+    start: FloatArray
+    end: FloatArray
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.end - self.start))
+
+    def __call__(self, u: FloatArray) -> FloatArray:
+        return np.asarray(self.start + u[:, None] * (self.end - self.start))
+
+
+@dataclass(frozen=True, eq=False)
+class _Arc:
+    """Places centre + cos(phi) radius + sin(phi) across, (3,) each [m], for phi from 0 to angle [rad]."""
+
+    centre: FloatArray
+    radius: FloatArray
+    across: FloatArray
+    angle: float
+
+    @property
+    def length(self) -> float:
+        return abs(self.angle) * float(np.linalg.norm(self.radius))
+
+    def __call__(self, u: FloatArray) -> FloatArray:
+        turned = np.asarray(self.angle * u)[:, None]
+        return np.asarray(self.centre + np.cos(turned) * self.radius + np.sin(turned) * self.across)
+
+
+def _arc(start: FloatArray, via: FloatArray, end: FloatArray, motion: Motion) -> _Arc:
+    """The circle through three places (3,) [m], up to the end or to the motion's angle."""
+    a, b = via - start, end - start
+    normal = np.cross(a, b)
+    size = float(normal @ normal)
+    if size < (_STRAIGHT * float(np.linalg.norm(b))) ** 2 or float(a @ a) < _STRAIGHT**2:
+        raise KrlMotionError("CIRC: start, auxiliary point and end lie on a line", motion.place)
+    centre = start + np.cross(float(a @ a) * b - float(b @ b) * a, normal) / (2.0 * size)
+    radius = start - centre
+    across = np.cross(normal / np.sqrt(size), radius)
+    angle = motion.angle
+    if angle is None:
+        reach = end - centre
+        angle = float(np.arctan2(reach @ across, reach @ radius)) % (2.0 * np.pi)
+    return _Arc(centre, radius, across, angle)

@@ -1,0 +1,167 @@
+"""A KRL program as a KR C4 drives it: a trajectory from one standstill to the next, waits, outputs."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ir_krl import (
+    Blend,
+    Command,
+    Followed,
+    KrlMotionError,
+    Motion,
+    Note,
+    Pace,
+    Place,
+    SetOutput,
+    SplineBlock,
+    Wait,
+    WaitFor,
+)
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.krl.blending import overlap, trajectory
+from ir_planner.krl.curves import AxisLine, Curve, tool_curve
+from ir_planner.krl.geometry import Arm
+from ir_planner.krl.moves import Move, move
+from ir_planner.krl.splines import block_curve, timed_block
+from ir_planner.scene import STILL, PlanningScene
+from ir_planner.timing import standing
+
+_BLENDED_JERK = 0.5  # of the limit: while two moves overlap their jerks add up
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenStep:
+    """One step from standstill to standstill: a movement, or a wait.
+
+    places: of its motions in the program; outputs: set at its end, number and value; waits_for: a condition
+    that ends a wait.
+    """
+
+    trajectory: JointTrajectory
+    moves: bool
+    places: tuple[Place, ...]
+    outputs: tuple[tuple[int, bool], ...] = ()
+    waits_for: str = ""
+
+
+def drive(
+    program: Followed, scene: PlanningScene, start: FloatArray
+) -> tuple[tuple[DrivenStep, ...], tuple[Note, ...]]:
+    """All steps of the program, and what was assumed; `start` (n,) is where the robot stands before.
+
+    As on the controller, the first motion brings the robot onto the programmed path (block coincidence): it
+    is no part of the cycle. Raises KrlMotionError.
+    """
+    run = _Drive(scene, np.array(start), list(program.notes))
+    for command in program.commands:
+        run.take(command)
+    run.finish()
+    return tuple(run.steps), tuple(run.notes)
+
+
+@dataclass
+class _Drive:
+    """Where the robot stands (n,), and the motions that are being driven through."""
+
+    scene: PlanningScene
+    here: FloatArray
+    notes: list[Note]
+    steps: list[DrivenStep] = field(default_factory=list)
+    _moves: list[Move] = field(default_factory=list)
+    _overlaps: list[int] = field(default_factory=list)
+    _places: list[Place] = field(default_factory=list)
+    _on_path: bool = False  # the first motion has led to the programmed path
+    _blend: Blend | None = None  # of the last motion; None: it ends at rest
+
+    def __post_init__(self) -> None:
+        self.arm = Arm(self.scene)
+
+    def take(self, command: Command) -> None:
+        """Drive one command."""
+        match command:
+            case Motion():
+                self._motion(command)
+            case SplineBlock():
+                self._block(command)
+            case SetOutput():
+                self.finish()
+                if self.steps:
+                    outputs = (*self.steps[-1].outputs, (command.number, command.value))
+                    self.steps[-1] = replace(self.steps[-1], outputs=outputs)
+            case Wait():
+                self.finish()
+                self._stand(command.seconds, command.place, "")
+            case WaitFor():
+                self.finish()
+                self._stand(0.0, command.place, command.condition)
+
+    def finish(self) -> None:
+        """Come to rest: what is being driven through becomes a step."""
+        if not self._moves:
+            return
+        names = self.scene.cell.robot.joint_names
+        self._step(trajectory(self._moves, self._overlaps, names), tuple(self._places), moves=True)
+        self._moves, self._overlaps, self._places, self._blend = [], [], [], None
+
+    def _motion(self, motion: Motion) -> None:
+        if not self._on_path:
+            if motion.kind != "ptp":
+                raise KrlMotionError(
+                    "the first motion must be a PTP: where does the robot stand before?", motion.place
+                )
+            self.here = self.arm.reached(motion.target, self.here, motion.place)
+            self._on_path = True
+            return
+        if motion.kind == "ptp":
+            end = self.arm.reached(motion.target, self.here, motion.place)
+            if np.abs(end - self.here).max() < STILL:
+                return
+            curve = AxisLine(self.here, end)
+            self._drive(curve, motion, motion.pace)
+        else:
+            line = tool_curve(motion, self.here, self.arm)
+            if max(line.length, line.turning) < STILL:
+                return
+            self._drive(line, motion, motion.pace)
+
+    def _block(self, block: SplineBlock) -> None:
+        if not self._on_path:
+            raise KrlMotionError(
+                "the first motion must be a PTP: where does the robot stand before?", block.place
+            )
+        driven = timed_block(block, self.here, self.arm)
+        if driven is not None:
+            self.finish()
+            self.here = driven.positions[-1]
+            self._step(driven, (block.place,), moves=True)
+            return
+        curve = block_curve(block, self.here, self.arm)
+        least = sum(one.seconds for one in block.times)
+        self._drive(curve, block, block.parts[0].pace, least)
+
+    def _drive(self, curve: Curve, command: Motion | SplineBlock, pace: Pace, least: float = 0.0) -> None:
+        share = 1.0 if self._blend is None and command.blend is None else _BLENDED_JERK
+        made = move(curve, pace, self.scene, command.place, least=least, jerk_share=share)
+        if self._moves and self._blend is not None:
+            steps = overlap(self._moves[-1], made, self._blend, self.scene)
+            if steps > 0:
+                self._overlaps.append(steps)
+            else:
+                self.finish()
+        self._moves.append(made)
+        self._places.append(command.place)
+        self._blend = command.blend
+        self.here = made.at(np.array([made.law.total]))[0][0]
+        if self._blend is None:
+            self.finish()
+
+    def _stand(self, seconds: float, place: Place, condition: str) -> None:
+        names = self.scene.cell.robot.joint_names
+        self._step(standing(self.here, names, seconds), (place,), moves=False, waits_for=condition)
+
+    def _step(
+        self, driven: JointTrajectory, places: tuple[Place, ...], *, moves: bool, waits_for: str = ""
+    ) -> None:
+        self.steps.append(DrivenStep(driven, moves, places, (), waits_for))

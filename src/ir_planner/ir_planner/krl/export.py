@@ -1,0 +1,220 @@
+"""Programs and trajectories written as KRL, read back, driven by the controller's model and proved again.
+
+A movement becomes a PTP_SPLINE through points of its trajectory with a TIME_BLOCK that gives each its time.
+As many points are taken as the movement needs to stay certified and near to what was planned.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_description import Cell
+from ir_krl import (
+    Attached,
+    Part,
+    WrittenPause,
+    WrittenSignals,
+    WrittenSpline,
+    follow,
+    parse,
+    written,
+)
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_msgs_py.status import StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.checks import Evaluation, total_report
+from ir_planner.errors import RequestError
+from ir_planner.krl.driven import DrivenStep, drive
+from ir_planner.krl.geometry import tool_in_flange
+from ir_planner.scene import PlanningScene
+
+DEVIATION_MAX = 2e-3  # rad, of a joint from the planned movement
+_SPACING = 0.2  # s between points at first
+_POINTS_MIN, _POINTS_MAX = 6, 400
+_SLOWINGS = 4  # per number of points
+_CLOSE = 1.001
+_ENOUGH = 1.01  # of the planned duration
+_FINEST = 0.04  # s between points, where more of them no longer help
+_SAMPLES_PER_S = 250
+_ASKS = {"BUS_POWER_OFF": "AB", "HIBERNATION": "HIB", "STAND_ON_BRAKES": ""}
+
+Judge = Callable[[JointTrajectory, PlannedMovement], Evaluation]
+"""Evaluates a trajectory as the step that it belongs to: with its load, its parts and its station."""
+
+
+@dataclass(frozen=True, eq=False)
+class KrlExport:
+    """Texts of the program; the largest deviation [rad] of a joint from the plan, and the reports of what was
+    planned and of what the controller drives.
+    """
+
+    source: str
+    data: str
+    deviation: float
+    planned: TrajectoryReport
+    exported: TrajectoryReport
+
+
+def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, judge: Judge) -> KrlExport:
+    """Write steps (movements with their points, and pauses) as program `name`.
+
+    Raises RequestError where a movement can't be written so that it stays certified, KrlError for the name.
+    """
+    moving = [step for step in steps if not step.is_pause]
+    if not moving:
+        raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
+    fitted = {id(step): _fitted(step, scene, judge) for step in moving}
+    parts = [part for step in steps for part in _parts(step, fitted)]
+    start = _points_of(moving[0]).positions[0]
+    header = [f"{scene.cell.name}: {len(moving)} movements, points and times as planned"]
+    source, data = written(name, start, parts, attached(scene), header)
+    driven = [step.trajectory for step in _driven(source, data, scene) if step.moves]
+    before, after, deviation = [], [], 0.0
+    for step, again in zip(moving, driven, strict=True):
+        found = judge(again, step)
+        if not found.verification.certified:
+            raise RequestError(
+                StatusCode.INVALID_MOTION_PLAN,
+                f"{_called(step)} isn't certified as the controller would drive it: "
+                f"{found.verification.status.message}",
+            )
+        deviation = max(deviation, _deviation(again, _points_of(step)))
+        before.append(step.report)
+        after.append(found.report)
+    return KrlExport(source, data, deviation, _together(before), _together(after))
+
+
+def attached(scene: PlanningScene) -> Attached:
+    """Tool and load of the scene as TOOL_DATA and LOAD_DATA give them, in KUKA's flange."""
+    cell: Cell = scene.cell
+    tool = cell.tool
+    if tool is None:
+        return Attached(tool_in_flange(cell.tcp), 0.0, np.zeros(3), np.zeros(3))
+    turn = tool_in_flange(np.eye(4))[:3, :3]
+    inertia = turn @ tool.inertia @ turn.T
+    return Attached(tool_in_flange(cell.tcp), tool.mass, turn @ tool.com, np.diag(inertia).copy())
+
+
+def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> WrittenSpline:
+    """The movement through as many points as it needs, doubled from `_SPACING`, to be certified, near to the
+    plan, and hardly slower.
+    """
+    planned = _points_of(step)
+    count = max(int(np.ceil(planned.duration / _SPACING)), _POINTS_MIN)
+    best: WrittenSpline | None = None
+    reason = ""
+    while count <= _POINTS_MAX:
+        spline, reason = _slowed(step, planned, count, scene, judge)
+        if spline is not None and (best is None or spline.seconds < best.seconds):
+            best = spline
+        if best is not None and (
+            best.seconds <= planned.duration * _ENOUGH or count * _FINEST > planned.duration
+        ):
+            return best
+        count *= 2
+    if best is not None:
+        return best
+    raise RequestError(
+        StatusCode.INVALID_MOTION_PLAN,
+        f"{_called(step)} can't be written with {_POINTS_MAX} points: {reason}",
+    )
+
+
+def _slowed(
+    step: PlannedMovement, planned: JointTrajectory, count: int, scene: PlanningScene, judge: Judge
+) -> tuple[WrittenSpline | None, str]:
+    """The movement through `count` points, slowed until it is certified; else None, and the reason."""
+    slower, reason = 1.0, ""
+    for _ in range(_SLOWINGS):
+        spline = _spline(step, planned, count, slower)
+        again = _read_back(spline, planned.positions[0], scene)
+        away = _deviation(again, planned)
+        if away > DEVIATION_MAX:
+            return (
+                None,
+                f"with {count} points a joint is {away:.4f} rad off; {DEVIATION_MAX:g} rad are allowed",
+            )
+        found = judge(again, step)
+        if found.verification.certified:
+            return spline, ""
+        reason = found.verification.status.message
+        needed = _needed(found.report)
+        if needed <= 1.0:  # no matter of time: the path is too near to something
+            break
+        slower *= needed * _CLOSE
+    return None, reason
+
+
+def _needed(report: TrajectoryReport) -> float:
+    """By how much the time has to grow for the limits of speed, acceleration, jerk and torque."""
+    ratios = (report.velocity_ratio, report.acceleration_ratio, report.jerk_ratio, report.torque_ratio)
+    roots = (1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 2.0)
+    return max(float(ratio.max(initial=0.0) ** root) for ratio, root in zip(ratios, roots, strict=True))
+
+
+def _spline(step: PlannedMovement, planned: JointTrajectory, count: int, slower: float) -> WrittenSpline:
+    times = np.linspace(0.0, planned.duration, count + 1)[1:]
+    seconds = round(planned.duration * slower, 3) if slower > 1.0 else planned.duration
+    report = step.report
+    comment = f"{_called(step)}: {seconds:.2f} s, planned {report.duration:.2f} s and {report.energy:.0f} J"
+    if np.isfinite(report.min_clearance):
+        comment += f", clearance {1e3 * report.min_clearance:.0f} mm"
+    return WrittenSpline(comment, planned.sample(times).q, np.full(count, 100.0 / count), seconds)
+
+
+def _read_back(spline: WrittenSpline, start: FloatArray, scene: PlanningScene) -> JointTrajectory:
+    """The movement alone, as the controller's model drives it."""
+    source, data = written("M", start, [spline], attached(scene), [])
+    (step,) = _driven(source, data, scene)
+    return step.trajectory
+
+
+def _parts(step: PlannedMovement, fitted: dict[int, WrittenSpline]) -> list[Part]:
+    parts: list[Part] = [WrittenSignals(wait_for=_signals(step.wait_for))] if step.wait_for else []
+    if step.is_pause:
+        mode = step.power_mode or "STAND_ON_MOTORS"
+        parts.append(WrittenPause(f"pause {step.duration:g} s: {mode}", step.duration, _ASKS.get(mode, "")))
+    else:
+        parts.append(fitted[id(step)])
+    if step.set_signals:
+        parts.append(WrittenSignals(set_signals=_signals(step.set_signals)))
+    return parts
+
+
+def _signals(texts: Sequence[str]) -> tuple[tuple[str, bool], ...]:
+    split = (text.partition("=") for text in texts)
+    return tuple((name, value != "0") for name, _, value in split)
+
+
+def _driven(source: str, data: str, scene: PlanningScene) -> tuple[DrivenStep, ...]:
+    home = scene.cell.machine_home
+    program = follow(
+        [parse(source, "export.src"), parse(data, "export.dat")], home, tool_in_flange(scene.cell.tcp)
+    )
+    return drive(program, scene, home)[0]
+
+
+def _deviation(driven: JointTrajectory, planned: JointTrajectory) -> float:
+    """Largest difference of a joint [rad] at equal shares of the two durations."""
+    share = np.linspace(0.0, 1.0, max(round(planned.duration * _SAMPLES_PER_S), 2))
+    away: FloatArray = driven.sample(share * driven.duration).q - planned.sample(share * planned.duration).q
+    return float(np.abs(away).max())
+
+
+def _points_of(step: PlannedMovement) -> JointTrajectory:
+    if step.trajectory is None:
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN, f"{_called(step)} has no points: get them by its id"
+        )
+    return step.trajectory
+
+
+def _called(step: PlannedMovement) -> str:
+    return f"{step.from_station or 'start'} -> {step.to_station or 'goal'}"
+
+
+def _together(reports: Sequence[TrajectoryReport]) -> TrajectoryReport:
+    elapsed = np.cumsum([0.0, *(report.duration for report in reports)])[:-1]
+    return total_report(tuple(reports), tuple(elapsed.tolist()))

@@ -1,0 +1,113 @@
+"""Spline blocks: several parts driven through without a stop.
+
+Assumptions, where KUKA publishes no formula: a PTP_SPLINE is the interpolating spline of degree five through
+its points; with one TIME_BLOCK over all of its parts it passes them at the marked times, at rest at both
+ends. A SPLINE is the same of the tool, straight between the ends of its SLIN parts as far as a spline
+through points of the line is.
+"""
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation, RotationSpline, Slerp
+
+from ir_krl import KrlMotionError, SplineBlock, TimeBlock
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.krl.curves import AxisCurve, followed, through_axes
+from ir_planner.krl.geometry import Arm
+from ir_planner.timing import GRID_NS
+
+_LINE_POINTS = 9  # of an SLIN part, so that the spline through them is straight
+_STEP_M = 4e-3
+_SAMPLES_MIN, _SAMPLES_MAX = 33, 20_001
+_DEGREE = 5
+_KNOTS_PER_S = 125
+
+
+def block_curve(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
+    """The curve of a block from the configuration `start` (n,). Raises KrlMotionError."""
+    if block.axis:
+        return through_axes(_axis_points(block, start, arm))
+    return _tool_spline(block, start, arm)
+
+
+def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTrajectory | None:
+    """The trajectory of a PTP_SPLINE whose TIME_BLOCK gives every part its time; None of other blocks."""
+    whole = [one for one in block.times if one.first == 0 and one.last == len(block.parts)]
+    if not block.axis or len(block.times) != 1 or not whole:
+        return None
+    points = _axis_points(block, start, arm)
+    times = _passing_times(whole[0], len(block.parts))
+    if times is None:
+        return None
+    rest = [(order, np.zeros(points.shape[1])) for order in (1, 2)]
+    spline = make_interp_spline(times, points, k=_DEGREE, bc_type=(rest, rest))  # type: ignore[arg-type]
+    total = round(times[-1] / (GRID_NS * 1e-9))
+    fine = np.linspace(0, total, max(round(times[-1] * _KNOTS_PER_S), len(times)) + 1)
+    steps = np.unique(np.concatenate([np.rint(fine), np.rint(times / (GRID_NS * 1e-9))])).astype(np.int64)
+    q, qd, qdd = (np.asarray(spline(steps * (GRID_NS * 1e-9), nu=k)) for k in range(3))
+    qd[[0, -1]] = qdd[[0, -1]] = 0.0
+    q[0], q[-1] = points[0], points[-1]
+    return JointTrajectory(arm.scene.cell.robot.joint_names, steps * GRID_NS, q, qd, qdd)
+
+
+def _passing_times(block: TimeBlock, parts: int) -> FloatArray | None:
+    """Times (parts + 1,) [s] at which the points are passed; None where marks leave some open."""
+    marked = dict(block.marks)
+    if set(marked) != set(range(1, parts)):
+        return None
+    shares = np.array([marked[k] for k in range(1, parts)])
+    last = 100.0 - shares.sum()
+    if (shares <= 0.0).any() or last <= 0.0:
+        raise KrlMotionError(
+            "TIME_BLOCK PART: shares are above 0 % and less than 100 % together", block.place
+        )
+    return np.concatenate([[0.0], np.cumsum([*shares, last])]) * (block.seconds / 100.0)
+
+
+def _axis_points(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
+    points = [start]
+    for part in block.parts:
+        if part.kind not in ("ptp", "spl"):
+            raise KrlMotionError("a PTP_SPLINE has SPTP parts only", part.place)
+        points.append(arm.reached(part.target, points[-1], part.place))
+    if np.abs(np.diff(points, axis=0)).max(axis=1).min() <= 0.0:
+        raise KrlMotionError("a PTP_SPLINE goes to the same place twice in a row", block.place)
+    return np.array(points)
+
+
+def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
+    """The spline of the tool through the ends of the parts, followed by the axes."""
+    first = block.parts[0]
+    poses = [arm.tool_pose(first.target, start)]
+    for part in block.parts:
+        if part.kind in ("ptp", "circ"):
+            raise KrlMotionError(f"{part.kind.upper()} inside of SPLINE isn't read", part.place)
+        if not np.array_equal(part.target.base, first.target.base) or not np.array_equal(
+            part.target.tool, first.target.tool
+        ):
+            raise KrlMotionError("a SPLINE keeps its tool and its base", part.place)
+        poses += _line(poses[-1], arm.pose(part.target, poses[-1]), _LINE_POINTS if part.kind == "lin" else 1)
+    stacked = np.array(poses)
+    steps = np.linalg.norm(np.diff(stacked[:, :3, 3], axis=0), axis=1)
+    if steps.min() <= 0.0:
+        raise KrlMotionError("a SPLINE goes to the same place twice in a row", block.place)
+    length = float(steps.sum())
+    u = np.concatenate([[0.0], np.cumsum(steps)]) / length
+    fine = np.linspace(0.0, 1.0, int(np.clip(length / _STEP_M, _SAMPLES_MIN, _SAMPLES_MAX)))
+    along = np.tile(np.eye(4), (len(fine), 1, 1))
+    along[:, :3, 3] = make_interp_spline(u, stacked[:, :3, 3], k=min(3, len(u) - 1))(fine)
+    along[:, :3, :3] = RotationSpline(u, Rotation.from_matrix(stacked[:, :3, :3]))(fine).as_matrix()
+    q = followed(along, first, start, arm)
+    turning = float(Rotation.from_matrix(stacked[0, :3, :3].T @ stacked[-1, :3, :3]).magnitude())
+    return AxisCurve(make_interp_spline(fine, q, k=_DEGREE), length, turning)
+
+
+def _line(first: FloatArray, last: FloatArray, count: int) -> list[FloatArray]:
+    """`count` poses (4, 4) on the straight line, without its first end."""
+    share = np.linspace(0.0, 1.0, count + 1)[1:]
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, 3] = first[:3, 3] + share[:, None] * (last[:3, 3] - first[:3, 3])
+    ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
+    poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(share).as_matrix()
+    return list(poses)

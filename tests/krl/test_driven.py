@@ -1,0 +1,188 @@
+"""How motions are driven, judged by the robot's kinematics and by closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ir_description.poses import abc_from_rotation, rotation_from_abc
+from ir_krl import Followed, KrlMotionError, Place, Target, follow, parse
+from ir_planner import Planner, evaluate_krl, tool_in_flange
+from ir_planner.krl.driven import drive
+from ir_planner.krl.geometry import Arm
+from ir_planner.krl.status_turn import status_turn
+
+Follow = Callable[..., Followed]
+START = "PTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}\n"  # machine home is singular for the tool
+
+
+def frame_text(arm: Arm, q: np.ndarray) -> str:
+    """The E6POS of q, of the cell's tool in the robot's foot, as a controller would show it."""
+    pose = arm.flange(q[None])[0] @ tool_in_flange(arm.scene.cell.tcp)
+    values = [*(1e3 * pose[:3, 3]), *abc_from_rotation(pose[:3, :3])]
+    status, turn = status_turn(arm.scene.chain, q)
+    named = ",".join(f"{n} {v:.9f}" for n, v in zip("XYZABC", values, strict=True))
+    return f"{{{named},S {status},T {turn}}}"
+
+
+def steps_of(program: Followed, planner: Planner) -> list[np.ndarray]:
+    scene = planner.scene("none")
+    return [step.trajectory for step in drive(program, scene, planner.cell.machine_home)[0] if step.moves]
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=60, deadline=None)
+def test_status_and_turn_find_the_taught_configuration_again(planner: Planner, seed: int) -> None:
+    """Law: S and T of a configuration, with its pose, mean this configuration and no other."""
+    robot = planner.cell.robot
+    q = np.random.default_rng(seed).uniform(robot.position_min, robot.position_max)
+    if np.abs(q).min() < 1e-3:
+        return
+    arm = Arm(planner.scene("none"))
+    tool = tool_in_flange(planner.cell.tcp)
+    pose = arm.flange(q[None])[0] @ tool
+    values = [*(1e3 * pose[:3, 3]), *abc_from_rotation(pose[:3, :3])]
+    status, turn = status_turn(arm.scene.chain, q)
+    target = Target(
+        None, dict(zip("XYZABC", values, strict=True)), status, turn, False, False, np.eye(4), tool
+    )
+    found = arm.reached(target, planner.cell.machine_home, Place())
+    assert np.abs(found - q).max() < np.radians(1e-4)
+
+
+def test_points_are_reached_as_the_data_list_says(
+    planner: Planner, followed: Follow, home: np.ndarray
+) -> None:
+    arm = Arm(planner.scene("none"))
+    rng = np.random.default_rng(3)
+    taught = home + rng.uniform(-0.4, 0.4, (12, 6))
+    program = followed(START + "\n".join(f"PTP {frame_text(arm, q)}" for q in taught))
+    for trajectory, q in zip(steps_of(program, planner), taught, strict=True):
+        assert np.degrees(np.abs(trajectory.positions[-1] - q)).max() < 1e-4
+        away = arm.scene.chain.tcp_poses(np.stack([trajectory.positions[-1], q]))
+        assert np.linalg.norm(away[0, :3, 3] - away[1, :3, 3]) < 1e-6
+
+
+def test_a_lin_is_straight_and_keeps_its_speed(planner: Planner, followed: Follow) -> None:
+    program = followed(START + "$VEL.CP=0.4\nLIN_REL {Y 500,Z -300}")
+    (trajectory,) = steps_of(program, planner)
+    times = np.linspace(0.0, trajectory.duration, 2000)
+    places = planner.scene("none").chain.tcp_poses(trajectory.sample(times).q)[:, :3, 3]
+    way = places[-1] - places[0]
+    assert way == pytest.approx([0.0, 0.5, -0.3], abs=1e-6)
+    along = way / np.linalg.norm(way)
+    off = (places - places[0]) - ((places - places[0]) @ along)[:, None] * along
+    assert np.linalg.norm(off, axis=1).max() < 1e-5
+    speed = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(times)
+    assert speed.max() == pytest.approx(0.4, rel=2e-3)
+
+
+def test_a_circ_is_round(planner: Planner, followed: Follow) -> None:
+    (trajectory,) = steps_of(followed(START + "CIRC_REL {Y 200,Z 200},{Y 400,Z 0}"), planner)
+    times = np.linspace(0.0, trajectory.duration, 800)
+    places = planner.scene("none").chain.tcp_poses(trajectory.sample(times).q)[:, :3, 3]
+    centre = places[0] + [0.0, 0.2, 0.0]
+    assert np.linalg.norm(places - centre, axis=1) == pytest.approx(np.full(800, 0.2), abs=1e-5)
+    assert places[:, 2].max() == pytest.approx(places[0, 2] + 0.2, abs=1e-4)
+
+
+def test_ca_sets_the_angle_of_a_circ(planner: Planner, followed: Follow) -> None:
+    (trajectory,) = steps_of(followed(START + "CIRC_REL {Y 200,Z 200},{Y 400,Z 0}, CA 90"), planner)
+    ends = planner.scene("none").chain.tcp_poses(trajectory.positions[[0, -1]])[:, :3, 3]
+    assert ends[1] - ends[0] == pytest.approx([0.0, 0.2, 0.2], abs=1e-5)
+
+
+def test_a_relative_motion_in_the_tool(planner: Planner, followed: Follow) -> None:
+    """The tool of the cell looks along its x axis; a step along it is one along the tool."""
+    (trajectory,) = steps_of(followed(START + "LIN_REL {X 100} #TOOL"), planner)
+    poses = planner.scene("none").chain.tcp_poses(trajectory.positions[[0, -1]])
+    step = poses[0, :3, :3].T @ (poses[1, :3, 3] - poses[0, :3, 3])
+    assert step == pytest.approx([0.1, 0.0, 0.0], abs=1e-6)
+
+
+def test_a_base_moves_its_points(planner: Planner, followed: Follow, home: np.ndarray) -> None:
+    arm = Arm(planner.scene("none"))
+    goal = home + np.array([0.5, 0.1, -0.1, 0.6, 0.8, 0.6])
+    text = frame_text(arm, goal)
+    program = followed(START + "$BASE={X 0,Y 100,Z 0,A 0,B 0,C 0}\n" + f"PTP {text}\n")
+    (trajectory,) = steps_of(program, planner)
+    moved, taught = arm.scene.chain.tcp_poses(np.stack([trajectory.positions[-1], goal]))
+    assert moved[:3, 3] - taught[:3, 3] == pytest.approx([0.0, 0.1, 0.0], abs=1e-6)
+
+
+def test_approximation_is_faster_and_stays_near_the_corner(planner: Planner, followed: Follow) -> None:
+    lines = "PTP {{A1 20,A3 100}}{}\nPTP {{A1 40}}"
+    stopping = steps_of(followed(START + lines.format("")), planner)
+    blended = steps_of(followed(START + "$APO.CPTP=50\n" + lines.format(" C_PTP")), planner)
+    assert len(stopping) == 2
+    assert len(blended) == 1
+    assert blended[0].duration < 0.97 * sum(one.duration for one in stopping)
+    assert blended[0].positions[-1] == pytest.approx(stopping[-1].positions[-1], abs=1e-9)
+
+
+def test_an_output_ends_an_approximation(planner: Planner, followed: Follow) -> None:
+    lines = "$APO.CPTP=50\nPTP {A1 20} C_PTP\n$OUT[1]=TRUE\nPTP {A1 40}"
+    assert len(steps_of(followed(START + lines), planner)) == 2
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=12, deadline=None)
+def test_what_is_driven_keeps_the_limits(planner: Planner, seed: int) -> None:
+    """Law: what is driven keeps speed, acceleration, jerk and torque of every axis, blends included."""
+    rng = np.random.default_rng(seed)
+    turns = rng.uniform([-60, -110, 60, -60, 20, -60], [60, -60, 110, 60, 80, 60], (3, 6))
+    points = [", ".join(f"A{j + 1} {angle:.3f}" for j, angle in enumerate(one)) for one in turns]
+    speed, share = rng.uniform(30, 100), rng.uniform(0, 100)
+    text = (
+        f"DEF T( )\nPTP XHOME\n$VEL_AXIS[1]={speed:.1f}\n$APO.CPTP={share:.1f}\nPTP {{{points[0]}}} C_PTP\n"
+        f"PTP {{{points[1]}}} C_PTP\nPTP {{{points[2]}}}\nLIN_REL {{Z 60}}\nEND\n"
+    )
+    cell = planner.cell
+    program = follow([parse(text, "t.src")], cell.machine_home, tool_in_flange(cell.tcp))
+    found = evaluate_krl(planner, program, load="none")
+    for step in found.steps:
+        report = step.report
+        for ratio in (
+            report.velocity_ratio,
+            report.acceleration_ratio,
+            report.jerk_ratio,
+            report.torque_ratio,
+        ):
+            assert ratio.max() <= 1.0 + 1e-6
+
+
+REFUSED = {
+    "out of reach": ("PTP {X 9000,Y 0,Z 0,A 0,B 0,C 0}", "is out of reach"),
+    "past an axis limit": ("PTP {A2 20}", "A2 20 deg is not within -140 to -5 deg"),
+    "no such configuration": ("PTP {X 1500,Y 0,Z 1500,A 0,B 90,C 0,S 1,T 63}", "has S 1, T 63"),
+    "a line that leaves the reach": ("LIN_REL {X 3000}", "the path leaves the reach or an axis limit"),
+    "a circle of points on a line": ("CIRC_REL {X 10},{X 20}", "lie on a line"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_the_robot_cannot_do_is_named_with_its_place(
+    name: str, planner: Planner, followed: Follow
+) -> None:
+    line, words = REFUSED[name]
+    with pytest.raises(KrlMotionError) as refused:
+        steps_of(followed(START + line), planner)
+    assert str(refused.value).startswith("test.src:3:1: ")
+    assert words in str(refused.value)
+
+
+def test_the_first_motion_must_be_a_ptp(planner: Planner, followed: Follow) -> None:
+    with pytest.raises(KrlMotionError, match="the first motion must be a PTP"):
+        steps_of(followed("LIN_REL {X 10}"), planner)
+
+
+def test_a_kept_orientation(planner: Planner, followed: Follow) -> None:
+    program = followed(START + "$ORI_TYPE=#CONSTANT\nLIN_REL {Z -100,A 30}")
+    (trajectory,) = steps_of(program, planner)
+    first, last = planner.scene("none").chain.tcp_poses(trajectory.positions[[0, -1]])[:, :3, :3]
+    assert first == pytest.approx(last, abs=1e-9)
+    assert abs(np.trace(first.T @ rotation_from_abc([0, 0, 0])) - np.trace(first)) < 1e-9

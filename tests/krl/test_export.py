@@ -1,0 +1,73 @@
+"""Programs written as KRL: read back, driven and certified again, near to what was planned."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_cli.main import main
+from ir_krl import follow, parse
+from ir_msgs_py.options import PlanOptions
+from ir_planner import Planner, RequestError, evaluate_krl, export_krl, tool_in_flange
+from ir_planner.krl import DEVIATION_MAX
+
+
+@pytest.fixture(scope="module")
+def planned() -> tuple[Planner, object]:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "demo")
+    plan = planner.plan_program(("gauge_measure", "home"), 0.0, PlanOptions(), planner.cell.posture("park"))
+    return planner, plan
+
+
+def test_an_exported_program_is_certified_and_near_the_plan(planned) -> None:
+    planner, plan = planned
+    export = export_krl(planner, plan.movements, "visit")
+    assert export.exported.certified
+    assert export.deviation <= DEVIATION_MAX
+    assert export.exported.duration <= 1.1 * export.planned.duration
+    cell = planner.cell
+    texts = [parse(export.source, "visit.src"), parse(export.data, "visit.dat")]
+    again = evaluate_krl(planner, follow(texts, cell.machine_home, tool_in_flange(cell.tcp)))
+    moving = [step for step in plan.movements if not step.is_pause]
+    driven = [step for step in again.steps if step.step.moves]
+    assert "gauge_measure" in again.stations
+    for step, movement in zip(driven, moving, strict=True):
+        for end in (0, -1):
+            away = np.degrees(step.step.trajectory.positions[end] - movement.trajectory.positions[end])
+            assert np.abs(away).max() < 1e-4
+
+
+def test_asynchronous_movements_are_refused(planned) -> None:
+    planner, plan = planned
+    with pytest.raises(RequestError, match="timing is asynchronous"):
+        export_krl(planner, plan.movements, "visit", PlanOptions(timing="asynchronous"))
+
+
+@pytest.mark.parametrize("name", ["", "1st", "has space", "x" * 25, "semi;colon", "línea"])
+def test_names_that_a_controller_does_not_take(planned, name: str) -> None:
+    planner, plan = planned
+    with pytest.raises(RequestError, match="the program's name is"):
+        export_krl(planner, plan.movements, name)
+
+
+def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "visit.src"
+    assert main(["krl", "export", "demo", "-o", str(source), "--stations", "gauge_measure", "home"]) == 0
+    assert "certified" in capsys.readouterr().out
+    assert main(["krl", "import", str(source), str(source.with_suffix(".dat")), "--cell", "demo"]) == 0
+    shown = capsys.readouterr().out
+    assert "stations: gauge_measure" in shown
+    assert "free of violations" in shown
+    assert main(["krl", "export", "demo", "-o", str(source)]) == 2  # never over a file that is there
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_a_complaint_names_file_line_and_column(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / "old.src"
+    broken.write_text("DEF OLD( )\nPTP XHOME\nLIN NOBODY\nEND\n")
+    assert main(["krl", "import", str(broken), "--cell", "open"]) == 2
+    assert "old.src:3:5: NOBODY has no value" in capsys.readouterr().err

@@ -1,0 +1,241 @@
+"""Constructs of the language, one program each: what it does, or the sentence that it gets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ir_krl import (
+    Followed,
+    KrlRunError,
+    KrlSyntaxError,
+    Motion,
+    SetOutput,
+    SplineBlock,
+    Wait,
+    WaitFor,
+    follow,
+    parse,
+)
+
+Follow = Callable[..., Followed]
+
+WAITS = {  # statements that end in WAIT SEC of what they compute
+    "integer division is towards zero": ("WAIT SEC 7/2", 3.0),
+    "one real operand makes it real": ("WAIT SEC 7.0/2", 3.5),
+    "products before sums": ("WAIT SEC 1+2*3", 7.0),
+    "brackets": ("WAIT SEC (1+2)*3", 9.0),
+    "signs": ("WAIT SEC -(-4)", 4.0),
+    "exponents": ("WAIT SEC 2.5E1", 25.0),
+    "bits": ("WAIT SEC 'B101'+('H1F' B_AND 6)", 11.0),
+    "functions of the controller": ("WAIT SEC SQRT(ABS(-16.0))", 4.0),
+    "trigonometry in degrees": ("WAIT SEC SIN(30)*10", 5.0),
+    "an INT keeps whole numbers": ("DECL INT I\nI=0\nI=2.6\nWAIT SEC I", 3.0),
+    "a REAL stays one": ("DECL REAL R=7\nWAIT SEC R/2", 3.5),
+    "case doesn't count": ("decl int i=4\nwait sec I", 4.0),
+    "FOR up": ("DECL INT I\nDECL INT N=0\nFOR I=1 TO 4\nN=N+I\nENDFOR\nWAIT SEC N", 10.0),
+    "FOR down": ("DECL INT I\nDECL INT N=0\nFOR I=4 TO 1 STEP -2\nN=N*10+I\nENDFOR\nWAIT SEC N", 42.0),
+    "FOR that doesn't run": ("DECL INT I\nDECL INT N=5\nFOR I=2 TO 1\nN=0\nENDFOR\nWAIT SEC N", 5.0),
+    "WHILE": ("DECL INT N=1\nWHILE N<100\nN=N*3\nENDWHILE\nWAIT SEC N", 243.0),
+    "REPEAT": ("DECL INT N=0\nREPEAT\nN=N+1\nUNTIL N>=3\nWAIT SEC N", 3.0),
+    "LOOP with EXIT": ("DECL INT N=0\nLOOP\nN=N+1\nIF N==5 THEN\nEXIT\nENDIF\nENDLOOP\nWAIT SEC N", 5.0),
+    "EXIT leaves the inner loop": (
+        "DECL INT N=0\nDECL INT I\nFOR I=1 TO 3\nLOOP\nEXIT\nENDLOOP\nN=N+1\nENDFOR\nWAIT SEC N",
+        3.0,
+    ),
+    "IF and ELSE": ("IF 1>2 THEN\nWAIT SEC 1\nELSE\nWAIT SEC 2\nENDIF", 2.0),
+    "SWITCH": ("SWITCH 3\nCASE 1,2\nWAIT SEC 1\nCASE 3\nWAIT SEC 3\nDEFAULT\nWAIT SEC 9\nENDSWITCH", 3.0),
+    "DEFAULT": ("SWITCH 8\nCASE 1\nWAIT SEC 1\nDEFAULT\nWAIT SEC 9\nENDSWITCH", 9.0),
+    "SWITCH of an enumeration": ("SWITCH #B\nCASE #A\nWAIT SEC 1\nCASE #B\nWAIT SEC 2\nENDSWITCH", 2.0),
+    "arrays": ("DECL REAL A[3]\nA[2]=1.5\nWAIT SEC A[2]*2", 3.0),
+    "arrays of two indices": ("DECL INT A[2,2]\nA[1,2]=6\nWAIT SEC A[1,2]", 6.0),
+    "components": ("DECL FRAME F={X 1,Y 2,Z 3,A 0,B 0,C 0}\nF.Y=5\nWAIT SEC F.X+F.Y", 6.0),
+    "a comparison is weaker than AND": ("IF (1<2) AND (3<4) THEN\nWAIT SEC 1\nENDIF", 1.0),
+    "NOT": ("IF NOT FALSE THEN\nWAIT SEC 1\nENDIF", 1.0),
+    "EXOR": ("IF TRUE EXOR FALSE THEN\nWAIT SEC 1\nENDIF", 1.0),
+    "comments": ("WAIT SEC 1 ; and no more", 1.0),
+    "folds": (";FOLD INI;%{PE}\nWAIT SEC 2\n;ENDFOLD (INI)", 2.0),
+    "frames compose": (
+        "DECL FRAME F\nF={X 10,Y 0,Z 0,A 90,B 0,C 0}:{X 5,Y 0,Z 0,A 0,B 0,C 0}\nWAIT SEC F.X+F.Y",
+        15.0,
+    ),
+    "INV_POS": ("DECL FRAME F\nF=INV_POS({X 0,Y -4,Z 0,A 0,B 0,C 0})\nWAIT SEC F.Y", 4.0),
+}
+
+
+@pytest.mark.parametrize("name", WAITS)
+def test_what_a_program_computes(name: str, followed: Follow) -> None:
+    lines, seconds = WAITS[name]
+    (wait,) = followed(lines).commands
+    assert isinstance(wait, Wait)
+    assert wait.seconds == pytest.approx(seconds, abs=1e-9)
+
+
+REFUSED = {
+    "a name without a value": ("WAIT SEC NOBODY", "1:10", "NOBODY has no value"),
+    "an unknown routine": ("NOBODY()", "1:1", "there is no routine NOBODY"),
+    "division by zero": ("WAIT SEC 1/0", "1:10", "division by 0"),
+    "a text as a number": ('WAIT SEC "A"', "1:10", "the text 'A', not a number"),
+    "a number as a condition": ("IF 1 THEN\nENDIF", "1:4", "the number 1, not TRUE or FALSE"),
+    "numbers with AND": ("IF 1==1 AND 2==2 THEN\nENDIF", "1:7", "a comparison is weaker"),
+    "an index that isn't there": ("DECL INT A[2]\nWAIT SEC A[3]", "2:10", "A[3] has no value"),
+    "GOTO": ("GOTO X", "1:1", "GOTO X isn't read"),
+    "an endless loop": ("WHILE TRUE\nENDWHILE", "1:1", "does a loop never end?"),
+    "an input that decides": (
+        "IF $IN[4] THEN\nENDIF",
+        "1:4",
+        "$IN[4] decides something here",
+    ),
+    "an output that isn't a truth value": ("$OUT[1]=5", "1:1", "$OUT[1] is set to the number 5"),
+    "a motion to a number": ("PTP 5", "1:5", "a motion can't go to the number 5"),
+    "LIN to axis angles": ("LIN {A1 0}", "1:1", "LIN goes to a frame"),
+    "a speed of nothing": ("$VEL.CP=0\nLIN {X 1}", "2:1", "$VEL.CP is 0; it must be above 0"),
+    "a share above all": ("$VEL_AXIS[2]=120\nPTP {A1 0}", "2:1", "$VEL_AXIS is 120 %"),
+    "an unknown command of BAS": ("BAS(#NOBODY,1)", "1:1", "BAS(#NOBODY) isn't known"),
+    "a tool that stands in the cell": ("$IPO_MODE=#TCP", "1:1", "a tool that stands in the cell isn't read"),
+    "EXIT outside of a loop": ("EXIT", None, "EXIT stands outside of a loop"),
+    "a component twice": ("PTP {A1 0,A1 1}", "1:11", "component A1 is given twice"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_followed_is_named_with_its_place(name: str, followed: Follow) -> None:
+    lines, place, words = REFUSED[name]
+    with pytest.raises(KrlRunError) as refused:
+        followed(lines)
+    if place is not None:
+        line, column = place.split(":")
+        assert str(refused.value).startswith(f"test.src:{int(line) + 1}:{column}: ")  # DEF is line 1
+    assert words is None or words in str(refused.value)
+
+
+SYNTAX = {
+    "a word that is none": ("PTP XP1 C_FOO", 2, 9),
+    "IF without THEN": ("IF TRUE\nENDIF", 2, 8),
+    "a character": ("X=§", 2, 3),
+    "a loop that isn't closed": ("LOOP\nWAIT SEC 1", 4, 1),
+    "an aggregate that isn't closed": ("PTP {A1 0", 2, 10),
+    "analog outputs": ("ANOUT ON X = 1", 2, 10),
+}
+
+
+@pytest.mark.parametrize("name", SYNTAX)
+def test_what_is_no_krl_is_named_with_line_and_column(name: str) -> None:
+    lines, line, column = SYNTAX[name]
+    with pytest.raises(KrlSyntaxError) as refused:
+        parse(f"DEF TEST( )\n{lines}\nEND\n", "test.src")
+    assert (refused.value.place.line, refused.value.place.column) == (line, column)
+
+
+def test_subprograms_and_functions() -> None:
+    text = (
+        "DEF MAIN( )\nDECL INT N=2\nTWICE(N)\nWAIT SEC N+HALF(3)\nEND\n"
+        "DEF TWICE(X:OUT)\nX=X*2\nEND\n"
+        "DEFFCT REAL HALF(X:IN)\nRETURN X/2.0\nENDFCT\n"
+    )
+    (wait,) = follow([parse(text, "m.src")], np.zeros(6), np.eye(4)).commands
+    assert isinstance(wait, Wait)
+    assert wait.seconds == pytest.approx(5.5)
+
+
+def test_a_routine_that_calls_itself_ends_with_a_sentence() -> None:
+    text = "DEF MAIN( )\nMAIN()\nEND\n"
+    with pytest.raises(KrlRunError, match="call within calls"):
+        follow([parse(text, "m.src")], np.zeros(6), np.eye(4))
+
+
+def test_inline_forms(followed: Follow) -> None:
+    program = followed(
+        ";FOLD PTP P1 CONT Vel=50 % PDAT1 Tool[1] Base[2]\n"
+        "$BWDSTART=FALSE\nPDAT_ACT=PPDAT1\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,50)\nPTP XP1 C_PTP\n;ENDFOLD\n"
+        ";FOLD LIN P2 Vel=0.3 m/s CPDAT1 Tool[1] Base[2]\n"
+        "$BWDSTART=FALSE\nLDAT_ACT=LCPDAT1\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,0.3)\n"
+        "LIN XP2 C_DIS C_DIS\n;ENDFOLD\n"
+        "SLIN XP1 WITH $VEL=SVEL_CP(0.2, , LCPDAT1), $TOOL=STOOL2(FP1), $BASE=SBASE(FP1.BASE_NO), "
+        "$IPO_MODE=SIPO_MODE(FP1.IPO_FRAME), $ACC=SACC_CP(LCPDAT1), $APO=SAPO(LCPDAT1) C_SPL",
+        "DECL E6POS XP1={X 1500,Y 0,Z 1200,A 0,B 90,C 0,S 2,T 10}\n"
+        "DECL E6POS XP2={X 1600,Y 0,Z 1200,A 0,B 90,C 0,S 2,T 10}\n"
+        'DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] " "}\n'
+        "DECL PDAT PPDAT1={VEL 100,ACC 80,APO_DIST 60}\n"
+        "DECL LDAT LCPDAT1={VEL 2,ACC 50,APO_DIST 30,APO_FAC 50}\n"
+        "BASE_DATA[2]={X 100,Y 0,Z 0,A 0,B 0,C 0}",
+    )
+    first, second, third = program.commands
+    assert isinstance(first, Motion)
+    assert isinstance(second, Motion)
+    assert isinstance(third, Motion)
+    assert first.pace.axis_velocity == (0.5,) * 6
+    assert first.pace.axis_acceleration == (0.8,) * 6
+    assert first.blend is not None
+    assert first.blend.share == pytest.approx(0.6)
+    assert first.target.base[0, 3] == pytest.approx(0.1)
+    assert (first.target.status, first.target.turn) == (2, 10)
+    assert second.pace.velocity == pytest.approx(0.3)
+    assert second.blend is not None
+    assert second.blend.distance == pytest.approx(0.03)
+    assert third.pace.velocity == pytest.approx(0.2)
+    assert third.pace.acceleration == pytest.approx(second.pace.acceleration)
+
+
+def test_settings_after_with_hold_for_their_motion_only(followed: Follow) -> None:
+    first, second = followed("SPTP {A1 1} WITH $VEL_AXIS[1]=SVEL_JOINT(20)\nSPTP {A1 2}").commands
+    assert isinstance(first, Motion)
+    assert isinstance(second, Motion)
+    assert (first.pace.axis_velocity[3], second.pace.axis_velocity[3]) == (0.2, 1.0)
+
+
+def test_outputs_waits_triggers_and_pulses(followed: Follow) -> None:
+    program = followed(
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[7]=TRUE\n"
+        "TRIGGER WHEN DISTANCE=1 DELAY=0 DO $OUT[8]=TRUE\n"
+        "PTP {A1 1}\nPULSE($OUT[3],TRUE,0.5)\nDOOR=TRUE\nWAIT FOR $IN[2] AND NOT $IN[3]",
+        "SIGNAL DOOR $OUT[12]",
+    )
+    before, motion, after, pulse, door, wait = program.commands
+    assert isinstance(motion, Motion)
+    assert [(o.number, o.value) for o in (before, after, door) if isinstance(o, SetOutput)] == [
+        (7, True),
+        (8, True),
+        (12, True),
+    ]
+    assert isinstance(pulse, SetOutput)
+    assert pulse.pulse == 0.5
+    assert isinstance(wait, WaitFor)
+    assert wait.condition == "($IN[2] AND NOT $IN[3])"
+
+
+def test_spline_blocks_and_time_blocks(followed: Follow) -> None:
+    (block,) = followed(
+        "PTP_SPLINE\nTIME_BLOCK START\nSPTP {A1 1}\nTIME_BLOCK PART=25\nSPTP {A1 2}\nTIME_BLOCK END=3.5\n"
+        "ENDSPLINE C_SPL"
+    ).commands
+    assert isinstance(block, SplineBlock)
+    assert block.axis
+    assert len(block.parts) == 2
+    (times,) = block.times
+    assert (times.first, times.last, times.marks, times.seconds) == (0, 2, ((1, 25.0),), 3.5)
+
+
+def test_an_endless_loop_is_followed_once_and_says_so(followed: Follow) -> None:
+    program = followed("LOOP\nPTP {A1 1}\nENDLOOP")
+    assert len(program.commands) == 1
+    assert [note.text for note in program.notes] == ["LOOP without EXIT: followed 1 times"]
+    assert len(followed("LOOP\nPTP {A1 1}\nENDLOOP", loop_passes=3).commands) == 3
+
+
+def test_signals_decide_as_they_are_given(followed: Follow) -> None:
+    lines = "IF $IN[4] THEN\nWAIT SEC 1\nELSE\nWAIT SEC 2\nENDIF"
+    for value, seconds in ((True, 1.0), (False, 2.0)):
+        (wait,) = followed(lines, inputs={4: value}).commands
+        assert isinstance(wait, Wait)
+        assert wait.seconds == seconds
+
+
+def test_what_is_not_modelled_is_noted(followed: Follow) -> None:
+    notes = [
+        note.text for note in followed("$FRICTION=1\nHALT\nINTERRUPT DECL 5 WHEN TRUE DO STOPIT()").notes
+    ]
+    assert len(notes) == 3
+    assert "$FRICTION isn't modelled" in notes
