@@ -72,9 +72,9 @@ def test_a_lin_is_straight_and_keeps_its_speed(planner: Planner, followed: Follo
     (trajectory,) = steps_of(program, planner)
     times = np.linspace(0.0, trajectory.duration, 2000)
     places = planner.scene("none").chain.tcp_poses(trajectory.sample(times).q)[:, :3, 3]
-    way = places[-1] - places[0]
-    assert way == pytest.approx([0.0, 0.5, -0.3], abs=1e-6)
-    along = way / np.linalg.norm(way)
+    path = places[-1] - places[0]
+    assert path == pytest.approx([0.0, 0.5, -0.3], abs=1e-6)
+    along = path / np.linalg.norm(path)
     off = (places - places[0]) - ((places - places[0]) @ along)[:, None] * along
     assert np.linalg.norm(off, axis=1).max() < 1e-5
     speed = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(times)

@@ -166,24 +166,24 @@ def test_inline_forms(followed: Follow) -> None:
     assert isinstance(first, Motion)
     assert isinstance(second, Motion)
     assert isinstance(third, Motion)
-    assert first.pace.axis_velocity == (0.5,) * 6
-    assert first.pace.axis_acceleration == (0.8,) * 6
+    assert first.speeds.axis_velocity == (0.5,) * 6
+    assert first.speeds.axis_acceleration == (0.8,) * 6
     assert first.blend is not None
     assert first.blend.share == pytest.approx(0.6)
     assert first.target.base[0, 3] == pytest.approx(0.1)
     assert (first.target.status, first.target.turn) == (2, 10)
-    assert second.pace.velocity == pytest.approx(0.3)
+    assert second.speeds.velocity == pytest.approx(0.3)
     assert second.blend is not None
     assert second.blend.distance == pytest.approx(0.03)
-    assert third.pace.velocity == pytest.approx(0.2)
-    assert third.pace.acceleration == pytest.approx(second.pace.acceleration)
+    assert third.speeds.velocity == pytest.approx(0.2)
+    assert third.speeds.acceleration == pytest.approx(second.speeds.acceleration)
 
 
 def test_settings_after_with_hold_for_their_motion_only(followed: Follow) -> None:
     first, second = followed("SPTP {A1 1} WITH $VEL_AXIS[1]=SVEL_JOINT(20)\nSPTP {A1 2}").commands
     assert isinstance(first, Motion)
     assert isinstance(second, Motion)
-    assert (first.pace.axis_velocity[3], second.pace.axis_velocity[3]) == (0.2, 1.0)
+    assert (first.speeds.axis_velocity[3], second.speeds.axis_velocity[3]) == (0.2, 1.0)
 
 
 def test_outputs_waits_triggers_and_pulses(followed: Follow) -> None:

@@ -15,7 +15,8 @@ ROOMS = {
     "ir_planner": (
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
         "regional", "trajectories", "service", "settings", "program", "store", "heard",
-        "current_cell", "certificates", "asked_states", "trips", "planner", "node",
+        "current_cell", "certificates", "asked_states", "trips", "planner", "krl",
+        "node",
     ),
     "ir_description": (
         "errors", "arrays", "poses", "shapes", "robot", "cell", "files", "library", "cell_process",

@@ -65,7 +65,7 @@ AWAKE = "AWAKE"
 
 def written(
     name: str, start: FloatArray, parts: Sequence[Part], attached: Attached, header: Sequence[str]
-) -> tuple[str, str]:
+) -> tuple[str, str]:  # long: the lines of two files
     """Texts of NAME.src and NAME.dat: from `start` (6,) [rad] through the parts. Raises KrlError for a name
     that the controller doesn't take.
     """

@@ -1,4 +1,4 @@
-"""What a program tells the controller, in the order in which it does: motions, waits, outputs."""
+"""What a program asks of the controller, in the order in which it does: motions, waits, outputs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Pace:
+class Speeds:
     """How fast: shares (6,) of the axes' speeds and accelerations; velocity [m/s] and acceleration [m/s^2] of
     the tool, turning [rad/s] and turning_acceleration [rad/s^2] of its orientation; override: share of all
     speeds.
@@ -67,7 +67,7 @@ class Motion:
 
     kind: Kind
     target: Target
-    pace: Pace
+    speeds: Speeds
     place: Place
     blend: Blend | None = None
     via: Target | None = None

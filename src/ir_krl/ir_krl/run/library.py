@@ -9,7 +9,7 @@ from ir_description.poses import inverse
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.run.frames import frame, pose
 from ir_krl.run.memory import Memory, Step
-from ir_krl.run.system import AXES, FULL, NULL, TOOL_ACCELERATION, system_pace
+from ir_krl.run.system import AXES, FULL, NULL, TOOL_ACCELERATION, system_speeds
 from ir_krl.run.values import Array, Structure, Symbol, Value, integer, kind_of, number
 
 Arguments = list[Value | None]
@@ -27,7 +27,7 @@ WITHOUT_EFFECT = frozenset(
         "USE_CM_PRO_VALUES",
     }
 )
-"""Called in nearly every program; neither the path nor the pace of a motion follows from them here."""
+"""Called in nearly every program; neither the path nor the speeds of a motion follows from them here."""
 
 _MATHEMATICS: dict[str, Callable[..., float]] = {
     "ABS": abs,
@@ -80,18 +80,18 @@ class Library:
                 f"{name} can't be computed of {', '.join(f'{one:g}' for one in numbers)}", place
             ) from None
 
-    def _bas(self, arguments: Arguments, place: Place) -> Value:
+    def _bas(self, arguments: Arguments, place: Place) -> Value:  # long: one case per command
         command = _first(arguments, "BAS", place)
         value = arguments[1] if len(arguments) > 1 else None
         if not isinstance(command, Symbol):
-            raise KrlRunError(f"BAS is told {kind_of(command)}, not a command such as #INITMOV", place)
+            raise KrlRunError(f"BAS is given {kind_of(command)}, not a command such as #INITMOV", place)
 
         def amount() -> float:
             return number(_given(value, f"BAS({command})", place), f"BAS({command})", place)
 
         match command.name:
             case "INITMOV":
-                self._memory.shared.update(system_pace())
+                self._memory.shared.update(system_speeds())
             case "PTP_PARAMS":
                 self._frames(place)
                 self._set("$ACC_AXIS", self._noted("PDAT_ACT", "ACC", FULL, place))

@@ -1,4 +1,4 @@
-"""Motions of a program as commands: targets, pace and approximation as the system variables stand."""
+"""Motions of a program as commands: targets, speeds and approximation as the system variables stand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import get_args
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
-from ir_krl.run.commands import Blend, Kind, Motion, Pace, Target
+from ir_krl.run.commands import Blend, Kind, Motion, Speeds, Target
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.frames import FRAME_NAMES, axes, components, is_axis_value, pose
 from ir_krl.run.memory import Memory
@@ -42,7 +42,7 @@ class Motions:
         if kind in ("lin", "circ", "spl") and end.axes is not None:
             raise KrlRunError(f"{word} goes to a frame, not to axis angles", place)
         blend = next((self.blend(child) for child in tree.children if _is(child, "approximation")), None)
-        return Motion(kind, end, self.pace(place), place, blend, via, angle, self._keeps_orientation())
+        return Motion(kind, end, self.speeds(place), place, blend, via, angle, self._keeps_orientation())
 
     def target(self, tree: Tree, relative: bool, in_tool: bool) -> Target:
         """Where an expression leads to."""
@@ -64,13 +64,13 @@ class Motions:
         )
         return Target(None, frame, status, turn, relative, in_tool, base, tool, name)
 
-    def pace(self, place: Place) -> Pace:
+    def speeds(self, place: Place) -> Speeds:
         """How fast the system variables say; each bounded by what a controller takes."""
         velocity, acceleration = (
             tuple(self._share(name, (j,), place) for j in range(1, AXES + 1))
             for name in ("$VEL_AXIS", "$ACC_AXIS")
         )
-        return Pace(
+        return Speeds(
             velocity,
             acceleration,
             self._positive("$VEL", "CP", place),

@@ -15,7 +15,7 @@ from ir_krl.run.library import Library
 from ir_krl.run.memory import Memory
 from ir_krl.run.motions import Motions
 from ir_krl.run.system import system_variables
-from ir_krl.run.values import Array, Structure, Symbol, Value, copied, kind_of
+from ir_krl.run.values import Array, Symbol, Value, copied, kind_of, typed
 from ir_msgs_py.arrays import FloatArray
 
 DEPTH_MAX = 60
@@ -134,7 +134,7 @@ class _Run(Control):
         for declarator in declarators:
             name, index, expression = declarator.children
             if expression is not None:
-                value = _typed(str(kind), copied(self.expressions.value(expression)))
+                value = typed(str(kind), copied(self.expressions.value(expression)))
                 self.memory.declare(str(name), value)
             elif index is not None:
                 self.memory.declare(str(name), Array(kind=str(kind)))
@@ -269,7 +269,7 @@ class _Run(Control):
         shared.update(before)
         return built
 
-    def _block(self, tree: Tree) -> SplineBlock:
+    def _block(self, tree: Tree) -> SplineBlock:  # long: one case per line of a block
         word, _, *parts, approximation = tree.children
         motions: list[Motion] = []
         times: list[TimeBlock] = []
@@ -298,14 +298,3 @@ class _Run(Control):
         axis = str(word) == "PTP_SPLINE"
         blend = self._motions.blend(approximation)
         return SplineBlock(axis, tuple(motions), tuple(times), self.place(tree), blend)
-
-
-def _typed(kind: str, value: Value) -> Value:
-    """A value as its declaration calls it: REAL X=3 is 3.0, an aggregate takes the type's name."""
-    if isinstance(value, Structure) and not value.kind:
-        return Structure(value.fields, kind)
-    if kind == "REAL" and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if kind == "INT" and isinstance(value, float):
-        return round(value)
-    return value

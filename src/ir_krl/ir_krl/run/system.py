@@ -19,7 +19,7 @@ BASES = 32  # numbers of BASE_DATA
 NULL: dict[str, Value] = dict.fromkeys(FRAME_NAMES, 0.0)
 
 
-def system_pace() -> dict[str, Value]:
+def system_speeds() -> dict[str, Value]:
     """Speeds, accelerations and approximation distances as BAS(#INITMOV) leaves them; override as it is."""
     turning = {"ORI1": TURNING_VELOCITY, "ORI2": TURNING_VELOCITY}
     turning_up = {"ORI1": TURNING_ACCELERATION, "ORI2": TURNING_ACCELERATION}
@@ -39,7 +39,7 @@ def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
     angles: dict[str, Value] = {f"A{j + 1}": float(angle) for j, angle in enumerate(np.degrees(home))}
     tool_frame = frame(tool)
     return {
-        **system_pace(),
+        **system_speeds(),
         "$GEAR_JERK": _all(FULL),
         "$OV_PRO": FULL,
         "$ADVANCE": 3,

@@ -84,3 +84,14 @@ def kind_of(value: Value) -> str:
             return f"a structure of {', '.join(list(value.fields)[:8])}"
         case Array():
             return "an array"
+
+
+def typed(kind: str, value: Value) -> Value:
+    """A value as its declaration calls it: REAL X=3 is 3.0, an aggregate takes the type's name."""
+    if isinstance(value, Structure) and not value.kind:
+        return Structure(value.fields, kind)
+    if kind == "REAL" and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if kind == "INT" and isinstance(value, float):
+        return round(value)
+    return value

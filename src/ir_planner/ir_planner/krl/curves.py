@@ -44,7 +44,7 @@ class AxisLine:
     turning: float = 0.0
 
     def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """As the protocol says."""
+        """q and its first three derivatives by s, (M, n) each, at s (M,)."""
         step = np.broadcast_to(self.end - self.start, (len(s), len(self.start)))
         none = np.zeros_like(step)
         return self.start + s[:, None] * step, step, none, none
@@ -59,7 +59,7 @@ class AxisCurve:
     turning: float
 
     def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """As the protocol says."""
+        """q and its first three derivatives by s, (M, n) each, at s (M,)."""
         q, first, second, third = (np.asarray(self.spline(s, nu=k)) for k in range(4))
         return q, first, second, third
 
@@ -78,18 +78,18 @@ def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
     last = arm.pose(motion.target, first)
     if motion.keeps_orientation:
         last[:3, :3] = first[:3, :3]
-    way: _Arc | _Line = _Line(first[:3, 3], last[:3, 3])
+    path: _Arc | _Line = _Line(first[:3, 3], last[:3, 3])
     if motion.via is not None:
-        way = _arc(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion)
+        path = _arc(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion)
     ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
     turning = float((ends[0].inv() * ends[1]).magnitude())
-    fine = np.ceil(max(way.length / _STEP_M, turning / _STEP_RAD)) + 1
+    fine = np.ceil(max(path.length / _STEP_M, turning / _STEP_RAD)) + 1
     u = np.linspace(0.0, 1.0, int(np.clip(fine, _SAMPLES_MIN, _SAMPLES_MAX)))
     poses = np.tile(np.eye(4), (len(u), 1, 1))
-    poses[:, :3, 3] = way(u)
+    poses[:, :3, 3] = path(u)
     poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(u).as_matrix()
     q = followed(poses, motion, start, arm)
-    return AxisCurve(make_interp_spline(u, q, k=_DEGREE), way.length, turning)
+    return AxisCurve(make_interp_spline(u, q, k=_DEGREE), path.length, turning)
 
 
 def followed(poses: FloatArray, motion: Motion, start: FloatArray, arm: Arm) -> FloatArray:

@@ -11,9 +11,9 @@ from ir_krl import (
     KrlMotionError,
     Motion,
     Note,
-    Pace,
     Place,
     SetOutput,
+    Speeds,
     SplineBlock,
     Wait,
     WaitFor,
@@ -119,12 +119,12 @@ class _Drive:
             if np.abs(end - self.here).max() < STILL:
                 return
             curve = AxisLine(self.here, end)
-            self._drive(curve, motion, motion.pace)
+            self._drive(curve, motion, motion.speeds)
         else:
             line = tool_curve(motion, self.here, self.arm)
             if max(line.length, line.turning) < STILL:
                 return
-            self._drive(line, motion, motion.pace)
+            self._drive(line, motion, motion.speeds)
 
     def _block(self, block: SplineBlock) -> None:
         if not self._on_path:
@@ -139,11 +139,11 @@ class _Drive:
             return
         curve = block_curve(block, self.here, self.arm)
         least = sum(one.seconds for one in block.times)
-        self._drive(curve, block, block.parts[0].pace, least)
+        self._drive(curve, block, block.parts[0].speeds, least)
 
-    def _drive(self, curve: Curve, command: Motion | SplineBlock, pace: Pace, least: float = 0.0) -> None:
+    def _drive(self, curve: Curve, command: Motion | SplineBlock, speeds: Speeds, least: float = 0.0) -> None:
         share = 1.0 if self._blend is None and command.blend is None else _BLENDED_JERK
-        made = move(curve, pace, self.scene, command.place, least=least, jerk_share=share)
+        made = move(curve, speeds, self.scene, command.place, least=least, jerk_share=share)
         if self._moves and self._blend is not None:
             steps = overlap(self._moves[-1], made, self._blend, self.scene)
             if steps > 0:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_krl import KrlMotionError, Pace, Place
+from ir_krl import KrlMotionError, Place, Speeds
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.krl.curves import AxisLine, Curve
 from ir_planner.scene import STILL, MotionLimits, PlanningScene, torque_use
@@ -33,7 +33,7 @@ class Move:
     law: TimeLaw
 
     def switches(self) -> IntArray:
-        """Grid steps at which the points of a trajectory are needed, ascending."""
+        """Grid steps (M,) at which a trajectory needs points, ascending."""
         if isinstance(self.curve, AxisLine):
             return self.law.switches()
         count = max(round(self.law.total * GRID_S * _KNOTS_PER_S), 2)
@@ -46,7 +46,7 @@ class Move:
         return q, qd, qdd
 
     def states(self, steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """The same, and the jerk but for the law's own."""
+        """q, qd, qdd and the jerk but for the law's own, (M, n) each, at grid steps (M,)."""
         s, sd, sdd = self.law.at(steps)
         q, first, second, third = self.curve.at(s)
         sd, sdd = sd[:, None], sdd[:, None]
@@ -56,19 +56,19 @@ class Move:
 
 def move(
     curve: Curve,
-    pace: Pace,
+    speeds: Speeds,
     scene: PlanningScene,
     place: Place,
     *,
     least: float = 0.0,
     jerk_share: float = 1.0,
 ) -> Move:
-    """The quickest law of a curve at a pace that lasts at least `least` s and uses `jerk_share` of the axes'
-    jerk. Raises KrlMotionError.
+    """The quickest law of a curve that keeps the speeds, lasts at least `least` s and uses `jerk_share` of
+    the axes' jerk. Raises KrlMotionError.
     """
-    limits = _axis_limits(pace, scene.limits)
+    limits = _axis_limits(speeds, scene.limits)
     limits = replace(limits, jerk=limits.jerk * jerk_share)
-    bounds = _law_bounds(curve, pace, limits)
+    bounds = _law_bounds(curve, speeds, limits)
     slower = 1.0
     for _ in range(_ROUNDS):
         v, a, j = bounds
@@ -80,31 +80,31 @@ def move(
     raise KrlMotionError("the drives can't carry the load along this path, however slowly", place)
 
 
-def _axis_limits(pace: Pace, limits: MotionLimits) -> MotionLimits:
+def _axis_limits(speeds: Speeds, limits: MotionLimits) -> MotionLimits:
     """What the program leaves of the axes' limits."""
-    share = np.asarray(pace.axis_acceleration)
+    share = np.asarray(speeds.axis_acceleration)
     kept = replace(
         limits,
-        velocity=limits.velocity * np.asarray(pace.axis_velocity),
+        velocity=limits.velocity * np.asarray(speeds.axis_velocity),
         acceleration=limits.acceleration * share,
         jerk=limits.jerk * share,
     )
-    return kept.for_speed(pace.override)
+    return kept.for_speed(speeds.override)
 
 
-def _law_bounds(curve: Curve, pace: Pace, limits: MotionLimits) -> tuple[float, float, float]:
-    """Bounds of s' [1/s], s'' and s''' before the axes are looked at along the way."""
+def _law_bounds(curve: Curve, speeds: Speeds, limits: MotionLimits) -> tuple[float, float, float]:
+    """Bounds of s' [1/s], s'' and s''' before the axes are looked at along the path."""
     _, first, _, _ = curve.at(np.linspace(0.0, 1.0, 65))
     rate = np.maximum(np.abs(first).max(axis=0), STILL)
     v, a, j = (float(np.min(bound / rate)) for bound in (limits.velocity, limits.acceleration, limits.jerk))
     for size, speed, acceleration in (
-        (curve.length, pace.velocity, pace.acceleration),
-        (curve.turning, pace.turning, pace.turning_acceleration),
+        (curve.length, speeds.velocity, speeds.acceleration),
+        (curve.turning, speeds.turning, speeds.turning_acceleration),
     ):
         if size > STILL:
-            v = min(v, speed * pace.override / size)
-            a = min(a, acceleration * pace.override**2 / size)
-            j = min(j, acceleration * pace.override**3 / (size * RAMP))
+            v = min(v, speed * speeds.override / size)
+            a = min(a, acceleration * speeds.override**2 / size)
+            j = min(j, acceleration * speeds.override**3 / (size * RAMP))
     return min(v, _HUGE), min(a, _HUGE), min(j, _HUGE)
 
 

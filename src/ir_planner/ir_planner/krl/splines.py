@@ -32,7 +32,7 @@ def block_curve(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
 
 
 def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTrajectory | None:
-    """The trajectory of a PTP_SPLINE whose TIME_BLOCK gives every part its time; None of other blocks."""
+    """The trajectory from `start` (n,) of a PTP_SPLINE whose TIME_BLOCK times all its parts; else None."""
     whole = [one for one in block.times if one.first == 0 and one.last == len(block.parts)]
     if not block.axis or len(block.times) != 1 or not whole:
         return None
