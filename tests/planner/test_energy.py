@@ -18,7 +18,7 @@ from ir_planner.request.work import Work
 from ir_planner.scene import Drives
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import standing, stretched
-from ir_planner.timing.objective import best_stretch
+from ir_planner.timing.objective import best_stretch, stretched_costs
 from ir_planner.timing.straight_steps import straight_steps
 
 Degrees = Callable[..., Any]
@@ -79,6 +79,18 @@ def test_lowering_a_load_gives_energy_back_on_the_bus(
     )
     assert down.joints.sum() < back.joints.sum()
     assert down.total >= down.base - 1e-9
+
+
+@pytest.mark.parametrize("regeneration", REGENERATIONS)
+def test_many_durations_at_once_cost_what_each_costs_alone(
+    fast: JointTrajectory, demo_scene: PlanningScene, budget: Work, regeneration: Any
+) -> None:
+    scene = replace(demo_scene, drives=Drives(regeneration))
+    factors = np.array([1.0, 1.3, 2.2])
+    together = stretched_costs(fast, factors, Context.of(scene, PlanOptions(objective="energy"), budget))
+    for factor, joules in zip(factors, together, strict=True):
+        alone = movement_energy(stretched(fast, factor), scene)
+        assert joules == pytest.approx(alone.total - alone.base, rel=2e-3)
 
 
 def test_the_objective_trades_time_for_joules(

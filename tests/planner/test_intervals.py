@@ -14,7 +14,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlannerSettings
 from ir_planner.checks import interval, movement_energy, movement_spread, peak_power
-from ir_planner.checks.energy_slopes import Sampled, holding_slope, movement_slope
+from ir_planner.checks.energy_slopes import Sampled, energy_and_slope, holding_slope
 from ir_planner.program.standby import plan_standby
 from ir_planner.request import Goal
 from ir_planner.scene import Drives, PlanningScene
@@ -120,7 +120,7 @@ def test_slopes_are_those_of_the_energy(name: str) -> None:
     below = at if at in (0.0, 1.0) and name.partition(".")[0] in ("iron", "inverter", "gear") else at - step
     above = min(at + step, 1.0) if name == "rectifier_efficiency" else at + step
     energies = [movement_energy(trajectory, scene(with_value(name, v))).total for v in (below, above)]
-    slope = movement_slope(Sampled.of(trajectory), scene())[SHEET.index(name)]
+    slope = energy_and_slope(Sampled.of(trajectory), scene())[1][SHEET.index(name)]
     difference = (energies[1] - energies[0]) / (above - below)
     assert slope == pytest.approx(difference, rel=0.05, abs=1e-3 * movement_energy(trajectory, scene()).total)
 

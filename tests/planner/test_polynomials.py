@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.curves import UniformSpline
 from ir_planner.curves.polynomials import extremes
 
 
@@ -37,6 +38,17 @@ def test_extremes_are_those_of_dense_samples(seed: int) -> None:
             ):
                 assert np.abs(values).max() * (1 - 1e-9) <= top <= np.abs(values).max() * (1 + 1e-3) + 1e-9
             assert found.travel[s, j] == pytest.approx(np.abs(np.diff(samples[0])).sum(), rel=1e-4)
+
+
+@given(st.integers(0, 100_000), st.integers(7, 20))
+@settings(max_examples=60, deadline=None)
+def test_the_travel_of_a_spline_is_that_of_dense_samples(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    control = rng.normal(size=(count, 2)).round(1)  # joints that stand for a while too
+    trajectory = UniformSpline(control, float(rng.uniform(0.01, 0.3))).trajectory(("a", "b"))
+    travel = extremes(*trajectory.coefficients()).travel.sum(axis=0)
+    dense = trajectory.sample(np.linspace(0.0, trajectory.duration, 2000 * count + 1)).q
+    assert travel == pytest.approx(np.abs(np.diff(dense, axis=0)).sum(axis=0), rel=1e-5, abs=1e-9)
 
 
 def test_a_line_and_a_standstill_have_no_false_extremes() -> None:

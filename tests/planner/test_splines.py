@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ir_planner.curves.arc_length import evenly_spaced
+from ir_planner.curves.arc_length import at_shares, evenly_spaced
 from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
 
 FloatArray = NDArray[np.float64]
@@ -121,6 +121,17 @@ def test_evenly_spaced_points_lie_on_the_path_at_even_lengths(corners: int, coun
     assert (points[[0, -1]] == path[[0, -1]]).all()
     length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= length / (count - 1) + 1e-9
+
+
+@given(st.integers(2, 12), st.integers(0, 3), st.integers(0, 10_000))
+def test_shares_of_a_path_are_interpolated_joint_by_joint(corners: int, stops: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    path = rng.uniform(-1.0, 1.0, (corners, 3))
+    path = np.insert(path, rng.integers(0, corners, stops), path[rng.integers(0, corners)], axis=0)
+    passed = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    shares = np.sort(np.append(rng.uniform(0.0, 1.0, 7), [0.0, 1.0]))
+    expected = [np.interp(shares * passed[-1], passed, path[:, j]) for j in range(3)]
+    assert at_shares(path, shares) == pytest.approx(np.stack(expected, axis=1), abs=1e-12)
 
 
 def test_times_that_do_not_increase_are_refused() -> None:

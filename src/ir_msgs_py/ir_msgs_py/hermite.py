@@ -36,12 +36,11 @@ def hermite_coefficients(
 
 
 def evaluate(c: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """q and its first three derivatives (M, n) of polynomials c (M, n, 6) at local times t (M,) [s]."""
+    """q and its first three derivatives (M, n) of polynomials c (6, M, n) at local times t (M,) [s]."""
     s = t[:, None]
-    q = ((((c[..., 5] * s + c[..., 4]) * s + c[..., 3]) * s + c[..., 2]) * s + c[..., 1]) * s + c[..., 0]
-    qd = (((5.0 * c[..., 5] * s + 4.0 * c[..., 4]) * s + 3.0 * c[..., 3]) * s + 2.0 * c[..., 2]) * s + c[
-        ..., 1
-    ]
-    qdd = ((20.0 * c[..., 5] * s + 12.0 * c[..., 4]) * s + 6.0 * c[..., 3]) * s + 2.0 * c[..., 2]
-    qddd = (60.0 * c[..., 5] * s + 24.0 * c[..., 4]) * s + 6.0 * c[..., 3]
+    c0, c1, c2, c3, c4, c5 = c
+    q = ((((c5 * s + c4) * s + c3) * s + c2) * s + c1) * s + c0
+    qd = (((5.0 * c5 * s + 4.0 * c4) * s + 3.0 * c3) * s + 2.0 * c2) * s + c1
+    qdd = ((20.0 * c5 * s + 12.0 * c4) * s + 6.0 * c3) * s + 2.0 * c2
+    qddd = (60.0 * c5 * s + 24.0 * c4) * s + 6.0 * c3
     return q, qd, qdd, qddd

@@ -133,14 +133,13 @@ class JointTrajectory:
         instants = np.asarray(t, dtype=np.float64)
         if instants.ndim != 1 or not np.isfinite(instants).all():
             raise TrajectoryError("sample times must be a finite array (M,)")
-        coefficients, durations = self._polynomials
-        times = self.times
+        durations, times = self._polynomials[1], self.times
         if len(durations) == 0:
             rest = np.zeros((len(instants), len(self.joint_names)))
             return Samples(np.repeat(self.positions, len(instants), axis=0), rest, rest, rest)
         segment = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(durations) - 1)
         local = np.clip(instants - times[segment], 0.0, durations[segment])
-        samples = Samples(*evaluate(coefficients[segment], local))
+        samples = Samples(*evaluate(self._powers.take(segment, axis=1), local))
         outside = (instants < times[0]) | (instants > times[-1])
         for derivative in samples[1:]:
             derivative[outside] = 0.0
@@ -172,6 +171,11 @@ class JointTrajectory:
 
     def __hash__(self) -> int:
         return hash(self.trajectory_id)
+
+    @cached_property
+    def _powers(self) -> FloatArray:
+        """The polynomials (6, N-1, n), each power's coefficients together."""
+        return np.ascontiguousarray(self._polynomials[0].transpose(2, 0, 1))
 
     @cached_property
     def _polynomials(self) -> tuple[FloatArray, FloatArray]:

@@ -3,7 +3,7 @@
 from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
 from ir_planner.checks.clearance_checks import clearance_violation
 from ir_planner.checks.energy import MovementEnergy, carried, holding_watts, movement_energy
-from ir_planner.checks.energy_slopes import holding_slope, movement_slope, standing_slope
+from ir_planner.checks.energy_slopes import energy_and_slope, holding_slope, standing_slope
 from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.intervals import ROBOTS, Interval, interval, movement_spread, spread
@@ -34,6 +34,7 @@ __all__ = [
     "cell_shapes",
     "clearance_violation",
     "end_in_collision",
+    "energy_and_slope",
     "evaluate_trajectory",
     "holding_slope",
     "holding_watts",
@@ -41,7 +42,6 @@ __all__ = [
     "measured",
     "movement_energy",
     "movement_shapes",
-    "movement_slope",
     "movement_spread",
     "nearest_pair",
     "nearest_pairs",

@@ -46,16 +46,17 @@ def sampled_energy(at: Sampled, scene: PlanningScene) -> float:
     return _drawn(bus, at.dt) / scene.drives.rectifier_efficiency + scene.base_watts * at.span
 
 
-def movement_slope(at: Sampled, scene: PlanningScene) -> FloatArray:
-    """d energy / d parameter (P,) of a sampled motion with the loads of the scene, J per unit."""
+def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArray]:
+    """The same, and d energy / d parameter (P,) with the loads of the scene, J per unit."""
     if at.span <= 0.0:
-        return np.zeros(len(scene.parameters.names))
+        return 0.0, np.zeros(len(scene.parameters.names))
     torque, power, bus = _powers(at, scene)
     efficiency = scene.drives.rectifier_efficiency
+    energy = _drawn(bus, at.dt) / efficiency + scene.base_watts * at.span
     price = _price(power, bus, scene) * (at.dt / efficiency)
     slope = _axis_slope(_States(at.motion, torque, price), scene)
     slope[scene.parameters.index("rectifier_efficiency")] = -_drawn(bus, at.dt) / efficiency**2
-    return slope + standing_slope(at.span, scene)
+    return energy, slope + standing_slope(at.span, scene)
 
 
 def _powers(at: Sampled, scene: PlanningScene) -> tuple[FloatArray, FloatArray, DcBus]:

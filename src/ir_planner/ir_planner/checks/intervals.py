@@ -15,7 +15,7 @@ import numpy as np
 from ir_description import PowerParameters
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.energy_slopes import Sampled, movement_slope, sampled_energy
+from ir_planner.checks.energy_slopes import Sampled, energy_and_slope, sampled_energy
 from ir_planner.scene import PlanningScene
 
 ROBOTS = 1000  # drawn: the ends of a 90 % interval are then known to some 5 % of its width
@@ -59,9 +59,9 @@ def spread(slope: FloatArray, parameters: PowerParameters) -> FloatArray:
 def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatArray:
     """What the drawn robots add (ROBOTS,) J to the energy of a movement."""
     at, there = Sampled.of(trajectory), expected_scene(scene)
-    more = sampled_energy(at, there) - sampled_energy(at, scene)
+    expected_energy, slope = energy_and_slope(at, there)
     drawn = robots(scene.parameters) - there.parameters.mean
-    return more + drawn @ movement_slope(at, there)
+    return expected_energy - sampled_energy(at, scene) + drawn @ slope
 
 
 def interval(nominal: float, added: FloatArray) -> Interval:

@@ -23,9 +23,17 @@ def evenly_spaced(path: FloatArray, count: int) -> FloatArray:
 
 def _lengths(path: FloatArray) -> FloatArray:
     """Length (M,) of the path before each of its points."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    steps = path[1:] - path[:-1]
+    passed = np.zeros(len(path))
+    np.cumsum(np.sqrt(np.add.reduce(steps * steps, axis=1)), out=passed[1:])
+    return passed
 
 
 def _at(path: FloatArray, passed: FloatArray, at: FloatArray) -> FloatArray:
-    """Configurations (K, n) where lengths `at` (K,) have been passed."""
-    return np.stack([np.interp(at, passed, path[:, j]) for j in range(path.shape[1])], axis=1)
+    """Configurations (K, n) where lengths `at` (K,), none below 0, have been passed."""
+    k = passed.searchsorted(at, side="right") - 1
+    after = np.minimum(k + 1, len(path) - 1)
+    length = (passed[after] - passed[k])[:, None]
+    step = path[after] - path[k]
+    slope = np.divide(step, length, out=np.zeros_like(step), where=length > 0.0)  # at the end there is none
+    return np.asarray(slope * (at - passed[k])[:, None] + path[k])

@@ -14,6 +14,7 @@ import numpy as np
 from ir_kernels import Extrema, polynomial_extrema
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
+_NOTHING = 1e-9  # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
 _HALVINGS = 15  # a root to 3e-5 of the segment: the value at an extreme is off by its square
 
 
@@ -37,7 +38,13 @@ class Extremes:
         """Sum |dq| (S, n) rad; found when it is asked for, because it costs more than all the others."""
         travel = np.abs(self.positions[:, :, 1:].sum(axis=2))
         if self.turning.any():
-            travel[self.turning] = _turning_travel(self.positions[self.turning])
+            turning = self.positions[self.turning]
+            cubic = np.abs(turning[:, 4:]).sum(axis=1) <= _NOTHING
+            found = np.empty(len(turning))
+            found[cubic] = _cubic_travel(turning[cubic])
+            if not cubic.all():
+                found[~cubic] = _turning_travel(turning[~cubic])
+            travel[self.turning] = found
         return np.asarray(travel)
 
 
@@ -101,6 +108,20 @@ def extremes(coefficients: FloatArray, durations: FloatArray) -> Extremes:
 
 def _size(found: Extrema) -> FloatArray:
     return np.asarray(np.maximum(np.abs(found.minimum), np.abs(found.maximum)))
+
+
+def _cubic_travel(position: FloatArray) -> FloatArray:
+    """Travel (P,) of polynomials (P, K) over u in [0, 1] that are cubic, or less."""
+    c = np.zeros((4, len(position)))
+    c[: min(position.shape[1], 4)] = position[:, :4].T
+    a, half, b = 3.0 * c[3], c[2], c[1]  # of the speed a u^2 + 2 half u + b
+    root = np.sqrt(np.maximum(half * half - a * b, 0.0))
+    larger = -(half + np.copysign(root, half))  # without cancellation
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turns = np.stack([np.zeros_like(a), larger / a, b / larger, np.ones_like(a)])
+    turns = np.sort(np.clip(np.where(np.isfinite(turns), turns, 0.0), 0.0, 1.0), axis=0)
+    along = ((c[3] * turns + c[2]) * turns + c[1]) * turns
+    return np.asarray(np.abs(np.diff(along, axis=0)).sum(axis=0))
 
 
 def _turning_travel(position: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
 from ir_planner.optimize.refinement import Refinement, Solution
 from ir_planner.optimize.stages import QUICK, THOROUGH, Effort
-from ir_planner.search import COARSE, apart, at_nine_shares, fewest_corners, first_different
+from ir_planner.search import COARSE, apart, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
 
 _BETTER = 0.99  # share of the cost below which an alike path replaces another
@@ -77,7 +77,7 @@ class Portfolio:
             looks = [look for look in looks if look[0].cost < most]
         looks.sort(key=lambda look: look[0].cost)
         new = 0
-        for look, guess in first_different(looks, _FOLLOWED, COARSE, lambda look: _places(look[0])):
+        for look, guess in first_different(looks, _FOLLOWED, COARSE, lambda look: look[0].places):
             solution = self.refinement.coarse_from(look.spline, guess, QUICK.coarse)
             new += self._take(Candidate(method, solution.spline.knots()[0], solution))
         return new
@@ -154,9 +154,4 @@ class Portfolio:
 
 def _alike(a: Solution, b: Solution) -> bool:
     """Whether two coarse solutions pass the same configurations."""
-    return apart(_places(a), _places(b)) < COARSE
-
-
-def _places(solution: Solution) -> FloatArray:
-    """Configurations (9, n) by which coarse solutions are compared."""
-    return at_nine_shares(solution.spline.control)
+    return apart(a.places, b.places) < COARSE

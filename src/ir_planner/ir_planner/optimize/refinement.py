@@ -8,6 +8,7 @@ comes too near gets a larger clearance margin, and the descent continues.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ir_planner.optimize.stages import QUICK, THOROUGH, Effort, Stage, decisive
 from ir_planner.optimize.terms import spline_cost
 from ir_planner.request import Context
 from ir_planner.scene import PROOF_TOLERANCE, MotionLimits, tcp_inside
+from ir_planner.search import at_nine_shares
 from ir_planner.timing import (
     DURATION_SLACK,
     TORQUE_SHARES,
@@ -70,6 +72,11 @@ class Solution:
     kept: FloatArray
     speed: float = 1.0
     torque: float = TORQUE_SHARES[0]
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Configurations (9, n) by which coarse solutions are compared."""
+        return at_nine_shares(self.spline.control)
 
 
 class Refinement:
@@ -199,22 +206,22 @@ class Refinement:
         )
         work.spend(int(np.ceil(found.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
         # a spline stays within the range of its control points
-        control = np.clip(found.control, robot.position_min, robot.position_max)
+        control = np.minimum(np.maximum(found.control, robot.position_min), robot.position_max)
         return replace(solution, spline=UniformSpline(control, found.interval), cost=found.value)
 
     def _cost(self, solution: Solution, path: FloatArray) -> SplineCost:
         weights = objective_weights(self.context, path)
         stage, stiffer = solution.stage, _STIFFER if self.context.options.duration > 0.0 else 1.0
         penalty = weights.power * max(stiffer * stage.stiffness, _STIFFNESS)
-        limits = self.limits.with_torque_share(solution.torque).for_speed(solution.speed)
-        if solution.kept is not self._kept:
-            return spline_cost(self.context, limits, weights, penalty, solution.kept, stage.smoothing)
         key = (penalty, stage.smoothing, solution.speed, solution.torque, weights.travel.tobytes())
-        if key not in self._costs:
-            self._costs[key] = spline_cost(
-                self.context, limits, weights, penalty, solution.kept, stage.smoothing
-            )
-        return self._costs[key]
+        known = self._costs.get(key) if solution.kept is self._kept else None
+        if known is not None:
+            return known
+        limits = self.limits.with_torque_share(solution.torque).for_speed(solution.speed)
+        cost = spline_cost(self.context, limits, weights, penalty, solution.kept, stage.smoothing)
+        if solution.kept is self._kept:
+            self._costs[key] = cost
+        return cost
 
     def _rows(self, spline: UniformSpline) -> RowArray:
         """Which thresholds hold in each interval: the station's where the tcp stays in the zone."""

@@ -16,7 +16,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import movement_energy
 from ir_planner.request import Context
-from ir_planner.scene import path_cost
+from ir_planner.scene import PlanningScene, path_cost
 
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _SLOWER = np.array(
@@ -132,7 +132,7 @@ def least_stretched_cost(fastest: JointTrajectory, context: Context) -> float:
         return coarse_cost(fastest, context)
     else:
         factors = _CLOSE[: None if options.objective == "energy" else _USUAL]
-    return float(_costs(fastest, factors, context).min())
+    return float(stretched_costs(fastest, factors, context).min())
 
 
 def best_stretch(fastest: JointTrajectory, context: Context) -> float:
@@ -140,15 +140,15 @@ def best_stretch(fastest: JointTrajectory, context: Context) -> float:
     if context.options.objective in ("time", "movement_cost"):
         return 1.0
     factors = _SLOWER if context.options.objective == "energy" else _FACTORS
-    costs = _costs(fastest, factors, context)
+    costs = stretched_costs(fastest, factors, context)
     k = int(np.argmin(costs))
     around = np.linspace(factors[max(k - 1, 0)], factors[min(k + 1, len(factors) - 1)], _REFINED + 2)[1:-1]
-    refined = _costs(fastest, around, context)
+    refined = stretched_costs(fastest, around, context)
     best = int(np.argmin(refined))
     return float(around[best]) if refined[best] < costs[k] else float(factors[k])
 
 
-def _costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> FloatArray:
+def stretched_costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> FloatArray:
     """J, or E_drive where the objective is not J (F,), of a trajectory stretched by `factors` (F,); all of
     them from the same samples.
     """
@@ -161,12 +161,21 @@ def _costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> F
     q = np.broadcast_to(motion.q, (len(factors), *motion.q.shape)).reshape(shape)
     qd, qdd = (motion.qd / slower).reshape(shape), (motion.qdd / slower**2).reshape(shape)
     axes = scene.dynamics.axis_power(qd, scene.dynamics.inverse_dynamics(q, qd, qdd))
-    steps = factors * span / count
-    drives = [
-        float(dc_bus(power, float(step), scene.dc_bus).mains.sum() * step)
-        for power, step in zip(axes.reshape(len(factors), count, -1), steps, strict=True)
-    ]
+    drives = _drawn(axes.reshape(len(factors), count, -1), factors * span / count, scene)
     options = context.options
     free = options.duration <= 0.0 and options.objective == "time_and_energy"
     per_second = options.time_value if free else 0.0
-    return np.array(drives) + per_second * factors * span
+    return drives + per_second * factors * span
+
+
+def _drawn(axes: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatArray:
+    """Joules (F,) at the mains of F motions with the powers (F, N, n) W of their axes over steps (F,) s.
+
+    The bus takes them one after the other; a step between two of them empties its capacitor.
+    """
+    motions, count, n = axes.shape
+    emptying = np.zeros((motions, 1, n))
+    emptying[:, 0, 0] = 2.0 * scene.dc_bus.capacity_energy / steps
+    power = np.concatenate([axes, emptying], axis=1).reshape(-1, n)
+    bus = dc_bus(power, np.repeat(steps, count + 1), scene.dc_bus)
+    return np.asarray(bus.mains.reshape(motions, count + 1)[:, :-1].sum(axis=1) * steps)
