@@ -41,6 +41,16 @@ def test_the_descent_lowers_the_cost_and_reports_it_truly(core: Any) -> None:
     assert last < 0.5 * cost.value(control, 0.15).value
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_no_pair_is_left_out_that_was_far_some_evaluations_before(compiled_core: Any, seed: int) -> None:
+    robot, collision, dynamics = chain_models(seed, 4 + seed % 4)
+    control = at_rest(motion(seed, 40, dynamics.n))
+    cost = SplineCost(collision, dynamics, terms(robot, len(collision.pairs)), core=compiled_core)
+    for evaluations in range(1, 120, 7):
+        found = cost.descend(control, 0.2, evaluations=evaluations, tolerance=0.0)
+        assert found.value == cost.value(found.control, found.interval).value  # which remembers nothing
+
+
 def test_ends_stay_where_they_are_and_still(core: Any) -> None:
     _, control, found = descended(core, 40)
     assert (found.control[:3] == control[:3]).all()

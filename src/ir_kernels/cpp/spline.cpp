@@ -122,6 +122,7 @@ class SplineCost {
         }
       }
       if (!cost_) cost_ = std::make_unique<ir::SplineCost>(from.geometry_, from.drives_, from.terms_);
+      cost_->forget();
     }
     ~Borrowed() {
       try {

@@ -38,12 +38,32 @@ std::vector<double> widest(const SplineTerms& t, int pairs) {
   return most;
 }
 
+// Along the links, whatever the joint values.
+std::vector<double> levers(const Model& model) {
+  const int n = model.chain.n;
+  std::vector<double> to_joint(n + 1, 0.0), longest(n, 0.0);
+  for (int k = 0; k < n; ++k) {
+    const Local& s = model.chain.joints[k].shift;
+    to_joint[k + 1] = to_joint[k] + std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+  }
+  for (const Capsule& c : model.capsules) {
+    double to_end = 0.0;
+    for (const double sign : {-1.0, 1.0}) {
+      double square = 0.0;
+      for (int i = 0; i < 3; ++i) square += std::pow(c.middle[i] + sign * c.axis[i], 2);
+      to_end = std::max(to_end, std::sqrt(square));
+    }
+    for (int k = 0; k < c.link; ++k) longest[k] = std::max(longest[k], to_joint[c.link] - to_joint[k + 1] + to_end);
+  }
+  return longest;
+}
+
 }  // namespace
 
 SplineCost::SplineCost(const Model& geometry, const dynamics::Core& drives, const SplineTerms& terms)
     : model_(geometry), core_(drives), terms_(terms), n_(drives.model.n), widest_(widest(terms, geometry.pairs())),
       shift_float_(geometry, widest_.data()), shift_double_(geometry, widest_.data()), placement_float_(geometry),
-      placement_double_(geometry), slope_(n_) {
+      placement_double_(geometry), lever_(levers(geometry)), slope_(n_) {
   smooth_envelope();
 }
 

@@ -2,6 +2,7 @@
 // control points and by the time between its knots: see ir_kernels/spline.py for the terms.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "dynamics_adjoint.hpp"
@@ -30,6 +31,9 @@ class SplineCost {
   // gradient (K, n) and of_interval.
   double operator()(const double* control, int K, const std::int32_t* row, double interval, double* gradient,
                     double& of_interval);
+
+  // Forgets what earlier calls found to be near: what follows depends on nothing but its own arguments.
+  void forget() { near_.clear(); }
 
   double energy = 0.0;  // [J] at the mains for the axes, of the last call
 
@@ -70,6 +74,16 @@ class SplineCost {
   Placement<Float16> placement_float_;
   Placement<Double8> placement_double_;
   std::vector<int> hits_[16];
+  // Of one lane group: no pair matters while bodies move by less than `clear` from where they were at `seen`, and none
+  // but `pairs` while they move by less than `around` from where they were at `listed`.
+  struct Near {
+    std::vector<double> seen, listed;       // joint values of the group's samples
+    double clear = 0.0, around = 0.0;       // [m]
+    std::vector<std::array<int, 2>> pairs;  // each with its capsule, or its number among the self pairs
+  };
+  std::vector<Near> near_;
+  std::vector<double> lever_;  // (n) [m] of each joint: no point of a capsule's axis is farther from it
+  double moved(const std::vector<double>& from, const double* q, int used) const;
   std::vector<Lane> slope_;
   template <class V> double clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>& shift,
                                          const std::int32_t* row, double step);
