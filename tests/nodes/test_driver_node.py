@@ -296,11 +296,13 @@ def test_faster_than_real_time_the_driver_is_the_clock(make_driver, listen, wait
     states = listen(names.JOINT_STATES, JointState)
     wait_for(lambda: len(clock) > 50 and len(states) > 500, timeout=60.0)
     stamps = np.array([stamp_ns(msg) for msg in states])
-    assert (np.diff(stamps) == 2_000_000).all()
+    gaps = np.diff(stamps)  # 2,000 messages in a second: a loaded machine may lose some, none leaves the grid
+    assert (gaps > 0).all()
+    assert (gaps % 2_000_000 == 0).all()
     ticks = {msg.clock.sec * 1_000_000_000 + msg.clock.nanosec for msg in clock}
     both = {tick for tick in ticks if stamps[0] <= tick <= stamps[-1]}
     assert len(both) > 20
-    assert both <= set(stamps.tolist())
+    assert all((tick - stamps[0]) % 2_000_000 == 0 for tick in both)
 
 
 def test_a_movement_whose_client_has_gone_is_stopped_on_its_path(
