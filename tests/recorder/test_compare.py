@@ -19,6 +19,8 @@ from hypothesis import strategies as st
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.front import Point, front_chart, front_section, pareto
+from ir_recorder.report.headline import source
+from ir_recorder.report.money import cycle_of
 from ir_recorder.report.step_table import step_columns, write_table
 from ir_recorder.report_main import main
 
@@ -129,6 +131,19 @@ def test_no_point_beats_one_of_the_front_and_each_other_one_is_beaten(points: li
     assert "nan" not in drawn
     numbers = [float(x) for x in re.findall(r'c[xy]="([-\d.]+)"', drawn)]
     assert all(math.isfinite(x) and 0.0 <= x <= 720.0 for x in numbers)
+
+
+def test_plans_that_were_not_driven_are_compared_by_what_was_predicted(analysis: Analysis) -> None:
+    bare = replace(analysis.recording, power=None, joints=None, controller=None, events=(), hardware="")
+    plan = analyse(replace(bare, path=Path("plan.mcap")))
+    page = page_of(plan, plan)
+    assert page.count("predicted, not driven") == 2
+    assert "3 800 J" in page
+    cycle = cycle_of(plan)
+    assert cycle is not None
+    assert (cycle.energy, cycle.seconds) == (3800.0, 5.7)
+    assert "this run" not in front_section(plan)
+    assert "Predicted" in source(plan)
 
 
 def test_the_run_stands_beside_the_common_program(analysis: Analysis) -> None:

@@ -90,6 +90,6 @@ def test_the_documentation_has_the_table_of_the_settings() -> None:
 
 
 def test_without_a_program_there_is_nothing_to_pay(analysis: Analysis) -> None:
-    bare = analyse(replace(analysis.recording, events=()))
+    bare = analyse(replace(analysis.recording, events=(), savings=()))
     assert costs_section(bare, Costs()) == ""
     assert lever_section(bare, Costs()) == ""

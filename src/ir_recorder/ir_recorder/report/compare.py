@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis import Analysis, Finding, StepResult, summary
 from ir_recorder.analysis.flows import energy_flows
 from ir_recorder.report.axes import Curves, packed
@@ -116,6 +117,10 @@ def _flow(name: str) -> Callable[[Analysis], float]:
     return value
 
 
+def _saved(of: Callable[[ProgramSavings], float]) -> Callable[[Analysis], float]:
+    return lambda analysis: of(analysis.savings) if analysis.savings is not None else math.nan
+
+
 def _least(analysis: Analysis) -> float:
     return min((r.clearance.least for r in analysis.movements if r.clearance is not None), default=math.nan)
 
@@ -139,6 +144,9 @@ _VALUES: tuple[tuple[str, Callable[[float], str], Callable[[Analysis], float]], 
     ("brake resistor", joules, _flow("resistor")),
     ("motors and inverters", joules, _flow("motors")),
     ("friction", joules, _flow("friction")),
+    ("planned in the common program's time", joules, _saved(lambda s: s.total.planned)),
+    ("common program", joules, _saved(lambda s: s.total.common)),
+    ("saved by the plan", joules, _saved(lambda s: s.total.saved)),
     ("peak power", watts, lambda a: a.peak_power),
     ("least clearance", millimetres, _least),
 )
@@ -151,6 +159,9 @@ def _points(analyses: Sequence[Analysis], names: Sequence[str]) -> list[Point]:
         if analysis.program is not None and math.isfinite(analysis.program.whole.energy):
             whole = analysis.program.whole
             points.append(Point(name, whole.seconds, whole.energy, analysis.recording.origin))
+        elif analysis.savings is not None:
+            total = analysis.savings.total
+            points.append(Point(name, total.seconds, total.planned, "predicted"))
     return points
 
 

@@ -27,11 +27,12 @@ class Point:
 def front_section(analysis: Analysis) -> str:
     """Section of the page: this run, the plan in the common program's time, and the common program."""
     savings, program = analysis.savings, analysis.program
-    if savings is None or program is None:
+    if savings is None:
         return ""
     total = savings.total
+    run = program.whole if program is not None and math.isfinite(program.whole.energy) else None
     points = [
-        Point("this run", program.whole.seconds, program.whole.energy, analysis.recording.origin),
+        *([Point("this run", run.seconds, run.energy, analysis.recording.origin)] if run is not None else ()),
         Point("common program", total.seconds, total.common, "predicted"),
         Point("planned in its time", total.seconds, total.planned, "predicted"),
     ]

@@ -55,12 +55,16 @@ def subtitle(analysis: Analysis) -> str:
 def plant_of(analysis: Analysis) -> str:
     """Whether the figures are simulated or measured, and the plant's name."""
     plant = analysis.recording.plant
+    if not analysis.steps and not analysis.recording.hardware and analysis.savings is not None:
+        return "predicted, not driven"
     return f"{analysis.recording.origin}, plant {plant}" if plant else analysis.recording.origin
 
 
 def source(analysis: Analysis) -> str:
     """Whether the figures are simulated, and by which plant."""
     hardware = analysis.recording.hardware
+    if not hardware and not analysis.steps and analysis.savings is not None:
+        return '<p class="source open"><b>Predicted</b> a plan that was not driven</p>'
     if not hardware:
         return '<p class="source open">plant not recorded</p>'
     style = analysis.recording.origin
@@ -94,7 +98,11 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     shown = (
         [_whole(analysis, program), _unshortened(program), *paid, *_parts(program, origin)]
         if program is not None
-        else [Tile("program", "none executed", ("figures of the whole recording only",)), _recorded(analysis)]
+        else [
+            Tile("program", "none executed", ("figures of the whole recording only",)),
+            *paid,
+            _recorded(analysis),
+        ]
     )
     peak = Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
     return "".join(tile.html() for tile in [*shown, peak, _clearance(analysis)] if tile is not None)

@@ -22,8 +22,13 @@ class Cycle:
 
 
 def cycle_of(analysis: Analysis) -> Cycle | None:
-    """The cycle as it is in production: with full pauses where the run's are shortened; None without one."""
-    program = analysis.program
+    """The cycle as it is in production: with full pauses where the run's are shortened; of a plan that was
+    not driven the planned one; None without either.
+    """
+    program, savings = analysis.program, analysis.savings
+    if program is None and savings is not None and savings.total.seconds > 0.0:
+        name = "planned in the common program's time, predicted"
+        return Cycle(name, savings.total.planned, savings.total.seconds)
     if program is None or not math.isfinite(program.whole.energy) or program.whole.seconds <= 0.0:
         return None
     full = program.unshortened
@@ -43,7 +48,7 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     rows = [_row(cycle.name, cycle.energy, cycle.seconds, counts, costs)]
     rows += _saved(analysis, counts, costs)
     heads = ("", ">a cycle", ">a part", ">a shift", ">a year")
-    origin = analysis.recording.origin
+    origin = analysis.recording.origin if analysis.program is not None else "not there: nothing was driven"
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
         f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their 90 % '
