@@ -17,8 +17,9 @@ from typing import Any
 
 import pytest
 
-from ir_recorder import analyse, findings, read_recording
+from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.report import report_html
+from ir_recorder.report.compare import comparison_html
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
 CONTROLS = Path(__file__).with_name("page_controls.js").read_text().strip().split("\n\n")
@@ -141,6 +142,38 @@ def test_nothing_is_cut_off_and_fingers_find_the_controls(
         assert page.run("getComputedStyle(document.getElementById('view')).touchAction") == "pan-y"
     clean(page)
     page.close()
+
+
+def test_recordings_side_by_side_and_a_page_for_management(
+    browser: Any, analysis: Analysis, file: Path, tmp_path: Path
+) -> None:
+    if browser is None:
+        return
+    path = tmp_path / "compare.html"
+    compared = [(each, ()) for each in (analysis, replace_path(analysis, EVIL.replace("/", "")))]
+    path.write_text(comparison_html(compared))
+    page = browser.open(path, *PHONE, touch=True)
+    assert page.run("document.documentElement.scrollWidth") == PHONE[0]
+    drawn = "document.querySelector('.axis-chart canvas').toDataURL()"
+    both = page.run(drawn)
+    page.run("document.querySelectorAll('.toggles input')[1].click()")
+    page.frame()
+    assert page.run(drawn) != both
+    assert page.run("document.querySelectorAll('img').length") == 0
+    clean(page)
+    page.close()
+    page = browser.open(file, 740, 1094)
+    page.call("Emulation.setEmulatedMedia", media="print")
+    last = "(() => document.getElementById('levers').getBoundingClientRect().bottom + scrollY)()"
+    assert page.run(last) <= 1045  # px of A4 between its margins
+    shown = "[...document.querySelectorAll('button.export, .toggles, #theme')].some((e) => e.offsetParent)"
+    assert page.run(shown) is False
+    clean(page)
+    page.close()
+
+
+def replace_path(analysis: Analysis, name: str) -> Analysis:
+    return replace(analysis, recording=replace(analysis.recording, path=Path(name)))
 
 
 def test_what_a_cell_is_called_is_never_executed(browser: Any, demo_file: Path, tmp_path: Path) -> None:
