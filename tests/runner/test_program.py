@@ -53,6 +53,8 @@ class World:
     knows_modes: bool = True
     refusals: dict[str, Status] = field(default_factory=dict)
     cancel_in: Callable[[ask.Request], bool] = lambda request: False
+    late: float = 0.0  # s: so old is the mode that the program hears
+    past: list[tuple[float, Mode]] = field(default_factory=list)
 
     def run(self, movements, settings=None, times=None):
         steps = Program(movements, settings or ProgramSettings(), times).run()
@@ -65,9 +67,17 @@ class World:
                     request = steps.throw(CanceledError())
                     continue
                 status, modes = self.fulfil(request)
-                request = steps.send(ask.Outcome(self.now, self.mode, status, modes, self.watts * self.now))
+                request = steps.send(ask.Outcome(self.now, self.heard, status, modes, self.watts * self.now))
         except StopIteration as ended:
             return ended.value
+
+    @property
+    def heard(self):
+        """The mode as the program knows it."""
+        if not self.past or self.past[-1][1] is not self.mode:
+            self.past.append((self.now, self.mode))
+        known = [mode for when, mode in self.past if when <= self.now - self.late]
+        return known[-1] if known else self.past[0][1]
 
     def fulfil(self, request):
         refusal = self.refusals.get(type(request).__name__)
@@ -139,11 +149,13 @@ class World:
 
     def wait_for_mode(self, modes, timeout):
         deadline = self.now + timeout
-        while self.mode not in modes:
-            if not self.changes or self.changes[0][0] > deadline:
+        while self.heard not in modes:
+            coming = [when for when, _ in self.changes] + [when + self.late for when, _ in self.past]
+            soon = [when for when in coming if self.now < when <= deadline]
+            if not soon:
                 self.pass_time(deadline)
                 return Status(StatusCode.TIMED_OUT, "not in time")
-            self.pass_time(self.changes[0][0])
+            self.pass_time(min(soon))
         return Status.success()
 
 
@@ -263,6 +275,17 @@ def test_a_pause_of_several_modes_goes_deeper_as_soon_as_it_can():
     assert world.log[2:-4] == ["0 started", *deeper, "0 ended"]
     assert world.now == pytest.approx(100.0 + 60.0 + 2.0)
     assert not any(world.bits.values())
+
+
+@pytest.mark.parametrize("late", [0.0, 5.5, 8.0])
+def test_a_controller_whose_hibernation_is_heard_late_is_woken_all_the_same(late):
+    world = World(late=late)
+    assert world.heard is Mode.STAND_ON_MOTORS
+    result = world.run([pause(ENTER + STAY + LEAVE, "HIBERNATION"), move()])
+    assert result.status.ok, result.status
+    assert world.packets >= 1
+    assert world.mode is Mode.STAND_ON_MOTORS
+    assert not world.bits["hib"]
 
 
 def test_a_pause_that_takes_other_joules_than_planned_says_so():

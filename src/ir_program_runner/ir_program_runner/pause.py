@@ -7,6 +7,7 @@ controller reacts to nothing but a Wake-on-LAN packet; the HIB bit is cleared wh
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 
 from ir_msgs_py.modes import READY, RESTS, Mode, modes_of
 from ir_msgs_py.power import PowerMode
@@ -150,14 +151,27 @@ class Pause:
 
     def _wake_by_packets(self, outcome: Outcome, limit: float) -> Requests:
         """Send packets until the controller starts; one may get lost, or come before it sleeps."""
-        if outcome.mode not in _ASLEEP:  # never hibernated: clear the bit instead
-            return need((yield SetPlcInput(_BIT[self._mode], False)))
+        if outcome.mode not in _ASLEEP:  # it has not hibernated, or that is heard late
+            outcome = yield from self._stay_awake()
+            if outcome.status.ok and outcome.mode not in _ASLEEP:
+                return outcome
         self.restarted = True
-        while outcome.mode in _ASLEEP and outcome.now < limit:
+        asleep, waking = outcome.mode in _ASLEEP, False
+        while not waking and outcome.now < limit:
             need((yield SendWakePacket()))
-            outcome = yield WaitForMode(_AWAKE, self._settings.wake_repeat)
+            outcome = yield WaitForMode((Mode.FROM_HIBERNATION,), self._settings.wake_repeat)
             if outcome.status.code == StatusCode.ROBOT_STATE_STALE:
                 raise StepFailedError(outcome.status)
+            asleep = asleep or outcome.mode in _ASLEEP
+            waking = outcome.mode is Mode.FROM_HIBERNATION or (asleep and outcome.mode in _AWAKE)
+        return outcome
+
+    def _stay_awake(self) -> Requests:
+        """Take the HIB bit back; whoever doesn't answer hibernates, and who has begun to shows it soon."""
+        outcome = yield SetPlcInput(_BIT[self._mode], False)
+        if outcome.status.ok:
+            seen = yield WaitForMode(_ASLEEP, self._settings.wake_repeat)
+            outcome = replace(seen, status=outcome.status)
         return outcome
 
     def _clear(self) -> Generator[Request, Outcome, None]:
