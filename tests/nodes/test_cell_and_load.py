@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ir_description import cell_hash, load_cell
-from ir_msgs.msg import CarriedLoad, CellState, ControllerTimers
+from ir_msgs.msg import CarriedLoad, CellState, ControllerTimers, MachineStates, Signal
 from ir_msgs.srv import CheckState, GetTrajectory, PlanRegionalMovement, PlanStandby, SetEquipment, SetLoad
 from ir_msgs_py import names
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import report_from_msg, trajectory_from_msg
-from ir_msgs_py.ros.quality import LATCHED
+from ir_msgs_py.ros.quality import COMMANDS, LATCHED
 from ir_planner.node.node import PlannerNode
 from ir_sim_driver.node import SimDriver
 
@@ -50,6 +51,29 @@ def planned(client: Client, goal: str = "A1 20 A2 -90 A3 90 A4 0 A5 0 A6 0") -> 
     answer = client.ask(names.PLAN_REGIONAL_MOVEMENT, request)
     found = client.ask(names.GET_TRAJECTORY, GetTrajectory.Request(trajectory_id=answer.trajectory_id))
     return report_from_msg(answer.report), trajectory_from_msg(found.trajectory)
+
+
+@pytest.mark.parametrize("latched", [True, False])
+def test_a_signal_that_was_sent_before_the_driver_started_counts(
+    make_driver: Any, ros_context: Any, ros_executor: Any, client: Client, wait_for: Any, latched: bool
+) -> None:
+    plc = ros_executor.add_node(Node("plc", context=ros_context))
+    quality = COMMANDS[0] if latched else COMMANDS[1]
+    door = plc.create_publisher(Signal, names.MACHINE_SIGNALS, quality)
+    for level in (True, False):
+        door.publish(Signal(name="lathe_open_door", value=level))
+    make_driver()
+
+    def state() -> str:
+        states = client.next_message(names.MACHINE_STATES, MachineStates)
+        lathe = list(states.equipment).index("lathe")
+        return str(states.next[lathe] or states.states[lathe])
+
+    if not latched:  # as `ros2 topic pub` by default: heard from now on
+        wait_for(lambda: door.get_subscription_count() > 0)
+        assert state() == "door_open"
+        door.publish(Signal(name="lathe_open_door", value=False))
+    wait_for(lambda: state() == "door_closed")
 
 
 @pytest.mark.usefixtures("planner_node")

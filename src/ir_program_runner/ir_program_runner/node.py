@@ -23,6 +23,7 @@ from ir_msgs_py.errors import InvalidValueError, ParameterError
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.program import Event, ProgramState
 from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.ros.commands import CommandTopic
 from ir_msgs_py.ros.conversions import (
     planned_movement_from_msg,
     program_state_to_msg,
@@ -32,7 +33,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.driver import Driver
 from ir_msgs_py.ros.planner import Planner
-from ir_msgs_py.ros.quality import ACTION_SERVICES
+from ir_msgs_py.ros.quality import ACTION_SERVICES, COMMANDS
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_msgs_py.ros.waiting import Waiting
@@ -50,7 +51,7 @@ from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings
 
 _KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-_SIGNALS = QoSProfile(depth=100)  # all signals of a cell may change at once
+_SIGNALS = COMMANDS[0]  # a driver that starts later hears them too
 _FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
 _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
 
@@ -85,7 +86,7 @@ class ProgramRunnerNode(Node):
         self._signals = self.create_publisher(SignalMsg, "~/signals", _SIGNALS)
         self._machine_signals = self.create_publisher(SignalMsg, "~/machine_signals", _SIGNALS)
         self._program_state = self.create_publisher(ProgramStateMsg, "~/program_state", _KEPT)
-        self.create_subscription(SignalMsg, "~/signals", self._hear_signal, _SIGNALS)
+        CommandTopic(self, SignalMsg, "~/signals", self._hear_signal, of=lambda msg: msg.name)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
         self._last, self._diagnostics = Status.success(), RunnerDiagnostics(self)

@@ -23,6 +23,7 @@ from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announced import CarriedLoad
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.ros.commands import CommandTopic
 from ir_msgs_py.ros.conversions import (
     carried_load_to_msg,
     contact_to_msg,
@@ -33,7 +34,6 @@ from ir_msgs_py.ros.quality import LATCHED
 from ir_sim_driver.controller import Driver, PlannedCell
 from ir_sim_driver.plant import Carried, plant_to_yaml
 
-_SIGNALS = QoSProfile(depth=100)  # all signals of a cell may change at once
 _CONTACTS = QoSProfile(depth=100)
 
 
@@ -62,7 +62,7 @@ class Announcements:
         self._changed = node.create_guard_condition(self.look)
         node.create_subscription(CellState, names.CELL, self._heard, LATCHED)
         for topic in (names.SIGNALS, names.MACHINE_SIGNALS):
-            node.create_subscription(Signal, topic, self._signalled, _SIGNALS)
+            CommandTopic(node, Signal, topic, self._signalled, of=lambda msg: msg.name)
 
     def close(self) -> None:
         """Read no more cells."""
