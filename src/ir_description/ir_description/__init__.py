@@ -13,6 +13,9 @@ from ir_description.cell import (
     Station,
     Task,
     Zone,
+    cell_in,
+    machine_in,
+    sweep_speeds,
 )
 from ir_description.cell_process import read_cell_apart
 from ir_description.cell_review import Finding, check_cell
@@ -95,6 +98,7 @@ __all__ = [
     "cell_file_errors",
     "cell_from_yaml",
     "cell_hash",
+    "cell_in",
     "cell_to_yaml",
     "check_cell",
     "data_sheet",
@@ -104,6 +108,7 @@ __all__ = [
     "load_power_data",
     "load_power_parameters",
     "load_robot",
+    "machine_in",
     "moving_frames",
     "parameter_unit",
     "physical_bounds",
@@ -113,4 +118,5 @@ __all__ = [
     "read_cell_apart",
     "robot_marks",
     "robot_urdf",
+    "sweep_speeds",
 ]

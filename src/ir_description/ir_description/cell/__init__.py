@@ -26,6 +26,7 @@ from ir_description.cell.equipment import (
     station_at,
     zone_around,
 )
+from ir_description.cell.moving import cell_in, machine_in, sweep_speeds
 from ir_description.cell.part import Part
 from ir_description.cell.program import (
     AUTO,
@@ -60,6 +61,7 @@ __all__ = [
     "Station",
     "Task",
     "Zone",
+    "cell_in",
     "check_base_contact",
     "check_contact",
     "check_follows",
@@ -67,7 +69,9 @@ __all__ = [
     "check_posture",
     "check_step",
     "check_switch",
+    "machine_in",
     "shape_register",
     "station_at",
+    "sweep_speeds",
     "zone_around",
 ]

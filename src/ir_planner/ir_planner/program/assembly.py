@@ -87,7 +87,7 @@ def assembled(  # long: what a step does, in its order
         result.extend(moves)
         if step.dwell > 0.0 or (not moves and (handling or waiting)):
             late = not moves
-            scene = scenes.of(placed.after if moves else placed.before)
+            scene = scenes.after(placed) if moves else scenes.before(placed)
             spent = Pause(here, step.dwell, step.power_mode, q, scene)
             standing = charge.stood(pause(spent), spent)
             result.append(

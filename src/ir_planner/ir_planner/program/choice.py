@@ -87,7 +87,7 @@ class Choice:
 
     def _end(self, seconds: float) -> Pause:
         route = self.movements.route
-        end = route.scenes.of(route.steps[-1].after)
+        end = route.scenes.after(route.steps[-1])
         q = self.movements.layers[-1][self.chain.chosen[-1]].interaction
         return Pause(route.name(len(route) - 1), seconds, AUTO, q, end)
 

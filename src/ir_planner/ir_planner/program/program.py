@@ -18,6 +18,7 @@ from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
 from ir_planner.program.choice import Steps
 from ir_planner.program.comparison import held_against_common
+from ir_planner.program.doors import advice
 from ir_planner.program.front import front_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
@@ -27,6 +28,7 @@ from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.request import Context, Journal, Work
 from ir_planner.timing import at_the_mains
 
+_SENTENCES = 4  # of a failure
 _ENDED = "{}; {} ended before all was tried: more of it may help"
 
 
@@ -37,7 +39,8 @@ def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobod
     try:
         answer = _answered(request, route, context, progress)
     except StageError as failed:
-        return ProgramPlan(_with_reason(failed.status, work), _info(request, context))
+        status = _with_reason(_advised(failed.status, route), work)
+        return ProgramPlan(status, _info(request, context))
     # the record of the whole request, savings and front included
     return replace(answer, info=_info(request, context))
 
@@ -77,6 +80,14 @@ def _with_reason(status: Status, work: Work) -> Status:
         return status
     ended = "planning_time" if work.truncated else "max_iterations"
     return replace(status, message=_ENDED.format(status.message, ended))
+
+
+def _advised(status: Status, route: Route) -> Status:
+    """A failure with what is known of doors that were not as the cell has them."""
+    stops = (route.steps[k] for k in route.stops)
+    said = (advice(route.scenes.cell, stop.step.target, stop.doors_before) for stop in stops)
+    sentences = [status.message, *filter(None, said)]
+    return replace(status, message="; ".join(sentences[:_SENTENCES]))
 
 
 def _planned(steps: Steps) -> ProgramPlan:

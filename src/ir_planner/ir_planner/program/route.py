@@ -39,9 +39,10 @@ class Route:
 
     def arriving(self, place: int) -> PlanningScene:
         """The scene in which a stop is reached."""
-        return self.scenes.of(self.at(place).before)
+        return self.scenes.before(self.at(place))
 
     def leaving(self, place: int) -> PlanningScene:
         """The scene in which a stop is left; after the last one, the scene at the end."""
-        last = place + 1 == len(self.stops)
-        return self.scenes.of(self.steps[-1].after if last else self.at(place + 1).before)
+        if place + 1 == len(self.stops):
+            return self.scenes.after(self.steps[-1])
+        return self.scenes.before(self.at(place + 1))

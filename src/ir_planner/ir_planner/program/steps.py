@@ -1,13 +1,14 @@
-"""A program as its planner sees it: every step with what is held and where the parts lie before and after
-it.
+"""A program as its planner sees it: every step with what is held, where the parts lie and how the doors stand
+before and after it.
 """
 
 from dataclasses import dataclass, field
 
-from ir_description import Cell, InvalidValueError, PartPlaces, PowerData, ProgramStep, Signal
+from ir_description import Cell, InvalidValueError, PartPlaces, PowerData, ProgramStep, Signal, cell_in
 from ir_description import UnknownNameError as DescriptionNameError
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.program.doors import Doors, doors_along
 from ir_planner.request import POSTURES
 from ir_planner.scene import Drives, PlanningScene, with_parts
 
@@ -16,28 +17,38 @@ STEPS_MAX = 500
 
 @dataclass(frozen=True)
 class PlacedStep:
-    """A step with the parts before and after it."""
+    """A step with the parts and the doors before and after it."""
 
     step: ProgramStep
     before: PartPlaces
     after: PartPlaces
+    doors_before: Doors = ()
+    doors_after: Doors = ()
 
 
 @dataclass
 class Scenes:
-    """Scenes of one program by where its parts are; each is built once."""
+    """Scenes of one program by where its parts are and how its doors stand; each is built once."""
 
     cell: Cell
     power: PowerData
     drives: Drives = field(default_factory=Drives)
     bare: bool = False
-    _built: dict[tuple[str, tuple[tuple[str, str], ...]], PlanningScene] = field(default_factory=dict)
+    _built: dict[tuple[str, tuple[tuple[str, str], ...], Doors], PlanningScene] = field(default_factory=dict)
 
-    def of(self, places: PartPlaces) -> PlanningScene:
+    def before(self, placed: PlacedStep) -> PlanningScene:
+        """The scene in which a step moves."""
+        return self.of(placed.before, placed.doors_before)
+
+    def after(self, placed: PlacedStep) -> PlanningScene:
+        """The scene when a step has been done."""
+        return self.of(placed.after, placed.doors_after)
+
+    def of(self, places: PartPlaces, doors: Doors = ()) -> PlanningScene:
         """The scene while the parts are at `places`."""
-        key = (places.held, tuple(sorted(places.lying.items())))
+        key = (places.held, tuple(sorted(places.lying.items())), doors)
         if key not in self._built:
-            cell = with_parts(self.cell, places)
+            cell = cell_in(with_parts(self.cell, places), dict(doors))
             loads = () if self.bare else cell.loads(places.held)
             self._built[key] = PlanningScene(cell, loads, self.power, self.drives)
         return self._built[key]
@@ -70,14 +81,14 @@ def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
 def placed_steps(cell: Cell, steps: tuple[ProgramStep, ...], places: PartPlaces) -> tuple[PlacedStep, ...]:
     """The steps with the parts before and after each. Raises RequestError for a step that can't be done."""
     result = []
-    for k, step in enumerate(steps):
+    for k, (step, doors) in enumerate(zip(steps, doors_along(cell, steps), strict=True)):
         try:
             after = places.after(step)
         except (InvalidValueError, DescriptionNameError) as error:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS, f"step {k} of the program: {error}"
             ) from error
-        result.append(PlacedStep(step, places, after))
+        result.append(PlacedStep(step, places, after, *doors))
         places = after
     return tuple(result)
 

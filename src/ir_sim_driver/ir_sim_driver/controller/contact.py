@@ -189,10 +189,11 @@ class ContactWatch:
     def _touched(
         self, scene: ContactScene, z: int, step: int, backend: Backend, dynamics: DynamicsModel
     ) -> Touch:
-        """The first touch: speed along the normal, and the mass of the robot that is behind it."""
+        """The first touch: speed along the normal, with a door's own, and the robot's mass behind it."""
         q, pair = backend.q[None], np.array([z])
         gradient = scene.model.gradients(q, pair)[0]
-        speed = max(0.0, -float(gradient @ backend.qd))
+        own = scene.speeds.get(scene.model.pairs[z].body_b, 0.0)
+        speed = max(0.0, own - float(gradient @ backend.qd))
         weight = float(gradient @ np.linalg.solve(dynamics.mass_matrix(q)[0], gradient))
         impact = speed * math.sqrt(STIFFNESS / weight) if weight > 0.0 else math.inf
         self.due = step + 1

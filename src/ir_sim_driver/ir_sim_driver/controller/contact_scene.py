@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
 import numpy as np
 
-from ir_description import Body, Capsule, Cell, Station
+from ir_description import Body, Capsule, Cell, Station, cell_in, sweep_speeds
 from ir_kernels.chain import Chain
 from ir_kernels.collision import CollisionModel
 from ir_msgs_py.arrays import BoolArray, FloatArray
@@ -23,10 +23,21 @@ ZONE_MARGIN = 0.05  # m around a zone where its contacts are still allowed: beyo
 
 
 class ContactScene:
-    """All pairs of `capsules` and `bodies`, and of capsules among themselves. Never changed."""
+    """All pairs of `capsules` and `bodies`, and of capsules among themselves. Never changed.
 
-    def __init__(self, cell: Cell, chain: Chain, load: Carried, bodies: Iterable[Body]) -> None:
+    speeds: bounds [m/s] of bodies that move by themselves, by name.
+    """
+
+    def __init__(
+        self,
+        cell: Cell,
+        chain: Chain,
+        load: Carried,
+        bodies: Iterable[Body],
+        speeds: Mapping[str, float] | None = None,
+    ) -> None:
         self.cell, self.chain, bodies = cell, chain, tuple(bodies)
+        self.speeds = speeds or {}
         self.capsules: tuple[Capsule, ...] = (
             *cell.robot.capsules,
             *(capsule for each in load.loads for capsule in each.capsules),
@@ -49,8 +60,15 @@ class ContactScene:
     def of(cls, cell: Cell, chain: Chain, load: Carried, machines: Machines, parts: Parts) -> ContactScene:
         """The scene of the cell as its machines and parts are now."""
         floor = tuple(body for body in cell.bodies() if body.name == "floor") if cell.floor else ()
-        around = (body for each in cell.equipment for body in each.bodies_in(*machines.present(each)))
-        return cls(cell, chain, load, (*floor, *around, *parts.bodies()))
+        states = machines.present_states()
+        around = (body for each in cell_in(cell, states).equipment for body in each.world_bodies())
+        speeds = {
+            name: speed
+            for machine in cell.equipment
+            if len(states[machine.name]) == 2
+            for name, speed in sweep_speeds(machine, *states[machine.name]).items()
+        }
+        return cls(cell, chain, load, (*floor, *around, *parts.bodies()), speeds)
 
     @cached_property
     def groups(self) -> tuple[tuple[BoolArray, FloatArray], ...]:

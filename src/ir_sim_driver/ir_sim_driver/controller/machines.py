@@ -1,7 +1,7 @@
 """The states of the cell's machines, as signals switch them; a change takes its time.
 
 A machine with a switch is in the state that its cell says until its signal is heard for the first time. While
-it changes it is in both states: their bodies are all there.
+it changes it is in both states: their bodies are all there, with what they sweep.
 """
 
 from __future__ import annotations
@@ -73,6 +73,10 @@ class Machines:
         """The states whose bodies are there."""
         ahead = self._moving.get(machine.name)
         return (self._states[machine.name], *(() if ahead is None else ahead[:1]))
+
+    def present_states(self) -> dict[str, tuple[str, ...]]:
+        """The same of all machines, by name."""
+        return {machine.name: self.present(machine) for machine in self.cell.equipment}
 
     def states(self, now: float) -> tuple[MachineState, ...]:
         """What every machine is in, and changes to."""

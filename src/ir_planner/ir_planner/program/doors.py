@@ -1,0 +1,75 @@
+"""Which states the machines with a switch are in along a program, as its own signals move them.
+
+They begin as the cell has them. A machine whose signal is set changes from then on, until a step waits for
+the signal that follows, or dwells as long as the change takes: meanwhile it is in both states, and what
+sweeps between them is there too. Movements are planned among what may be there.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from ir_description import Cell, Equipment, ProgramStep
+
+Doors = tuple[tuple[str, tuple[str, ...]], ...]
+"""Machines that are not as the cell has them, with their state, or the two between which they change."""
+
+
+def doors_along(cell: Cell, steps: Sequence[ProgramStep]) -> Iterator[tuple[Doors, Doors]]:
+    """Before each step moves, and after it."""
+    states: dict[str, tuple[str, ...]] = {machine.name: (machine.state,) for machine in _switched(cell)}
+    for step in steps:
+        for machine in _switched(cell):
+            states[machine.name] = _awaited(cell, machine, step, states[machine.name])
+        before = _unlike(cell, states)
+        for machine in _switched(cell):
+            states[machine.name] = _set(machine, step, states[machine.name])
+        yield before, _unlike(cell, states)
+
+
+def advice(cell: Cell, target: str, doors: Doors) -> str:
+    """What a movement to `target` that was not found may want, "" where all is as the cell has it."""
+    return "; ".join(_advice(cell, cell.machine(name), target, states) for name, states in doors)
+
+
+def _switched(cell: Cell) -> list[Equipment]:
+    return [machine for machine in cell.equipment if machine.switch is not None and machine.enabled]
+
+
+def _answers(cell: Cell, machine: Equipment) -> list[str]:
+    """Signals that say where the machine is: they follow its switch, no sooner than it is there."""
+    assert machine.switch is not None
+    signal, time = machine.switch.signal, machine.switch.time
+    own = [signal] if time == 0.0 else []
+    return [*own, *(each.name for each in cell.signals if each.follows == signal and each.delay >= time)]
+
+
+def _awaited(cell: Cell, machine: Equipment, step: ProgramStep, states: tuple[str, ...]) -> tuple[str, ...]:
+    assert machine.switch is not None
+    for signal in step.wait_for:
+        if signal.name in _answers(cell, machine):
+            states = (machine.switch.on if signal.value else machine.switch.off,)
+    return states
+
+
+def _set(machine: Equipment, step: ProgramStep, states: tuple[str, ...]) -> tuple[str, ...]:
+    switch = machine.switch
+    assert switch is not None
+    for signal in step.set_signals:
+        target = switch.on if signal.value else switch.off
+        if signal.name == switch.signal and states[-1] != target:
+            states = (states[-1], target)
+    return states[-1:] if step.dwell >= switch.time else states
+
+
+def _unlike(cell: Cell, states: Mapping[str, tuple[str, ...]]) -> Doors:
+    return tuple((name, now) for name, now in states.items() if now != (cell.machine(name).state,))
+
+
+def _advice(cell: Cell, machine: Equipment, target: str, states: tuple[str, ...]) -> str:
+    switch = machine.switch
+    assert switch is not None
+    there = f"on the way to {target} {machine.name}"
+    if len(states) == 1:
+        return f"{there} is {states[0]}, as signal {switch.signal} has it"
+    level = "" if states[1] == switch.on else "=0"
+    wait = "".join(f"wait for signal {name}{level}, or " for name in _answers(cell, machine)[:1])
+    return f"{there} changes from {states[0]} to {states[1]}: {wait}dwell {switch.time:g} s before"

@@ -1,0 +1,92 @@
+"""Doors along a program: the planner counts on no state that the driver's machines might not be in."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ir_description import ProgramStep, Signal, load_cell, load_power_data
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.status import StatusCode
+from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.doors import doors_along
+from ir_planner.request import Work
+from ir_sim_driver.controller.machines import Machines
+
+DEMO = load_cell("demo")
+OPEN, IS_OPEN = "lathe_open_door", "lathe_door_open"
+
+steps = st.builds(
+    ProgramStep,
+    kind=st.just("POSTURE"),
+    target=st.sampled_from(["home", "park"]),
+    dwell=st.sampled_from([0.0, 1.0, 1.5, 4.0]),
+    wait_for=st.lists(st.builds(Signal, st.just(IS_OPEN), st.booleans()), max_size=1).map(tuple),
+    set_signals=st.lists(st.builds(Signal, st.just(OPEN), st.booleans()), max_size=2).map(tuple),
+)
+
+
+@given(st.lists(steps, max_size=8), st.lists(st.floats(0.0, 3.0), min_size=8, max_size=8), st.booleans())
+@settings(deadline=None)
+def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_take(program, seconds, shut):
+    state = "door_closed" if shut else "door_open"
+    cell = DEMO.with_equipment("lathe", state=state)
+    machines, lathe, now = Machines(cell), cell.machine("lathe"), 0.0
+    delay = next(signal.delay for signal in cell.signals if signal.name == IS_OPEN)
+    due: tuple[float, bool] = (-1.0, not shut)  # when the answer comes, and which
+    for step, (before, after), moving in zip(program, doors_along(cell, program), seconds, strict=False):
+        for signal in step.wait_for:
+            if signal.value != due[1]:
+                return  # it waits forever
+            now = max(now, due[0])
+        machines.step(now)
+        for doors, wait in ((before, moving), (after, step.dwell)):
+            planned = dict(doors).get("lathe", (state,))
+            if doors is after:
+                for signal in step.set_signals:
+                    machines.hear(OPEN, signal.value, now)
+                    due = (now + delay, signal.value)
+                now += wait
+                machines.step(now)
+                assert set(machines.present(lathe)) <= set(planned)
+            else:
+                assert set(machines.present(lathe)) <= set(planned)
+                now += wait
+                machines.step(now)
+
+
+def planned(*program: ProgramStep) -> ProgramPlan:
+    cell = replace(DEMO.with_equipment("lathe", state="door_closed"), program=program)
+    request = ProgramRequest(cell, load_power_data(), (), np.array(cell.machine_home), PlanOptions())
+    return plan_program(request, Work(100_000, time.monotonic() + 120.0, time.monotonic))
+
+
+OPENED = ProgramStep("POSTURE", "home", set_signals=(Signal(OPEN, True),))
+HOME = ProgramStep("POSTURE", "home")
+
+
+def test_a_movement_through_a_door_that_may_be_closed_is_refused_with_the_signal_to_wait_for():
+    plan = planned(OPENED, ProgramStep("STATION", "lathe_work"), HOME)
+    assert plan.status.code in (StatusCode.GOAL_IN_COLLISION, StatusCode.PLANNING_FAILED)
+    assert f"lathe changes from door_closed to door_open: wait for signal {IS_OPEN}" in plan.status.message
+
+
+@pytest.mark.parametrize("wait", [Signal(IS_OPEN, True), None])
+def test_a_door_that_was_waited_for_is_relied_upon(wait):
+    opened = OPENED if wait else replace(OPENED, dwell=1.5)
+    there = ProgramStep("STATION", "lathe_work", wait_for=(wait,) if wait else ())
+    plan = planned(opened, there, HOME)
+    assert plan.status.ok, plan.status.message
+    assert any(movement.states == ("lathe=door_open",) for movement in plan.movements)
+
+
+def test_a_door_that_closes_on_the_robot_is_refused():
+    closing = ProgramStep("STATION", "lathe_work", set_signals=(Signal(OPEN, False),))
+    plan = planned(replace(OPENED, dwell=1.5), closing, HOME)
+    assert not plan.status.ok
+    assert "lathe changes from door_open to door_closed" in plan.status.message
