@@ -103,7 +103,10 @@ def test_envelope_and_friction_are_those_of_the_kernels(cell, make):
     gears = Gears(nominal_plant(cell.robot, load_power_data()).gears, 0.001)
     dry = gears.dry([0.0] * 6, [0.0] * 6)
     mine = np.array(
-        [gears.friction(b.tolist(), dry)[0] - drives.counterbalance(a) for a, b in zip(q, qd, strict=True)]
+        [
+            np.subtract(gears.friction(b.tolist(), dry)[0], drives.counterbalance(a.tolist()))
+            for a, b in zip(q, qd, strict=True)
+        ]
     )
     assert np.allclose(mine[fast], resistance[fast], atol=1e-6)
 

@@ -157,9 +157,9 @@ def test_gears_warm_up_by_their_friction_and_turn_more_easily(cell, data):
     for _ in range(3600):
         friction, _ = gears.friction(speed.tolist(), dry)
         gears.heat(friction, speed)
-        heat += friction * speed
+        heat += np.array(friction) * speed
     warm, _ = gears.friction(speed.tolist(), dry)
     assert (gears.temperature > before + 1.0).all()
-    assert (warm < cold).all()
+    assert np.less(warm, cold).all()
     figures = typical_plant(cell.robot, data, 0).gears
     assert (gears.temperature - before < heat / figures.capacity).all()  # some of it has gone

@@ -67,7 +67,7 @@ def _unlike(cell: Cell, states: Mapping[str, tuple[str, ...]]) -> Doors:
 def _advice(cell: Cell, machine: Equipment, target: str, states: tuple[str, ...]) -> str:
     switch = machine.switch
     assert switch is not None
-    there = f"on the way to {target} {machine.name}"
+    there = f"when {target} is next, {machine.name}"
     if len(states) == 1:
         return f"{there} is {states[0]}, as signal {switch.signal} has it"
     level = "" if states[1] == switch.on else "=0"

@@ -15,7 +15,8 @@ from ir_sim_driver.plant.bullet_bodies import bodies_of, urdf_of
 
 GRAVITY = 9.80665
 SPEED_GUARD = 50.0
-"""Speed [rad/s] that no joint reaches: beyond it the physics has diverged."""
+"""Speed [rad/s] that all joints together do not reach: beyond it the physics has diverged."""
+_GUARD = SPEED_GUARD * SPEED_GUARD
 
 
 class BulletArm:
@@ -51,12 +52,14 @@ class BulletArm:
 
     def mass_matrix(self, q: Sequence[float]) -> FloatArray:
         """H (n, n) at q, without rotor inertia."""
-        H = self._call(self._bullet.calculateMassMatrix, self._body, q)
-        return np.array(H, dtype=np.float64)
+        return np.array(self._call(self._bullet.calculateMassMatrix, self._body, q))
 
-    def inverse_dynamics(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> FloatArray:
+    def inverse_dynamics(
+        self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]
+    ) -> tuple[float, ...]:
         """Torque H qdd + h (n,) on the links."""
-        return np.array(self._call(self._bullet.calculateInverseDynamics, self._body, q, qd, qdd))
+        torque: tuple[float, ...] = self._call(self._bullet.calculateInverseDynamics, self._body, q, qd, qdd)
+        return torque
 
     def link_com_position(self, link: int) -> FloatArray:
         """Centre of mass (3,) of link 1..n in the world [m], the last one's with its loads.
@@ -74,22 +77,21 @@ class BulletArm:
         for joint, position, speed in zip(self._joints, q, qd, strict=True):
             self._call(self._bullet.resetJointState, self._body, joint, position, speed)
 
-    def advance(self, torque: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    def advance(self, torque: Sequence[float]) -> tuple[list[float], list[float]]:
         """Make a step with these torques on the links: position (n,), and speed (n,) over the step."""
-        bullet, call = self._bullet, self._call
-        call(
-            bullet.setJointMotorControlArray,
-            self._body,
-            self._joints,
-            bullet.TORQUE_CONTROL,
-            forces=torque,
-        )
-        call(bullet.stepSimulation)
-        states = call(bullet.getJointStates, self._body, self._joints)
+        states = self._call(self._step, torque)
         speeds = [state[1] for state in states]
-        if not all(-SPEED_GUARD < x < SPEED_GUARD for x in speeds):  # NaN does not pass either
-            raise BackendError(f"the physics has diverged: a joint moves faster than {SPEED_GUARD:g} rad/s")
-        return np.array([state[0] for state in states]), np.array(speeds)
+        if not sum([v * v for v in speeds]) < _GUARD:  # NaN does not pass either
+            raise BackendError(f"the physics has diverged: joints move faster than {SPEED_GUARD:g} rad/s")
+        return [state[0] for state in states], speeds
+
+    def _step(self, torque: Sequence[float], physicsClientId: int) -> Any:  # as in PyBullet
+        bullet, body, joints, client = self._bullet, self._body, self._joints, physicsClientId
+        bullet.setJointMotorControlArray(
+            body, joints, bullet.TORQUE_CONTROL, forces=torque, physicsClientId=client
+        )
+        bullet.stepSimulation(physicsClientId=client)
+        return bullet.getJointStates(body, joints, physicsClientId=client)
 
     def _build(self, text: str) -> None:
         """Make a new server: the inverse dynamics of a removed body live on in the old one. Where that is not

@@ -12,6 +12,7 @@ torques.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,7 @@ from ir_sim_driver.plant.drivetrain import Drivetrain
 from ir_sim_driver.plant.gears import SMOOTHING
 
 _TURN = 2.0 * np.pi
+_STEEP = 1.0 / SMOOTHING
 
 
 @dataclass(frozen=True)
@@ -78,10 +80,11 @@ class ServoControl:
         self._dt, self._per_dt = dt, 1.0 / dt
         self._kp, self._kv, self._per_ti = s.position_gain, s.speed_gain, 1.0 / s.integral_time
         self._share = dt / (s.speed_filter + dt)
-        self._count: FloatArray = _TURN / s.encoder_counts / np.array(robot.gear_ratio)
+        self._count: list[float] = (_TURN / s.encoder_counts / np.array(robot.gear_ratio)).tolist()
         none = np.zeros(len(robot.joint_names))
         self._bare = replace(robot, friction_viscous=none, friction_coulomb=none)
-        self._viscous, self._coulomb = np.array(robot.friction_viscous), np.array(robot.friction_coulomb)
+        self._viscous: list[float] = np.array(robot.friction_viscous).tolist()
+        self._coulomb: list[float] = np.array(robot.friction_coulomb).tolist()
         self._base_pose, self._drives = base_pose, Drivetrain(robot)
         self.declare(())
 
@@ -92,32 +95,41 @@ class ServoControl:
     def reset(self, q: FloatArray) -> None:
         """Start over with a command that stands at q."""
         self.command: FloatArray = q.copy()
-        self._seen = self._measured(q)
-        self._speed: FloatArray = np.zeros(len(q))
-        self._integral: FloatArray = np.zeros(len(q))
-        self._slow: FloatArray = np.zeros(len(q))
+        self._wanted = q.tolist()
+        self._seen = self._measured(self._wanted)
+        still = [0.0] * len(q)
+        self._speed, self._integral, self._slow = still, still, still
 
     def torque(self, q_next: FloatArray, q: FloatArray) -> tuple[FloatArray, bool]:
         """Torque (n,) for the step that ends with the command q_next, the robot being at q now, and whether
         the envelope has cut it.
         """
-        seen, dt = self._measured(q), self._dt
-        measured = (seen - self._seen) * self._per_dt  # half a step old, as the commanded speed is
-        speed = (q_next - self.command) * self._per_dt
-        change = (speed - self._speed) * self._per_dt
-        self._slow = self._slow + self._share * (self._speed - measured - self._slow)
-        wrong = self._slow + self._kp * (self.command - seen)
-        u = self._kv * (wrong + self._per_ti * self._integral)
-        now = self._speed + (0.5 * dt) * change
-        wanted = self._model.inverse_dynamics(self.command[None], now[None], (change + u)[None])[0]
-        wanted += self._viscous * now + self._coulomb * np.tanh(now * (1.0 / SMOOTHING))
+        # plain floats, joint by joint: half the time of arrays this small
+        seen, goal, per_dt, half = self._measured(q.tolist()), q_next.tolist(), self._per_dt, 0.5 * self._dt
+        rows = zip(seen, self._seen, goal, self._wanted, self._speed, self._slow, self._integral, strict=True)
+        measured, speeds, slow, errors, now, change = [], [], [], [], [], []
+        for x, x_before, c_next, c, v, e_slow, integral in rows:
+            moves = (x - x_before) * per_dt  # half a step old, as the commanded speed is
+            speed = (c_next - c) * per_dt
+            faster = (speed - v) * per_dt
+            lag = e_slow + self._share * (v - moves - e_slow)
+            wrong = lag + self._kp * (c - x)
+            measured.append(moves)
+            speeds.append(speed)
+            slow.append(lag)
+            errors.append(wrong)
+            now.append(v + half * faster)
+            change.append(faster + self._kv * (wrong + self._per_ti * integral))
+        model = self._model.inverse_dynamics(self.command[None], np.array((now,)), np.array((change,)))[0]
+        friction = zip(model.tolist(), self._viscous, self._coulomb, now, strict=True)
+        wanted = [t + viscous * v + dry * math.tanh(v * _STEEP) for t, viscous, dry, v in friction]
         torque, cut = self._drives.limited(wanted, measured)
         if not cut:  # else the integral would wind up
-            self._integral += dt * wrong
-        self._seen, self.command, self._speed = seen, q_next, speed
+            self._integral = [i + self._dt * e for i, e in zip(self._integral, errors, strict=True)]
+        self._seen, self._speed, self._slow = seen, speeds, slow
+        self.command, self._wanted = q_next, goal
         return torque, cut
 
-    def _measured(self, q: FloatArray) -> FloatArray:
+    def _measured(self, q: Sequence[float]) -> list[float]:
         """What the encoders say (n,) [rad]."""
-        seen: FloatArray = np.rint(q / self._count) * self._count
-        return seen
+        return [round(x / count) * count for x, count in zip(q, self._count, strict=True)]

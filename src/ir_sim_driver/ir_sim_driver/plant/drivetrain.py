@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -44,13 +45,13 @@ class Drivetrain:
         )
         self._speeds: list[list[float]] = np.array(robot.envelope_speed).tolist()
         self._torques: list[list[float]] = np.array(robot.envelope_torque).tolist()
-        self._least: FloatArray = np.array(robot.envelope_torque)[:, -1]
+        self._least: list[float] = np.array(robot.envelope_torque)[:, -1].tolist()
 
-    def counterbalance(self, q: FloatArray) -> FloatArray:
+    def counterbalance(self, q: Sequence[float]) -> list[float]:
         """What the counterbalance does about the positive axes (n,) [Nm]."""
-        torque: FloatArray = np.zeros(len(q))
+        torque = [0.0] * len(q)
         if self._gas_spring is not None:
-            torque[self._gas_joint] = self.counterbalance_torque(float(q[self._gas_joint]))
+            torque[self._gas_joint] = self.counterbalance_torque(q[self._gas_joint])
         return torque
 
     def counterbalance_torque(self, angle: float) -> float:
@@ -65,20 +66,15 @@ class Drivetrain:
         force: float = area * pressure * (gas_volume / volume) ** exponent
         return force * (pz * (bx - px) - px * (bz - pz)) / length
 
-    def limited(self, torque: FloatArray, qd: FloatArray) -> tuple[FloatArray, bool]:
+    def limited(self, torque: Sequence[float], qd: Sequence[float]) -> tuple[FloatArray, bool]:
         """Torque (n,) within the envelope at the speeds qd, and whether anything was cut off."""
-        size = np.abs(torque)
-        critical = (size > self._least).nonzero()[0].tolist()
-        if not critical:
-            return torque, False
-        result = torque
-        for j in critical:
-            limit = self._limit_of(j, abs(float(qd[j])))
-            if size[j] > limit:
-                if result is torque:
-                    result = torque.copy()
-                result[j] = limit if torque[j] > 0.0 else -limit
-        return result, result is not torque
+        result, cut = np.array(torque), False
+        for j, (t, least) in enumerate(zip(torque, self._least, strict=True)):
+            if abs(t) > least:
+                limit = self._limit_of(j, abs(qd[j]))
+                if abs(t) > limit:
+                    result[j], cut = math.copysign(limit, t), True
+        return result, cut
 
     def limit(self, qd: FloatArray) -> FloatArray:
         """Torque (n,) [Nm] available at the speeds |qd|."""

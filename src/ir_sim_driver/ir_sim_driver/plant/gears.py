@@ -37,7 +37,7 @@ class Gears:
         self._dry: list[list[float]] = np.array(dry).T.tolist()
         self._coulomb: list[float] = f.coulomb.tolist()
         self.temperature: FloatArray = np.array(f.start)
-        self._heat: FloatArray = np.zeros(len(self.temperature))  # J since the last look
+        self._heat = [0.0] * len(self.temperature)  # J since the last look, over dt
         self._steps = 0
         self._warm()
 
@@ -52,7 +52,7 @@ class Gears:
 
     def friction(
         self, speed: Sequence[float], dry: Sequence[float], chord: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[list[float], list[float]]:
         """Torque (n,) [Nm] against the motion, and its derivative by speed; or, where `chord`, the slope of
         its chord through rest, with which every step of an iteration comes nearer.
         """
@@ -62,11 +62,11 @@ class Gears:
             torque.append(viscous * v + most * tanh)
             chordal = chord and v != 0.0
             slope.append(viscous + most * (tanh / v if chordal else _STEEP * (1.0 - tanh * tanh)))
-        return np.array(torque), np.array(slope)
+        return torque, slope
 
-    def heat(self, friction: FloatArray, speed: FloatArray) -> None:
+    def heat(self, friction: Sequence[float], speed: Sequence[float]) -> None:
         """Count one step in which the friction (n,) [Nm] took place at this speed."""
-        self._heat += friction * speed
+        self._heat = [heat + f * v for heat, f, v in zip(self._heat, friction, speed, strict=True)]
         self.cool()
 
     def cool(self) -> None:
@@ -79,7 +79,7 @@ class Gears:
         """Bring temperature and viscous friction up to the present step."""
         f = self._figures
         lost = f.conductance * (self.temperature - f.ambient) * self._steps
-        self.temperature = self.temperature + self._dt * (self._heat - lost) / f.capacity
-        self._heat, self._steps = np.zeros(len(self.temperature)), 0
+        self.temperature = self.temperature + self._dt * (np.array(self._heat) - lost) / f.capacity
+        self._heat, self._steps = [0.0] * len(self.temperature), 0
         falling = np.exp(f.viscous_per_kelvin * (REFERENCE_TEMPERATURE - self.temperature))
         self._viscous: list[float] = (f.viscous * falling).tolist()

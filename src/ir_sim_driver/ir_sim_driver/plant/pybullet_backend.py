@@ -57,7 +57,8 @@ class PyBulletBackend:
         self.q: FloatArray = np.array(plant.robot.machine_home, dtype=np.float64)
         self.qd = self._still
         self._speed: FloatArray = self._still  # of Bullet, half a step old
-        self._load: FloatArray = self._still  # through the gears to the links in the last step
+        self._rest = [0.0] * self._n
+        self._load = self._rest  # through the gears to the links in the last step
         self._speeds: list[FloatArray] = []
         self._torques: list[FloatArray] = []
         self._stale = False  # whether Bullet's state is older than ours
@@ -121,13 +122,14 @@ class PyBulletBackend:
         H, h = self.mass_matrix(), self._bias(self._speed)
         stopping = self._speed * (-1.0 / self._dt)
         links = H @ stopping + h
-        wanted = links + self._drives.rotor_inertia * stopping - self._drives.counterbalance(self.q)
+        balance = np.array(self._drives.counterbalance(self.q.tolist()))
+        wanted = links + self._drives.rotor_inertia * stopping - balance
         torque: FloatArray = np.clip(wanted, -most, most)
         self.torque, self.saturated = torque if motors else self._still, False
         if (torque != wanted).any() or self.disturbance is not None:
             self._drive(torque)
         else:
-            self._advance(links)
+            self._advance(links.tolist())
         self._servo.reset(self.q)
 
     def rest(self) -> None:
@@ -164,44 +166,48 @@ class PyBulletBackend:
     def required_torque(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         """Motor torque (n,) [Nm] at the joint for this motion, by the equations that are stepped."""
         links = self._arm.inverse_dynamics(q.tolist(), qd.tolist(), qdd.tolist())
-        through = links - self._drives.counterbalance(q)
+        through = np.array(links) - self._drives.counterbalance(q.tolist())
         speed = qd.tolist()
         friction, _ = self._gears.friction(speed, self._gears.dry(speed, through.tolist()))
         torque: FloatArray = through + self._drives.rotor_inertia * qdd + friction
         return torque
 
     def _bias(self, qd: FloatArray) -> FloatArray:
-        return self._arm.inverse_dynamics(self.q.tolist(), qd.tolist(), self._still.tolist())
+        return np.array(self._arm.inverse_dynamics(self.q.tolist(), qd.tolist(), self._rest))
 
     def _drive(self, torque: FloatArray) -> None:
         """Make a step under this motor torque and the disturbance."""
-        gears, half, lagging = self._gears, 0.5 * self._dt, self._speed
-        speed = self.qd  # the state's speed lags half a step: qd is the speed at its position
-        inertia, balance = self.mass_matrix(), self._drives.counterbalance(self.q)
-        inertia.flat[self._diagonal] += self._drives.rotor_inertia
-        outer = torque - self._bias(speed) + balance
+        gears, half = self._gears, 0.5 * self._dt
+        q, speed, lagging = self.q.tolist(), self.qd.tolist(), self._speed.tolist()
+        inertia, balance = self._arm.mass_matrix(q), self._drives.counterbalance(q)
+        inertia.ravel()[self._diagonal] += self._drives.rotor_inertia
+        bias = self._arm.inverse_dynamics(q, speed, self._rest)
+        outer = [t - h + c for t, h, c in zip(torque.tolist(), bias, balance, strict=True)]
         if self.disturbance is not None:
-            outer = outer + self.disturbance
-        dry = gears.dry(speed.tolist(), self._load.tolist())
-        friction, slope = gears.friction(speed.tolist(), dry)
-        for k in range(_ITERATIONS):
+            outer = [t + d for t, d in zip(outer, self.disturbance.tolist(), strict=True)]
+        dry = gears.dry(speed, self._load)
+        friction, slope = gears.friction(speed, dry)
+        for k in range(_ITERATIONS):  # the state's speed lags half a step: qd is the speed at its position
             stiff = inertia.copy()
-            stiff.flat[self._diagonal] += half * slope
-            qdd = dposv(stiff, outer - friction + slope * (speed - lagging))[1]
-            change = lagging + half * qdd - speed
-            speed, expected = speed + change, friction + slope * change
-            friction, slope = gears.friction(speed.tolist(), dry, chord=k >= _NEWTON)
-            if np.abs(friction - expected).max() < _FRICTION:
+            stiff.ravel()[self._diagonal] += [half * s for s in slope]
+            rest = zip(outer, friction, slope, speed, lagging, strict=True)
+            qdd = dposv(stiff, [t - f + s * (v - w) for t, f, s, v, w in rest])[1].tolist()
+            before, speed = speed, [w + half * a for w, a in zip(lagging, qdd, strict=True)]
+            linear = zip(friction, slope, speed, before, strict=True)
+            expected = [f + s * (v - u) for f, s, v, u in linear]
+            friction, slope = gears.friction(speed, dry, chord=k >= _NEWTON)
+            if all(abs(f - e) < _FRICTION for f, e in zip(friction, expected, strict=True)):
                 break
         gears.heat(friction, speed)
-        links = self._arm.inverse_dynamics(self.q.tolist(), lagging.tolist(), qdd.tolist())
-        self._load = links - balance
+        links = self._arm.inverse_dynamics(q, lagging, qdd)
+        self._load = [t - c for t, c in zip(links, balance, strict=True)]
         self._advance(links)
 
-    def _advance(self, links: FloatArray) -> None:
+    def _advance(self, links: Sequence[float]) -> None:
         """Make a step with these torques (n,) on the links."""
         before = self._speed
-        self.q, self._speed = self._arm.advance(links.tolist())
+        q, speed = self._arm.advance(links)
+        self.q, self._speed = np.array(q), np.array(speed)
         half = 0.5 * (self._speed - before)
         self.qd = self._speed + half
         self._speeds.append(before + half)
