@@ -16,6 +16,7 @@ OPTIONS = {"--cell", "--seeds", "--quick", "--json"}
 OTHERS = {
     "compare": {"--before", "--after", "--quick", "--json"},  # its requests name cells and seeds
     "soak": {"--minutes", "--quick", "--json"},  # one cell for an hour
+    "recording": {"--seconds", "--minutes", "--kills", "--demo", "--quick", "--json"},
     "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
 }
 

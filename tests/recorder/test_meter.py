@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from ir_msgs_py.modes import Mode
-from ir_recorder import read_recording
+from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.meter import Meter
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
@@ -23,3 +24,18 @@ def test_the_meter_integrates_a_constant_power_exactly(new_run: Callable[[], Any
     assert meter.energy(0.2, 0.7) == pytest.approx(205.0 * 0.5)
     assert meter.base(0.2, 0.7) == pytest.approx(205.0 * 0.5)
     assert meter.peak(0.2, 0.7) == pytest.approx(205.0)
+
+
+def test_the_rectifiers_loss_is_counted_and_the_capacitors_by_the_plants_own_mains(demo_file: Path) -> None:
+    """A plant of 540 V holds nothing at 540 V, and what it holds at 560 V is no error of the movement."""
+    recording = read_recording(demo_file)
+    power = replace(recording.power, rectifier_loss=np.full(len(recording.power.time), 20.0))
+    plant = "dc_link: {capacitance_f: 0.002, mains_v: 540.0, chopper_on_v: 688.0, chopper_off_v: 680.0}"
+    volts = replace(power, bus_voltage=np.full(len(power.time), 560.0))
+    result = analyse(replace(recording, power=volts, plant_yaml=plant)).steps[0]
+    assert result.rectifier_energy == pytest.approx(20.0 * result.seconds, rel=0.02)
+    assert result.stored_energy == pytest.approx(0.5 * 0.002 * (560.0**2 - 540.0**2))
+    assert analyse(replace(recording, power=volts)).steps[0].stored_energy == 0.0
+    damaged = analyse(replace(recording, power=volts, power_yaml="nonsense", plant_yaml="dc_link: 3"))
+    assert damaged.steps[0].stored_energy == 0.0
+    assert any("power.yaml can't be read" in problem for problem in damaged.problems)

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, data_sheet, load_power_data
+from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, data_sheet
+from ir_description.robot import DcLink
 from ir_kernels import KernelError
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES
@@ -19,6 +20,7 @@ from ir_recorder.analysis.indirect import IndirectMeter
 from ir_recorder.analysis.loads import carried, load_timeline
 from ir_recorder.analysis.meter import Meter
 from ir_recorder.analysis.plateaus import plateaus
+from ir_recorder.analysis.power_data import recorded_link, recorded_power_data
 from ir_recorder.analysis.resting import MOTORS, resting_watts
 from ir_recorder.analysis.results import NAN, Analysis, StepResult, Unshortened
 from ir_recorder.analysis.shares import mode_shares, station_uses
@@ -37,7 +39,13 @@ def analyse(recording: Recording) -> Analysis:
 class _Analyser:
     recording: Recording
     problems: list[str] = field(default_factory=list)
-    data: PowerData = field(default_factory=load_power_data)
+    data: PowerData = field(init=False)
+    link: DcLink = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.data, problem = recorded_power_data(self.recording)
+        self.problems += [problem] if problem else []
+        self.link = recorded_link(self.recording, self.data)
 
     def analysis(self) -> Analysis:
         recording = self.recording
@@ -141,11 +149,12 @@ class _Analyser:
             joint_energy=meter.joints(start, end) if meter else np.full(len(JOINT_NAMES), NAN),
             base_energy=meter.base(start, end) if meter else NAN,
             dissipated_energy=meter.dissipated(start, end) if meter else NAN,
+            rectifier_energy=meter.rectifier(start, end) if meter else NAN,
             peak_power=meter.peak(start, end) if meter else NAN,
             indirect_energy=indirect.energy(start, end, loads) if indirect and moved else NAN,
             second_opinion=indirect.second_opinion(start, end, loads) if indirect and moved else NAN,
             torque_energy=indirect.from_torques(start, end, loads) if indirect and moved else NAN,
-            stored_energy=meter.stored(start, self.data.dc_link) if meter else NAN,
+            stored_energy=meter.stored(start, self.link) if meter else NAN,
             motors_power=self._resting(MOTORS, step, cell),
             tool_deviation=self._deviation(step),
             clearance=clearance,

@@ -24,6 +24,7 @@ class Meter:
         self._energy = power.energy - power.energy[:1]
         self._joints = np.cumsum(np.nan_to_num(power.joint_power) * step[:, None], axis=0)
         self._base = np.cumsum(np.nan_to_num(power.base_power) * step)
+        self._rectifier = np.cumsum(np.nan_to_num(power.rectifier_loss) * step)
         self._dissipated = np.cumsum(np.nan_to_num(power.burnt_power) * step)
 
     def energy(self, start: float, end: float) -> float:
@@ -37,6 +38,10 @@ class Meter:
     def dissipated(self, start: float, end: float) -> float:
         """J dissipated in the brake resistor."""
         return self._between(self._dissipated, start, end)
+
+    def rectifier(self, start: float, end: float) -> float:
+        """J lost in the rectifier."""
+        return self._between(self._rectifier, start, end)
 
     def joints(self, start: float, end: float) -> FloatArray:
         """J per joint (n,) at the DC bus, signed."""

@@ -22,7 +22,8 @@ NAN = float("nan")
 class StepResult:
     """A step with what it took, measured at the mains meter.
 
-    energy, base_energy, dissipated_energy [J]; joint_energy (n,) [J] at the DC bus; peak_power [W];
+    energy, base_energy, dissipated_energy, rectifier_energy [J]; joint_energy (n,) [J] at the DC bus;
+    peak_power [W];
     indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and torque;
     second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
     stored_energy [J]: in the capacitors at the
@@ -35,6 +36,7 @@ class StepResult:
     joint_energy: FloatArray
     base_energy: float
     dissipated_energy: float
+    rectifier_energy: float
     peak_power: float
     indirect_energy: float
     torque_energy: float

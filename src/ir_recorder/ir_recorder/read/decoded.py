@@ -98,3 +98,12 @@ def _pair_from(message: Any) -> DistancePair:
 
 def _point(point: Any) -> FloatArray:
     return np.array([point.x, point.y, point.z], dtype=np.float64)
+
+
+def contact_sentence(contact: Any) -> str:
+    """A recorded Contact, for people."""
+    pair = contact.pair
+    return (
+        f"contact: {pair.body_a} touched {pair.body_b} at {contact.speed:.2f} m/s, "
+        f"{contact.depth * 1e3:.1f} mm deep, about {contact.force:.0f} N (simulated)"
+    )

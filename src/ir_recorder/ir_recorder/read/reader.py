@@ -25,7 +25,7 @@ from ir_recorder.format.definition import definitions_of
 from ir_recorder.read.cdr import Columns
 from ir_recorder.read.cells import chosen_namespace
 from ir_recorder.read.chunks import ReadLimits
-from ir_recorder.read.decoded import movement_from, savings_from
+from ir_recorder.read.decoded import contact_sentence, movement_from, savings_from
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
     BitSeries,
@@ -98,7 +98,9 @@ class _Reader:
             savings=tuple(self._savings()),
             hardware=self._hardware(),
             cell_yaml=self._attached(contents.CELL),
-            urdf=self._attached(contents.URDF) or self._description(),
+            urdf=self._attached(contents.URDF) or self._text(names.ROBOT_DESCRIPTION),
+            power_yaml=self._attached(contents.POWER),
+            plant_yaml=self._text(names.PLANT),
             facts=raw.facts,
             problems=tuple(self._problems),
         )
@@ -221,7 +223,7 @@ class _Reader:
             if message.level >= _WARN and owns_logger(self._namespace, message.name):
                 yield TextEvent(time, message.name, message.msg)
         for time, message in self._messages(names.CONTACTS):
-            yield TextEvent(time, names.SIM_DRIVER, _contact_sentence(message))
+            yield TextEvent(time, names.SIM_DRIVER, contact_sentence(message))
 
     def _goals(self) -> Iterator[GoalEnd]:
         """How every goal of planner and runner ended, by the status of their actions."""
@@ -247,10 +249,9 @@ class _Reader:
     def _of_driver(self, name: str) -> bool:
         return names.SIM_DRIVER in name and owns_diagnostic(self._namespace, name)
 
-    def _description(self) -> str:
-        for _, message in self._messages(names.ROBOT_DESCRIPTION):
-            return str(message.data)
-        return ""
+    def _text(self, name: str) -> str:
+        """The first text of a topic."""
+        return next((str(message.data) for _, message in self._messages(name)), "")
 
     def _messages(self, name: str, needed: bool = False) -> Iterator[tuple[float, Any]]:
         channel = self._channel(name)
@@ -289,12 +290,3 @@ class _Reader:
     def _attached(self, name: str) -> str:
         data = self._raw.attachment(name)
         return data.decode(errors="replace") if data is not None else ""
-
-
-def _contact_sentence(contact: Any) -> str:
-    """A recorded Contact, for people."""
-    pair = contact.pair
-    return (
-        f"contact: {pair.body_a} touched {pair.body_b} at {contact.speed:.2f} m/s, "
-        f"{contact.depth * 1e3:.1f} mm deep, about {contact.force:.0f} N (simulated)"
-    )

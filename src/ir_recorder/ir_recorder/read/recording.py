@@ -140,7 +140,8 @@ class Recording:
     """All that could be read; a series is None where its topic is missing, `problems` names what is wrong.
 
     start_ns: node clock of time 0. hardware: the driver's name of its plant ("..., simulated"). cell_yaml and
-    urdf are "" where none is attached. facts: texts by key.
+    urdf are "" where none is attached, so are power_yaml (data of the controller) and plant_yaml (the
+    simulated plant with its figures). facts: texts by key.
     """
 
     path: Path
@@ -163,6 +164,8 @@ class Recording:
     urdf: str
     facts: tuple[tuple[str, str], ...]
     problems: tuple[str, ...]
+    power_yaml: str = ""
+    plant_yaml: str = ""
 
     @property
     def origin(self) -> str:
