@@ -10,14 +10,17 @@ from pathlib import Path
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.analysis import Analysis, analyse, findings
+from ir_recorder.analysis.external_meter import with_meter
 from ir_recorder.arguments import add_roots
 from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.read.reader import read_recording
+from ir_recorder.read.recording import Recording
 from ir_recorder.report import write_report
 from ir_recorder.report.compare import MOST, write_comparison
 from ir_recorder.report.costs import read_costs
 from ir_recorder.report.picture import write_picture
 from ir_recorder.report.step_table import write_table
+from ir_recorder.traces import read_mapping
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--namespace", help="of the cell, where the recording holds several")
     add_roots(parser)
     parser.add_argument("--costs", default="", help="prices, shifts and CO2 (YAML); else as assumed")
+    meter = "a power meter's file (.csv, .parquet) in place of the recorded watts, of one recording"
+    parser.add_argument("--meter", default="", metavar="FILE", help=meter)
+    parser.add_argument("--meter-mapping", default="", metavar="FILE", help="what its columns are (.yaml)")
     parser.add_argument("--table", default="", help="steps as a table to write as well (.csv or .parquet)")
     parser.add_argument("--picture", default="", help="picture to write as well (.png), of one recording")
 
@@ -56,7 +62,8 @@ def _analyses(options: argparse.Namespace, roots: FileRoots) -> list[Analysis]:
     analyses = []
     for path, named in _paths(options.files, roots):
         try:
-            analysis = analyse(read_recording(path, roots, namespace=options.namespace))
+            recording = read_recording(path, roots, namespace=options.namespace)
+            analysis = analyse(_metered(recording, options, roots))
         except ReadError as error:
             if named:
                 raise
@@ -68,6 +75,14 @@ def _analyses(options: argparse.Namespace, roots: FileRoots) -> list[Analysis]:
     if not analyses:
         raise ReadError(f"no recording could be read below {', '.join(map(str, options.files))}")
     return analyses
+
+
+def _metered(recording: Recording, options: argparse.Namespace, roots: FileRoots) -> Recording:
+    """The recording, with the readings of a meter's file where one is named."""
+    if not options.meter:
+        return recording
+    mapping = read_mapping(roots.inside(options.meter_mapping)) if options.meter_mapping else None
+    return with_meter(recording, roots.inside(options.meter), mapping)
 
 
 def _paths(files: Sequence[str], roots: FileRoots) -> list[tuple[Path, bool]]:
