@@ -1,0 +1,127 @@
+"""What is left of a planned program on its way through KRL, and how near what is read back comes?
+
+    python benchmarks/shop_floor.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
+
+Every cell's program, or a random visit of its stations for each seed, is planned, written as KRL, read back,
+driven by the controller's model and certified again: what that costs, and how near the ends come.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from _results import at_least, at_most, command_line, finish, line_of
+
+from ir_description import bundled_cells, load_cell
+from ir_krl import follow, parse
+from ir_msgs_py.options import PlanOptions
+from ir_planner import KrlExport, Planner, ProgramPlan, RequestError, evaluate_krl, export_krl, tool_in_flange
+
+SEEDS, QUICK_SEEDS, VISITS = 5, 1, 3
+CELLS = tuple(sorted(bundled_cells()))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One program: movements; seconds and joules of the movements before and after; the largest deviation of
+    a joint [rad], the largest error of an end that is read back [deg, mm]; why it was refused, else "".
+    """
+
+    cell: str
+    seed: int
+    movements: int
+    planned_s: float
+    exported_s: float
+    planned_joules: float
+    exported_joules: float
+    deviation_rad: float
+    end_deg: float
+    end_mm: float
+    certified: bool
+    refused: str
+    process_s: float
+
+
+def stations_for(planner: Planner, seed: int) -> tuple[str, ...]:
+    """Seed 0 asks for the cell's program where it has one, the others for stations drawn at random."""
+    cell = planner.cell
+    if seed == 0 and cell.program:
+        return ()
+    names = sorted(station.name for station in cell.stations)
+    drawn = np.random.default_rng(seed).choice(names, min(VISITS, len(names)), replace=False)
+    return (*(str(name) for name in drawn), "home")
+
+
+def row_of(cell: str, seed: int, planner: Planner) -> Row | None:
+    """Plan, export, read back; None where the planner finds no program."""
+    plan = planner.plan_program(stations_for(planner, seed), 0.0, PlanOptions(), planner.cell.posture("park"))
+    if not plan.status.ok:
+        return None
+    moving = [step for step in plan.movements if not step.is_pause]
+    began = time.process_time()
+    try:
+        export = export_krl(planner, plan.movements, "shop_floor")
+    except RequestError as error:
+        took = time.process_time() - began
+        return Row(cell, seed, len(moving), 0, 0, 0, 0, 0, 0, 0, False, str(error), took)
+    took = time.process_time() - began
+    degrees, millimetres, certified = read_back(planner, plan, export)
+    before, after = export.planned, export.exported
+    figures = (before.duration, after.duration, before.energy, after.energy, export.deviation)
+    return Row(cell, seed, len(moving), *figures, degrees, millimetres, certified, "", took)
+
+
+def read_back(planner: Planner, plan: ProgramPlan, export: KrlExport) -> tuple[float, float, bool]:
+    """Largest error of an end of a movement [deg], [mm] of the tcp, and whether the export was certified."""
+    cell = planner.cell
+    texts = [parse(export.source, "shop_floor.src"), parse(export.data, "shop_floor.dat")]
+    program = follow(texts, cell.machine_home, tool_in_flange(cell.tcp))
+    driven = [one for one in evaluate_krl(planner, program).steps if one.step.moves]
+    planned = [step.trajectory for step in plan.movements if step.trajectory is not None]
+    ends = [
+        (one.step.trajectory.positions[k], trajectory.positions[k])
+        for one, trajectory in zip(driven, planned, strict=True)
+        for k in (0, -1)
+    ]
+    first, second = (np.array(side) for side in zip(*ends, strict=True))
+    chain = planner.scene("").chain
+    away = chain.tcp_poses(first)[:, :3, 3] - chain.tcp_poses(second)[:, :3, 3]
+    return (
+        float(np.degrees(np.abs(first - second)).max()),
+        1e3 * float(np.linalg.norm(away, axis=1).max()),
+        export.exported.certified,
+    )
+
+
+def main() -> None:
+    """Run all cells and seeds."""
+    parser = command_line(__doc__, CELLS, SEEDS, "one program of each cell")
+    arguments = parser.parse_args()
+    seeds = QUICK_SEEDS if arguments.quick else arguments.seeds
+    rows: list[Row] = []
+    for cell in arguments.cell or CELLS:
+        load_cell(cell)
+        planner = Planner(time.monotonic)
+        planner.set_cell("", cell)
+        for seed in range(seeds):
+            row = row_of(cell, seed, planner)
+            if row is not None:
+                rows.append(row)
+                print(line_of(asdict(row)), flush=True)
+    written = [row for row in rows if not row.refused]
+    slower = [row.exported_s / row.planned_s - 1.0 for row in written]
+    claims = [
+        at_least("programs written", len(written) / len(rows), "share", 1.0),
+        at_least("of them certified again", float(np.mean([row.certified for row in written])), "share", 1.0),
+        at_most("ends that are read back", max(row.end_deg for row in written), "deg", 1e-4),
+        at_most("ends that are read back", max(row.end_mm for row in written), "mm", 1e-3),
+        at_most("joints apart from the plan", max(row.deviation_rad for row in written), "rad", 2e-3),
+        at_most("slower than planned, median", 100.0 * float(np.median(slower)), "%", 5.0),
+    ]
+    finish(arguments.json, [asdict(row) for row in rows], claims)
+
+
+if __name__ == "__main__":
+    main()
