@@ -1,4 +1,4 @@
-"""What is left of a planned program on its way through KRL, and how near what is read back comes?
+"""What is left of a planned program that goes through KRL, and how near does what is read back come?
 
     python benchmarks/shop_floor.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
