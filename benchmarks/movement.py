@@ -1,0 +1,132 @@
+"""How soon is one regional movement known: a coarse solution, and the certified answer?
+
+    python benchmarks/movement.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
+
+Every task of the cells, there and back, apart by whether its straight movement (PTP) is free. Processor time,
+the least of the repetitions (the seed stays). Coarse: the first free path, and of its coarse solution and
+those of all guesses the cheapest; `first` is the coarse solution of the first path alone. Their costs, with
+the penalties of a coarse solution, are held against J of the answer.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from _regional_ours import UNHURRIED, asked, planner_of
+from _regional_tasks import CELLS, Task, tasks_of
+from _results import Claim, at_least, at_most, command_line, finish, line_of
+
+from ir_kernels.collision import FREE
+from ir_planner.checks import FreeSpace
+from ir_planner.optimize import Portfolio, Refinement
+from ir_planner.planner import Planner
+from ir_planner.regional.exploration import GUESS, first_paths
+from ir_planner.request import Context, Work
+from ir_planner.request.goals import Goal
+from ir_planner.search import Ends, guesses
+
+NEAR = 1.05  # of J of the answer
+FEW = 8  # guesses beside a free segment
+
+
+@dataclass(frozen=True)
+class Row:
+    """One task: ms of processor time; costs of coarse solutions over J [J] of the answer."""
+
+    task: str
+    free: bool
+    first_ms: float
+    first_over: float
+    coarse_ms: float
+    coarse_over: float
+    answer_ms: float
+    J: float
+
+
+def least(repetitions: int, function: Callable[[], float]) -> tuple[float, float]:
+    """Least milliseconds of processor time, and what the function returned."""
+    times = []
+    for _ in range(repetitions):
+        begin = time.process_time()
+        found = function()
+        times.append(1e3 * (time.process_time() - begin))
+    return min(times), found
+
+
+def coarse(planner: Planner, task: Task, *, alone: bool) -> float:
+    """Cost of the cheapest coarse solution, `alone` of the first free path."""
+    options, cell = asked(task), task.scene.cell
+    work = Work(planner.settings.max_iterations, time.monotonic() + UNHURRIED, time.monotonic)
+    context, searches = Context.of(task.scene, options, work), planner.settings.searches
+    ends, space = Ends(task.start, task.goal[None]), FreeSpace.of(task.scene, task.margin, work)
+    paths = first_paths(ends, space, context, searches, briefly=True)
+    paths = paths or first_paths(ends, space, context, searches, briefly=False)
+    portfolio = Portfolio(space, Refinement(context))
+    portfolio.add(paths[0][0], [path for _, path in paths])
+    if not alone:
+        free = any(len(path) == 2 for _, path in paths)
+        looks = guesses(task.start, task.goal, np.array(cell.park), space.low, space.high)
+        portfolio.descend(GUESS, looks[:FEW] if free else looks, 1.3 if free else np.inf)
+    return portfolio.candidates[0].solution.cost
+
+
+def answered(planner: Planner, task: Task) -> float:
+    """J of the answer [J]."""
+    report = planner.plan_regional(task.start, Goal(configuration=task.goal), asked(task)).report
+    drives: float = report.energy - report.base_energy
+    return drives + asked(task).time_value * report.duration
+
+
+def measured(planner: Planner, task: Task, repetitions: int) -> Row:
+    """All figures of one task."""
+    space = FreeSpace.of(task.scene, task.margin, Work(1, np.inf, time.monotonic))
+    found = task.scene.collision.certify_edges(task.start[None], task.goal[None], space.threshold)
+    answer_ms, J = least(repetitions, lambda: answered(planner, task))
+    first_ms, first = least(repetitions, lambda: coarse(planner, task, alone=True))
+    coarse_ms, cheapest = least(repetitions, lambda: coarse(planner, task, alone=False))
+    free = bool(found.verdict[0] == FREE)
+    return Row(task.label, free, first_ms, first / J, coarse_ms, cheapest / J, answer_ms, J)
+
+
+def claims_of(rows: Sequence[Row]) -> list[Claim]:
+    """Medians, apart by whether the PTP is free."""
+    claims = []
+    for free, name, bound in ((True, "PTP free", 15.0), (False, "PTP not free", 30.0)):
+        some = [row for row in rows if row.free == free]
+        if not some:
+            continue
+        near = 100.0 * float(np.mean([row.coarse_over <= NEAR for row in some]))
+        first = 100.0 * float(np.mean([row.first_over <= NEAR for row in some]))
+        claims += [
+            at_most(f"{name}: certified answer, median", np.median([r.answer_ms for r in some]), "ms", bound),
+            at_most(f"{name}: first coarse solution, median", np.median([r.first_ms for r in some]), "ms", 2),
+            at_least(f"{name}: it costs at most {NEAR} times the answer", first, "%", 95.0),
+            at_most(
+                f"{name}: coarse solutions of all classes, median",
+                np.median([r.coarse_ms for r in some]),
+                "ms",
+                2.0,
+            ),
+            at_least(f"{name}: the best costs at most {NEAR} times the answer", near, "%", 95.0),
+        ]
+    return claims
+
+
+def main() -> None:
+    """Measure, print, write."""
+    given = command_line(__doc__, CELLS, 10, "3 repetitions of every third task").parse_args()
+    repetitions = min(given.seeds, 3) if given.quick else given.seeds
+    rows = []
+    for cell in given.cell or CELLS:
+        planner = planner_of(cell)
+        for task in tasks_of(cell)[:: 3 if given.quick else 1]:
+            rows.append(measured(planner, task, repetitions))
+            print(line_of(asdict(rows[-1])), flush=True)
+    finish(given.json, [asdict(row) for row in rows], claims_of(rows))
+
+
+if __name__ == "__main__":
+    main()
