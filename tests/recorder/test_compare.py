@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ir_msgs_py.savings import ProgramPoint
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.front import Point, front_chart, front_section, pareto
@@ -147,6 +148,8 @@ def test_plans_that_were_not_driven_are_compared_by_what_was_predicted(analysis:
 
 
 def test_the_run_stands_beside_the_common_program(analysis: Analysis) -> None:
+    front = [ProgramPoint(4.0, 9000.0, "a"), ProgramPoint(5.0, 5000.0, "b")]
+    assert front_section(analysis, front).count("program of the front") == 2
     section = front_section(analysis)
     for words in ("this run", "common program", "planned in its time"):
         assert words in section

@@ -13,6 +13,7 @@ from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.external_meter import with_meter
 from ir_recorder.arguments import add_roots
 from ir_recorder.errors import ReadError, RecorderError
+from ir_recorder.read.front import recorded_front
 from ir_recorder.read.reader import read_recording
 from ir_recorder.read.recording import Recording
 from ir_recorder.report import write_report
@@ -48,7 +49,8 @@ def run(options: argparse.Namespace) -> int:
     if len(compared) > 1:
         page = write_comparison(compared, options.output, roots, costs)
     else:
-        page = write_report(*compared[0], options.output, roots=roots, costs=costs)
+        front = recorded_front(analyses[0].recording.path, roots, options.namespace)
+        page = write_report(*compared[0], options.output, roots=roots, costs=costs, front=front)
     sys.stdout.write(f"{page}\n")
     if options.table:
         sys.stdout.write(f"{write_table(analyses, options.table, roots)}\n")

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.agreement import agreement
 from ir_recorder.report.bars import joule_bars
-from ir_recorder.report.front import front_section
 from ir_recorder.report.sankey import sankey_section
 from ir_recorder.report.savings import savings_section
 from ir_recorder.report.tables import (
@@ -31,7 +30,6 @@ CHARTS: Mapping[str, Chart] = {
     "problems": lambda analysis: problem_list(analysis.problems),
     "bars": lambda analysis: joule_bars(analysis.movements),
     "flows": sankey_section,
-    "front": front_section,
     "steps": step_table,
     "savings": savings_section,
     "stations": station_table,

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis
 from ir_recorder.report.bars import tick_step
 from ir_recorder.report.words import joules, seconds, text
@@ -24,21 +25,23 @@ class Point:
     source: str
 
 
-def front_section(analysis: Analysis) -> str:
-    """Section of the page: this run, the plan in the common program's time, and the common program."""
+def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> str:
+    """Section of the page: this run, the planned front, the common program, what was planned in its time."""
     savings, program = analysis.savings, analysis.program
-    if savings is None:
+    if savings is None and not planned:
         return ""
-    total = savings.total
+    total = savings.total if savings is not None else None
     run = program.whole if program is not None and math.isfinite(program.whole.energy) else None
     points = [
         *([Point("this run", run.seconds, run.energy, analysis.recording.origin)] if run is not None else ()),
-        Point("common program", total.seconds, total.common, "predicted"),
-        Point("planned in its time", total.seconds, total.planned, "predicted"),
+        *(Point("", point.cycle_time, point.energy, "predicted") for point in planned),
     ]
+    if total is not None:
+        points.append(Point("common program", total.seconds, total.common, "predicted"))
+        points.append(Point("planned in its time", total.seconds, total.planned, "predicted"))
     hint = "Left is faster, down is cheaper; the line joins programs that no other one beats in both."
-    head = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>'
-    return f'<section id="front">{head}{front_chart(points)}</section>'
+    head, drawn = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>', front_chart(points)
+    return f'<section id="front">{head}{drawn}</section>' if drawn else ""
 
 
 def pareto(points: Sequence[Point]) -> list[Point]:
@@ -105,7 +108,8 @@ def _grid(x: _Axis, y: _Axis) -> str:
 
 def _mark(point: Point, index: int, x: _Axis, y: _Axis) -> str:
     at, high = x.at(point.seconds), y.at(point.energy)
-    words = f"{point.name}, {point.source}: {seconds(point.seconds)}, {joules(point.energy)}"
+    name = point.name or "program of the front"
+    words = f"{name}, {point.source}: {seconds(point.seconds)}, {joules(point.energy)}"
     filled = "hollow" if point.source == "predicted" else f"a{index % 6 + 1}"
     return (
         f'<circle class="{filled}" cx="{at:.1f}" cy="{high:.1f}" r="6"><title>{text(words)}</title></circle>'

@@ -10,12 +10,14 @@ from pathlib import Path
 
 from ir_description import load_power_data
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.report.charts import CHARTS
 from ir_recorder.report.check_tables import check_table
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
+from ir_recorder.report.front import front_section
 from ir_recorder.report.headline import notes, source, subtitle, tiles, verdict
 from ir_recorder.report.lever_table import lever_section
 from ir_recorder.report.money import costs_section
@@ -33,12 +35,13 @@ def write_report(
     tolerances: Tolerances | None = None,
     roots: FileRoots = ANYWHERE,
     costs: Costs | None = None,
+    front: Sequence[ProgramPoint] = (),
 ) -> Path:
     """Writes the page below `roots`, in place of another page but of no other file; its absolute path.
 
     PathError when it can't be written.
     """
-    page = report_html(analysis, checks, tolerances, costs).encode()
+    page = report_html(analysis, checks, tolerances, costs, front).encode()
     return write_output(path, page, PAGE_START, roots)
 
 
@@ -47,8 +50,10 @@ def report_html(
     checks: Sequence[Finding],
     tolerances: Tolerances | None = None,
     costs: Costs | None = None,
+    front: Sequence[ProgramPoint] = (),
 ) -> str:
-    """The page as text, with the checks to show; without `costs` with those that are assumed.
+    """The page as text, with the checks to show; without `costs` with those that are assumed. front: of the
+    program, as it was planned.
 
     The chart of clearances shows the recorded safety distance, else that of the tolerances.
     """
@@ -65,6 +70,7 @@ def report_html(
         "tiles": tiles(analysis, costs or Costs()),
         "capacity": text(joules(load_power_data().dc_link_capacity_energy)),
         "costs": costs_section(analysis, costs or Costs()),
+        "front": front_section(analysis, front),
         "levers": lever_section(analysis, costs or Costs()),
         "checks": check_table(checks),
         "style": asset("page.css"),
