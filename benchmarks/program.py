@@ -7,6 +7,9 @@ Small programs are drawn by seed: 3 to 6 stops of a cell, with its tool and with
 edge at the cost that the planner finds for it (edges that cannot belong to a cheaper chain by an exact lower
 bound are left out). "answer": cost of the movements of the answer over the best chain's; "chain": cost of its
 configurations with the same edges, over the best's.
+
+Then the demonstration's own program is driven by the simulated robot on the nominal plant, without real time:
+every movement and pause, and the whole, against what was planned.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 
 import numpy as np
+from _driven_program import driven
 from _program_chains import CEILING, Chains, EdgeCosts, cost_of
 from _regional_tasks import SHARE_OF_ENDS, scene_of
 from _results import Claim, at_least, at_most, command_line, finish, line_of
@@ -33,6 +37,7 @@ CELLS = ("demo", "open", "table_columns", "cnc_door", "deep_box")
 OBJECTIVES = {"J": "time_and_energy", "W": "movement_cost"}
 BOUND = 1.01  # of the best chain
 STOPS = (3, 6)
+DRIVEN, QUICK_PAUSE = "demo", 30.0  # the cell whose program is driven; s: what --quick cuts its pauses to
 CHAINS_S = 300.0  # ceiling of the search through all chains of one instance
 
 
@@ -176,7 +181,7 @@ def claims_of(rows: list[Row]) -> list[Claim]:
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    parser = command_line(__doc__, CELLS, 1, "2 programs of each cell")
+    parser = command_line(__doc__, CELLS, 1, "2 programs of each cell, short pauses")
     parser.add_argument("--instances", type=int, default=8, help="programs of each cell; default: 8")
     given = parser.parse_args()
     if given.quick:
@@ -195,7 +200,10 @@ def main() -> None:
                 for objective in OBJECTIVES:
                     rows.append(compared(instance, objective, seed, known))
                     print(line_of(asdict(rows[-1])), flush=True)
-    finish(given.json, [asdict(row) for row in rows], claims_of(rows))
+    steps, agreement = driven(DRIVEN, QUICK_PAUSE if given.quick else np.inf)
+    for step in steps:
+        print(line_of(asdict(step)), flush=True)
+    finish(given.json, [asdict(row) for row in (*rows, *steps)], [*claims_of(rows), *agreement])
 
 
 if __name__ == "__main__":

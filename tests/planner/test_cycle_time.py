@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from ir_description import Cell, PowerData
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.transitions import TransitionTimes
+from ir_planner import Planner
 from ir_planner.errors import RequestError
 from ir_planner.program.cycle_time import Task, shared_out
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
@@ -184,3 +185,21 @@ def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power:
     for a, b in itertools.combinations(range(POINTS), 2):
         wait = plan_standby(seconds[b] - seconds[a], park, scene, TransitionTimes()).energy
         assert energy[b] <= 1.005 * (energy[a] + wait)
+
+
+def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "demo")
+    stops, start = ("infeed_pick", "park"), np.array(planner.cell.park)
+
+    def plan(objective: str, cycle_time: float) -> ProgramPlan:
+        options = PlanOptions(objective=objective, planning_time=100.0)
+        return planner.plan_program(stops, cycle_time, options, start)
+
+    slow, usual = plan("energy", 0.0), plan("time_and_energy", 0.0)
+    assert f"the movements take {slow.report.duration:.1f} s" in slow.status.message
+    assert usual.status.message == ""
+    short = plan("energy", usual.report.duration)
+    assert short.status.message == ""
+    assert slow.report.duration > 1.2 * short.report.duration
+    assert slow.report.energy > short.report.energy

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import PowerParameters, load_power_data, load_power_parameters
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlannerSettings
@@ -167,3 +168,33 @@ def test_reports_name_their_parameters_and_hold_their_energy() -> None:
     found = planner().evaluate(movement("home->p1"), 0.005, "", "").report
     assert found.power_parameters == "data_sheet"
     assert found.energy_low <= found.energy < found.energy_high
+
+
+@given(st.floats(0.0, 1e6), st.lists(st.floats(-1e5, 1e5), min_size=1, max_size=50).map(np.array))
+def test_an_interval_holds_the_energy_that_it_is_of(energy: float, added: FloatArray) -> None:
+    within = interval(energy, added)
+    assert within.low <= energy <= within.high
+
+
+def test_every_answer_lies_within_its_own_interval() -> None:
+    asked = planner()
+    cell, start = asked.cell, np.array(asked.cell.park)
+    name = cell.stations[0].name
+    plan = asked.plan_program((name, "park"), 0.0, PlanOptions(), start, savings=True, front_points=3)
+    assert plan.compared is not None
+    programs = (plan, plan.compared, *plan.front)
+    reports = [step.report for program in programs for step in program.movements]
+    reports += [program.report for program in programs]
+    first = plan.movements[0].trajectory
+    assert first is not None
+    better = asked.optimize_trajectory(first)
+    reports += [better.before, better.after, asked.evaluate(first, 0.0, "", name).report]
+    service = asked.plan_service(name, "exit", None, start, 2, PlanOptions())
+    reports += [one.report for one in service.candidates if one.trajectory is not None]
+    assert len(plan.front) == 3
+    assert all(report.energy_low <= report.energy <= report.energy_high for report in reports)
+    assert all(report.power_parameters for report in reports)
+    savings = plan.savings
+    assert savings.movements.saved_low <= savings.movements.saved <= savings.movements.saved_high
+    rest = asked.standby(300.0, start, "")
+    assert rest.saving_low <= rest.saving <= rest.saving_high

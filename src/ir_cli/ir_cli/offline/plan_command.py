@@ -151,6 +151,8 @@ def sentences_of(plan: ProgramPlan) -> list[str]:
         f"{predicted(plan.report)}; "
         f"{proof if totals['certified'] else 'NOT certified'}",
     ]
+    if plan.status.message:
+        lines.append(plan.status.message)
     if totals["truncated"]:
         lines.append("cut by --planning-time: more time may give a better program")
     lines.append(f"saving: {plan.savings.sentence if plan.savings.available else HOW_TO_SAVE}")

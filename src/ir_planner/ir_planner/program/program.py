@@ -30,6 +30,10 @@ from ir_planner.timing import at_the_mains
 
 _SENTENCES = 4  # of a failure
 _ENDED = "{}; {} ended before all was tried: more of it may help"
+_SLOW = (
+    "objective energy counts the drives alone, which take least when they are slow: the movements take "
+    "{:.1f} s; for the least energy at the mains give a cycle_time, or a price of time by time_and_energy"
+)
 
 
 def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobody) -> ProgramPlan:
@@ -59,6 +63,9 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
             f"(is {request.front_points}) must be 0",
         )
     plan = replace(_planned(steps), gap=answer.gap)
+    if choice.parts and request.options.objective == "energy" and cycle <= 0.0:
+        moving = plan.report.duration - standing
+        plan = replace(plan, status=Status.success(_SLOW.format(moving)))
     if request.savings:
         comparison = held_against_common(choice, steps, cycle, standing, progress)
         if isinstance(comparison, str):
