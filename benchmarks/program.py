@@ -203,7 +203,8 @@ def main() -> None:
     steps, agreement = driven(DRIVEN, QUICK_PAUSE if given.quick else np.inf)
     for step in steps:
         print(line_of(asdict(step)), flush=True)
-    finish(given.json, [asdict(row) for row in (*rows, *steps)], [*claims_of(rows), *agreement])
+    written = [*(asdict(row) for row in rows), *(asdict(step) for step in steps)]
+    finish(given.json, written, [*claims_of(rows), *agreement])
 
 
 if __name__ == "__main__":
