@@ -110,7 +110,10 @@ class Robot:
 def driven(name: str, longest: float) -> tuple[list[Step], list[Claim]]:
     """The program of a cell, planned with the defaults and driven; its pauses are cut to `longest` s."""
     cell = load_cell(name)
-    short = tuple(replace(step, dwell=min(step.dwell, longest)) for step in cell.program)
+    short = tuple(
+        step if step.dwell <= longest else replace(step, dwell=longest, power_mode="AUTO")
+        for step in cell.program
+    )
     cell, planner = replace(cell, program=short), Planner(itertools.repeat(0.0).__next__)  # no ceiling
     planner.set_cell(cell_to_yaml(cell), "")
     plan = planner.plan_program((), 0.0, PlanOptions(), np.array(cell.park))
