@@ -17,12 +17,16 @@ from ir_kernels.collision import (
 from ir_kernels.dynamics import DynamicsModel, Gradients
 from ir_kernels.errors import InputError, KernelError
 from ir_kernels.geometry import ENVIRONMENT, SELF, Pair
-from ir_kernels.inverse_kinematics import IkSet, SphericalWristIk
+from ir_kernels.ik_set import IkSet, InverseKinematics
+from ir_kernels.inverse_kinematics import inverse_kinematics
 from ir_kernels.limits import Extrema, MotionExtrema, motion_extrema, polynomial_extrema
 from ir_kernels.power import DcBus, DcBusParameters, DriveEnergy, dc_bus, drive_energy
 from ir_kernels.search import BidirectionalTree
+from ir_kernels.searched_ik import SearchedIk
+from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_kernels.spline import SplineCost, SplineDescent, SplineValue
 from ir_kernels.spline_terms import SplineTerms
+from ir_kernels.three_parallel import ThreeParallelIk
 from ir_kernels.torque_bounds import EXCEEDS, WITHIN, TorqueBounds
 
 __all__ = [
@@ -48,20 +52,24 @@ __all__ = [
     "Gradients",
     "IkSet",
     "InputError",
+    "InverseKinematics",
     "KernelError",
     "MinDistance",
     "MotionExtrema",
     "Pair",
+    "SearchedIk",
     "SphericalWristIk",
     "SplineCost",
     "SplineDescent",
     "SplineTerms",
     "SplineValue",
+    "ThreeParallelIk",
     "TorqueBounds",
     "Witnesses",
     "ccd",
     "dc_bus",
     "drive_energy",
+    "inverse_kinematics",
     "motion_extrema",
     "polynomial_extrema",
 ]

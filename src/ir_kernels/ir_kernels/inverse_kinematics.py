@@ -1,86 +1,34 @@
-"""Closed-form inverse kinematics of 6R arms with a spherical wrist: every branch and every turn within the
-limits.
-"""
+"""Which inverse kinematics an arm has: in closed form where its axes allow it, else by a search."""
 
-from dataclasses import dataclass
-
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import compiled, data
-from ir_kernels.arguments import shaped
+from ir_kernels.arm_lines import arm_lines
 from ir_kernels.chain import Chain
 from ir_kernels.errors import InputError
-from ir_kernels.reference import inverse_kinematics as reference
+from ir_kernels.ik_set import InverseKinematics
+from ir_kernels.searched_ik import SearchedIk
+from ir_kernels.spherical_wrist import SphericalWristIk
+from ir_kernels.three_parallel import ThreeParallelIk
 from ir_kernels.wrist_geometry import wrist_geometry
-from ir_msgs_py.arrays import FloatArray, IntArray
 
 
-@dataclass(frozen=True)
-class IkSet:
-    """Solutions sorted by pose, branch, q: q (M, 6) rad, pose_index (M,) which pose each belongs to, branch
-    (M,) 0..7.
+def inverse_kinematics(chain: Chain, position_min: ArrayLike, position_max: ArrayLike) -> InverseKinematics:
+    """All configurations within the limits (6,) rad that bring `chain`'s tcp to a pose.
 
-    Branch bits: 4 the arm reaches backwards over its base, 2 the other elbow, 1 the other wrist.
+    Raises InputError for an arm that has not six axes, or whose axes 2 and 3 are not parallel.
     """
-
-    q: FloatArray
-    pose_index: IntArray
-    branch: IntArray
-
-    def of_pose(self, index: int) -> FloatArray:
-        """(m, 6): the solutions of one pose."""
-        begin, end = np.searchsorted(self.pose_index, [index, index + 1])
-        solutions: FloatArray = self.q[begin:end]
-        return solutions
+    lines = arm_lines(chain)
+    if has_spherical_wrist(chain):
+        return SphericalWristIk(chain, position_min, position_max)
+    if lines.parallel(3):
+        return ThreeParallelIk(chain, position_min, position_max)
+    return SearchedIk(chain, position_min, position_max)
 
 
-class SphericalWristIk:
-    """All configurations within the limits that bring `chain`'s tcp to a pose.
-
-    position_min, position_max (6,) rad. A singular wrist (axes 4 and 6 parallel) leaves one parameter
-    free: the representative with q4 = 0 (or the limit nearest to 0) is given; a wrist centre on axis 1
-    likewise gives q1 = 0 and its opposite. Raises InputError where the chain isn't a 6R arm with z1 _|_ z2
-    || z3, z4 _|_ z5 _|_ z6 and axes 4 to 6 meeting in a point (1e-9 m).
-    """
-
-    def __init__(
-        self,
-        chain: Chain,
-        position_min: ArrayLike,
-        position_max: ArrayLike,
-        *,
-        core: compiled.Core = compiled.MODULE,
-    ) -> None:
-        self.chain = chain
-        self.geometry = wrist_geometry(chain)
-        self.position_min = data.read_only(
-            data.array(np.ascontiguousarray(position_min), "position_min", (6,)).copy()
-        )
-        self.position_max = data.read_only(
-            data.array(np.ascontiguousarray(position_max), "position_max", (6,)).copy()
-        )
-        if (self.position_min > self.position_max).any():
-            j = int(np.argmax(self.position_min > self.position_max))
-            low, high = self.position_min[j], self.position_max[j]
-            raise InputError(f"position_min[{j}] is {low} rad, above position_max[{j}], {high} rad")
-        self._to_base = np.linalg.inv(chain.base_pose)
-        self._from_tcp = np.linalg.inv(chain.tcp)
-        self._core = None
-        if core is not None and hasattr(core, "SphericalWristIk"):
-            limits = (self.position_min, self.position_max)
-            self._core = core.SphericalWristIk(self.geometry, self._to_base, self._from_tcp, *limits)
-
-    def solve(self, poses: ArrayLike) -> IkSet:
-        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
-        1e-9 rad.
-        """
-        targets = shaped("poses", poses, None, 4, 4)
-        result = None if self._core is None else self._core.solve(targets)
-        if result is None:  # no compiled core, or it refused a pose: the check says which and why
-            data.poses(targets, "poses")
-            hand = self._to_base @ targets @ self._from_tcp
-            result = reference.solve(self.geometry, hand, self.position_min, self.position_max)
-        for array in result:
-            array.setflags(write=False)
-        return IkSet(*result)
+def has_spherical_wrist(chain: Chain) -> bool:
+    """Whether the closed form for a spherical wrist serves."""
+    try:
+        wrist_geometry(chain)
+    except InputError:
+        return False
+    return True

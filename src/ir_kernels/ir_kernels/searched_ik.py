@@ -1,0 +1,117 @@
+"""Inverse kinematics of 6R arms whose axes 2 and 3 are parallel, whatever their wrist: a search over q4.
+
+With q4 known, q1 and q5 follow in closed form (shoulder_wrist), then q6, the sum of q2 and q3, and q2; what
+remains is one equation, that axis 3 is as far from axis 2 as it is built. It is evaluated on a grid of q4,
+and Newton's steps start wherever it is smallest along a branch. Every answer is exact; that none is missed
+is a matter of the grid and is measured (benchmarks/robots.py).
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ir_kernels import data
+from ir_kernels.arguments import shaped
+from ir_kernels.arm_lines import arm_lines
+from ir_kernels.chain import Chain
+from ir_kernels.ik_set import Found, IkSet, limits, with_turns
+from ir_kernels.polish import newton
+from ir_kernels.shoulder_wrist import shoulder_and_wrist
+from ir_kernels.three_parallel import angle_about, displacements, wrist_and_sum
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+
+GRID = 720  # values of q4: half a degree; a pair of solutions nearer than that is found by Newton's steps
+CHUNK = 64  # poses at once: 64 x 720 x 4 candidates fit into the cache
+SLACK = 0.05  # how far beyond a tangent a guess may lie: solutions between two values of q4 are near it
+_STEPS, _MORE_STEPS = 8, 40
+_HOPEFUL = 0.02  # m and rad
+_EXACT = 1e-9  # m and rad: what counts as a solution
+_SAME = 1e-6  # rad
+
+
+class SearchedIk:
+    """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a pose.
+
+    branch: 0, 1, .. in the order of q. grid: values of q4 that are tried. Raises InputError where axes 2 and
+    3 are not parallel (1e-9).
+    """
+
+    def __init__(
+        self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike, *, grid: int = GRID
+    ) -> None:
+        self.chain, self.lines = chain, arm_lines(chain)
+        self.position_min, self.position_max = limits(position_min, position_max)
+        self._q4 = np.linspace(-np.pi, np.pi, grid, endpoint=False)
+        self._E4 = self.lines.turned(3, self._q4)
+
+    def solve(self, poses: ArrayLike) -> IkSet:
+        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
+        1e-9 rad.
+        """
+        targets = shaped("poses", poses, None, 4, 4)
+        data.poses(targets, "poses")
+        found: list[Found] = []
+        for first in range(0, len(targets), CHUNK):
+            chunk = targets[first : first + CHUNK]
+            found += [(first + pose, branch, q) for pose, branch, q in self._of(chunk)]
+        return with_turns(found, self.position_min, self.position_max)
+
+    def _of(self, targets: FloatArray) -> list[Found]:
+        count, grid = len(targets), len(self._q4)
+        X = np.repeat(displacements(self.chain, self.lines, targets), grid, axis=0)
+        q, lack = self._candidates(X, np.tile(self._E4, (count, 1, 1)), np.tile(self._q4, count))
+        pose, k, branch = np.nonzero(_starts(lack.reshape(count, grid, -1)))
+        starts = q.reshape(count, grid, -1, 6)[pose, k, branch]
+        best, error = newton(self.chain, targets[pose], starts, _STEPS)
+        slow = (error >= _EXACT) & (error < _HOPEFUL)  # beside a tangent, where each step gains one bit
+        best[slow], error[slow] = newton(self.chain, targets[pose[slow]], best[slow], _MORE_STEPS)
+        exact = error < _EXACT
+        return _distinct(pose[exact], best[exact])
+
+    def _candidates(self, X: FloatArray, E4: FloatArray, q4: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """q (N, 4, 6) and by how much axis 3 misses its place [m] (N, 4), inf where there is nothing."""
+        lines = self.lines
+        q1, q5, exists = shoulder_and_wrist(lines, X, E4, SLACK)
+        rows, lacks = [], []
+        upper = lines.o[2] - lines.o[1]
+        z, turned = lines.z, lines.turned
+        length = np.linalg.norm(upper - (upper @ z[1]) * z[1])
+        for pair in range(4):
+            q6, total, _ = wrist_and_sum(lines, X, E4, q1[:, pair], q5[:, pair], 0.0)
+            back = turned(0, -q1[:, pair]) @ X @ turned(5, -q6) @ turned(4, -q5[:, pair])
+            back = back @ turned(3, -q4)  # = E2 E3
+            elbow = back[:, :3, :3] @ lines.o[2] + back[:, :3, 3] - lines.o[1]
+            q2 = angle_about(z[1], np.broadcast_to(upper, elbow.shape), elbow)
+            q3 = lines.parallel(2) * (total - q2)
+            rows.append(np.stack([q1[:, pair], q2, q3, q4, q5[:, pair], q6], axis=1))
+            apart = np.linalg.norm(elbow - (elbow @ z[1])[:, None] * z[1], axis=1)
+            lacks.append(np.where(exists[:, pair], apart - length, np.inf))
+        return np.stack(rows, axis=1), np.stack(lacks, axis=1)
+
+
+def _starts(lack: FloatArray) -> BoolArray:
+    """Where Newton's steps start (n, grid, 4): on both sides of a change of sign and of the end of a branch,
+    and around each smallest value (two solutions near each other change no sign).
+    """
+    there, size = np.isfinite(lack), np.abs(lack)
+    least = there & (size <= np.roll(size, 1, axis=1)) & (size <= np.roll(size, -1, axis=1))
+    least |= np.roll(least, 1, axis=1) | np.roll(least, -1, axis=1)
+    ends = np.zeros_like(there)
+    for step in (1, -1):
+        beside = np.roll(lack, step, axis=1)
+        ends |= ~np.isfinite(beside) | (np.sign(beside) != np.sign(lack))
+    return np.asarray(there & (least | ends))
+
+
+def _distinct(pose: IntArray, q: FloatArray) -> list[Found]:
+    """Each solution once, its angles in (-pi, pi], numbered in the order of q."""
+    q = np.pi - np.mod(np.pi - q, 2.0 * np.pi)
+    found: list[Found] = []
+    for k in np.unique(pose):
+        own = q[pose == k]
+        own = own[np.lexsort(own.T[::-1])]
+        kept: list[FloatArray] = []
+        for row in own:
+            if all(np.abs(np.mod(row - other + np.pi, 2.0 * np.pi) - np.pi).max() > _SAME for other in kept):
+                kept.append(row)
+        found += [(int(k), branch, row) for branch, row in enumerate(kept)]
+    return found

@@ -1,0 +1,135 @@
+"""Closed-form inverse kinematics of 6R arms whose axes 2, 3 and 4 are parallel (UR and its kind).
+
+q1 and q5 first (shoulder_wrist), then q6 from where z2 points in the hand, the sum of q2, q3 and q4 from the
+hand's rotation, and q2, q3 as a planar arm of two links.
+
+Branch numbers 0..7: +4 for the second shoulder, +2 for the other elbow, +1 for the other wrist.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ir_kernels import data
+from ir_kernels.arguments import shaped
+from ir_kernels.arm_lines import ArmLines, arm_lines
+from ir_kernels.chain import Chain
+from ir_kernels.errors import InputError
+from ir_kernels.ik_set import Found, IkSet, limits, with_turns
+from ir_kernels.polish import polished
+from ir_kernels.shoulder_wrist import shoulder_and_wrist
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+
+STRETCHED = 1e-9  # m: how far out of reach still counts as stretched
+FREE = np.linspace(-np.pi, np.pi, 25)  # rad: of a free q6, the nearest to 0 first
+SINGULAR = 1e-7  # sine between axis 6 and z2 below which only the sum of the wrist's angles is determined
+
+
+class ThreeParallelIk:
+    """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a pose.
+
+    Where axis 6 is parallel to axes 2 to 4 one parameter is free: the representative with q6 = 0 (or the
+    limit nearest to 0) is given, or where the arm does not reach so the next in steps of 15 deg. Raises
+    InputError where axes 2, 3 and 4 are not parallel (1e-9).
+    """
+
+    def __init__(self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike) -> None:
+        self.chain, self.lines = chain, arm_lines(chain)
+        if not self.lines.parallel(3):
+            raise InputError("axes 2, 3 and 4 are not parallel")
+        self.position_min, self.position_max = limits(position_min, position_max)
+
+    def solve(self, poses: ArrayLike) -> IkSet:
+        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
+        1e-9 rad.
+        """
+        targets = shaped("poses", poses, None, 4, 4)
+        data.poses(targets, "poses")
+        X = displacements(self.chain, self.lines, targets)
+        found: list[Found] = []
+        still = np.broadcast_to(np.eye(4), X.shape)
+        q1, q5, exists = shoulder_and_wrist(self.lines, X, still)
+        for pair in range(4):
+            rows = np.flatnonzero(exists[:, pair])
+            found += self._of_pair(X[rows], rows, q1[rows, pair], q5[rows, pair], 4 * (pair // 2) + pair % 2)
+        return with_turns(polished(self.chain, targets, found), self.position_min, self.position_max)
+
+    def _of_pair(
+        self, X: FloatArray, rows: IntArray, q1: FloatArray, q5: FloatArray, branch: int
+    ) -> list[Found]:
+        """Both elbows of q1, q5 (M,), for displacements (M, 4, 4) that belong to the poses `rows` (M,)."""
+        found: list[Found] = []
+        still = np.broadcast_to(np.eye(4), X.shape)
+        open_ = np.ones(len(rows), dtype=bool)
+        low, high = self.position_min[5], self.position_max[5]
+        for free in sorted(np.clip(FREE, low, high), key=abs):
+            q6, total, singular = wrist_and_sum(self.lines, X, still, q1, q5, float(free))
+            done = np.zeros(len(rows), dtype=bool)
+            for elbow in (0, 1):
+                q, reached = self._planar(X, q1, q5, q6, total, bool(elbow))
+                found += [(int(rows[k]), branch + 2 * elbow, q[k]) for k in np.flatnonzero(reached & open_)]
+                done |= reached
+            open_ &= singular & ~done  # a free angle: the next one may be in reach
+            if not open_.any():
+                break
+        return found
+
+    def _planar(
+        self, X: FloatArray, q1: FloatArray, q5: FloatArray, q6: FloatArray, total: FloatArray, other: bool
+    ) -> tuple[FloatArray, BoolArray]:
+        """q (N, 6) of one elbow, and whether it is in reach; where the arm is stretched both are the same."""
+        lines = self.lines
+        z, o, turned = lines.z, lines.o, lines.turned
+        back = turned(0, -q1) @ X @ turned(5, -q6) @ turned(4, -q5)  # = E2 E3 E4
+        target = back[:, :3, :3] @ o[3] + back[:, :3, 3] - o[1]
+        across = np.cross(z[1], _normal(z[1]))
+
+        def planar(vector: FloatArray) -> FloatArray:
+            return np.asarray(vector @ _normal(z[1]) + 1j * (vector @ across))
+
+        upper, fore, aim = planar(o[2] - o[1]), planar(o[3] - o[2]), planar(target)
+        a, b, distance = abs(upper), abs(fore), np.abs(aim)
+        cosine = (distance**2 - a**2 - b**2) / (2.0 * a * b)
+        bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if other else 1.0)
+        turn = bend - np.angle(np.conj(upper) * fore)
+        q2 = np.angle(aim * np.conj(upper + fore * np.exp(1j * turn)))
+        reached = (distance <= a + b + STRETCHED) & (distance >= abs(a - b) - STRETCHED)
+        twice = other & (np.abs(cosine) >= 1.0)
+        q4 = lines.parallel(3) * (total - q2 - turn)
+        return np.stack([q1, q2, lines.parallel(2) * turn, q4, q5, q6], axis=1), reached & ~twice
+
+
+def displacements(chain: Chain, lines: ArmLines, targets: FloatArray) -> FloatArray:
+    """(N, 4, 4): how the hand is displaced from q = 0 in link 0, for poses of the tcp in the world."""
+    hand = np.linalg.inv(chain.base_pose) @ targets @ np.linalg.inv(chain.tcp)
+    return np.asarray(hand @ np.linalg.inv(lines.hand))
+
+
+def wrist_and_sum(
+    lines: ArmLines, X: FloatArray, E4: FloatArray, q1: FloatArray, q5: FloatArray, free: float
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """q6 (N,), the angle (N,) about z2 that is left for axes 2, 3 and those parallel to them, and where q6 is
+    free and taken as `free`.
+    """
+    z, turned = lines.z, lines.turned
+    R1, R5 = turned(0, q1)[:, :3, :3], turned(4, q5)[:, :3, :3]
+    R4, R = E4[:, :3, :3], X[:, :3, :3]
+    before = np.swapaxes(R4 @ R5, 1, 2) @ z[1]  # = R6 (R^T R1 z2)
+    after = (np.swapaxes(R, 1, 2) @ R1) @ z[1]
+    singular = np.linalg.norm(np.cross(before, z[5]), axis=1) < SINGULAR
+    q6 = np.where(singular, free, angle_about(z[5], after, before))
+    left = np.swapaxes(R1, 1, 2) @ R @ np.swapaxes(R4 @ R5 @ turned(5, q6)[:, :3, :3], 1, 2)
+    normal = _normal(z[1])
+    return q6, angle_about(z[1], np.broadcast_to(normal, after.shape), left @ normal), singular
+
+
+def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Angles (N,) by which a turn about an axis (3,) brings vectors (N, 3) into the planes of others."""
+    u, v = start - (start @ axis)[:, None] * axis, end - (end @ axis)[:, None] * axis
+    return np.asarray(np.arctan2(np.cross(u, v) @ axis, (u * v).sum(axis=1)))
+
+
+def _normal(z: FloatArray) -> FloatArray:
+    """A unit vector perpendicular to z (3,)."""
+    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
+    across = np.cross(z, helper)
+    return np.asarray(across / np.linalg.norm(across))
