@@ -66,7 +66,17 @@ def unturned(q: FloatArray) -> FloatArray:
 
 
 def test_all_cells_are_there() -> None:
-    assert bundled_cells() == ("cnc_door", "deep_box", "demo", "open", "table_columns")
+    known = (
+        "cnc_door",
+        "deep_box",
+        "demo",
+        "kr300_pallets",
+        "kr6_bench",
+        "open",
+        "table_columns",
+        "ur10e_bench",
+    )
+    assert bundled_cells() == known
 
 
 @pytest.mark.parametrize("name", bundled_cells())

@@ -26,20 +26,28 @@ from ir_description.errors import (
     RobotFileError,
     UnknownNameError,
 )
-from ir_description.files import cell_hash, cell_to_yaml, power_parameters_to_yaml, robot_urdf
+from ir_description.files import (
+    cell_hash,
+    cell_to_yaml,
+    is_path,
+    power_parameters_to_yaml,
+    robot_file_errors,
+    robot_urdf,
+)
 from ir_description.library import (
     bundled_cells,
     bundled_robots,
     cell_file_errors,
     cell_from_yaml,
     data_sheet,
-    is_path,
+    data_sheet_of,
     load_cell,
     load_power_data,
     load_power_parameters,
     load_robot,
     power_marks,
     robot_marks,
+    robot_named,
 )
 from ir_description.robot import (
     AXIS_UNITS,
@@ -102,6 +110,7 @@ __all__ = [
     "cell_to_yaml",
     "check_cell",
     "data_sheet",
+    "data_sheet_of",
     "fixed_frames",
     "is_path",
     "load_cell",
@@ -116,7 +125,9 @@ __all__ = [
     "power_parameters_to_yaml",
     "prior",
     "read_cell_apart",
+    "robot_file_errors",
     "robot_marks",
+    "robot_named",
     "robot_urdf",
     "sweep_speeds",
 ]

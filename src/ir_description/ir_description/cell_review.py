@@ -13,7 +13,6 @@ from typing import Literal
 import numpy as np
 
 from ir_description.cell import AUTO, Cell, Zone
-from ir_description.library import load_power_data
 from ir_description.robot import PowerData
 from ir_description.shapes import Body, Capsule, capsule_distance, overlapping, point_distance
 from ir_msgs_py.arrays import FloatArray
@@ -32,13 +31,13 @@ class Finding:
 
 
 def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...]:
-    """Return what looks wrong in a cell, errors first. power: the controller's modes; None: the bundled."""
+    """Return what looks wrong in a cell, errors first. power: the modes; None: the robot's own."""
     findings = [
         *_base(cell),
         *_stations(cell),
         *_zones(cell),
         *_signals(cell),
-        *_pauses(cell, power or load_power_data()),
+        *_pauses(cell, power or cell.robot.controller),
         *_parts(cell),
     ]
     return tuple(sorted(findings, key=lambda finding: finding.severity))
@@ -178,6 +177,10 @@ def _signals(cell: Cell) -> Iterator[Finding]:
 def _pauses(cell: Cell, power: PowerData) -> Iterator[Finding]:
     for k, step in enumerate(cell.program, start=1):
         if step.kind != "PAUSE" or step.power_mode == AUTO:
+            continue
+        if step.power_mode not in [mode.name for mode in power.modes]:
+            sentence = f"asks for {step.power_mode}, which the controller {power.name} does not have"
+            yield Finding("error", f"step {k}", sentence)
             continue
         mode = power.mode(step.power_mode)
         if step.dwell < mode.time_min_pause:

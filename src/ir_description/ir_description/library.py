@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -11,12 +12,13 @@ from pathlib import Path
 from ir_description.cell import Cell
 from ir_description.errors import CellFileError, RobotFileError, UnknownNameError, shown
 from ir_description.files import (
+    bundled_controller,
     cell_errors,
-    confidence_marks,
-    power_from_yaml,
+    is_path,
     power_parameters_from_yaml,
     read_cell,
     read_regular_file,
+    read_robot,
     robot_from_yaml,
 )
 from ir_description.robot import DATA_SHEET, PowerData, PowerParameters, RobotModel, prior
@@ -47,30 +49,33 @@ def load_robot(name: str = "kr210_r2700_extra") -> RobotModel:
     if name not in bundled_robots():
         raise UnknownNameError("robot", name, bundled_robots())
     path = _DATA / "robots" / f"{name}.yaml"
-    return robot_from_yaml(path.read_text(encoding="utf-8"), path.name)
+    robot = robot_from_yaml(path.read_text(encoding="utf-8"), path.name, Path(str(path)).parent)
+    return replace(robot, document="")  # its name is enough
 
 
-@cache
+def robot_named(name_or_path: str) -> RobotModel:
+    """Return a bundled robot by its name, or the robot of a file by its path."""
+    if not is_path(name_or_path):
+        return load_robot(name_or_path)
+    try:
+        return read_robot(Path(name_or_path))
+    except InvalidValueError as error:
+        raise RobotFileError(shown(name_or_path)[1:-1], 0, str(error)) from error
+
+
 def load_power_data(name: str = "kr_c4") -> PowerData:
-    """Return the power figures of a bundled controller."""
-    if name not in _bundled("power"):
-        raise UnknownNameError("controller", name, _bundled("power"))
-    path = _DATA / "power" / f"{name}.yaml"
-    return power_from_yaml(path.read_text(encoding="utf-8"), path.name)
+    """Return the power figures of a bundled controller; the same object for the same name."""
+    return bundled_controller(name)
 
 
-@cache
 def robot_marks(name: str = "kr210_r2700_extra") -> Mapping[str, str]:
     """Return how sure each figure of a bundled robot is, H, M or L; see `confidence_marks`."""
-    load_robot(name)
-    return confidence_marks((_DATA / "robots" / f"{name}.yaml").read_text(encoding="utf-8"), name)
+    return load_robot(name).marks
 
 
-@cache
 def power_marks(name: str = "kr_c4") -> Mapping[str, str]:
     """Return how sure each figure of a bundled controller is, H, M or L; see `confidence_marks`."""
-    load_power_data(name)
-    return confidence_marks((_DATA / "power" / f"{name}.yaml").read_text(encoding="utf-8"), name)
+    return load_power_data(name).marks
 
 
 def load_power_parameters(name_or_path: str = DATA_SHEET) -> PowerParameters:
@@ -91,18 +96,17 @@ def data_sheet(robot: str = "kr210_r2700_extra", controller: str = "kr_c4") -> P
     """Return the parameters as the data of a bundled robot and controller have them, with the deviations
     that their marks of confidence give.
     """
-    marks = {**robot_marks(robot), **power_marks(controller)}
-    return prior(load_robot(robot), load_power_data(controller), marks)
+    return data_sheet_of(load_robot(robot), load_power_data(controller))
+
+
+def data_sheet_of(robot: RobotModel, power: PowerData) -> PowerParameters:
+    """Return the same of any robot and controller."""
+    return prior(robot, power, {**robot.marks, **power.marks})
 
 
 def bundled_cells() -> tuple[str, ...]:
     """Return the names of cells that load_cell knows."""
     return _bundled("cells")
-
-
-def is_path(text: str) -> bool:
-    """Whether a text that names a cell is the path of a file, and not the name of a bundled cell."""
-    return os.sep in text or text.endswith((".yaml", ".yml"))
 
 
 def load_cell(name_or_path: str | Path) -> Cell:

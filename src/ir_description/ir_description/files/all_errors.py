@@ -1,4 +1,4 @@
-"""Everything that is wrong with a cell file, in one run.
+"""Everything that is wrong with a cell or robot file, in one run.
 
 The reader stops at the first error. Here what it refused is left out and the rest is read again, until
 nothing is wrong any more. Errors that only follow from what was left out (a missing key, a name that was in
@@ -8,11 +8,10 @@ it) are not reported.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from typing import TypeVar
 
-from ir_description.errors import CellFileError
-from ir_description.files.cell_reader import RobotSource, cell_of
+from ir_description.errors import DescriptionFileError
 from ir_description.files.items import Item
 from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
 
@@ -25,25 +24,26 @@ _UNKNOWN_KEY = re.compile(r"has the unknown key '([^']*)'")
 _MISSING = re.compile(r"has no (\w+)|must have exactly one of")
 
 Step = str | int
+Error = TypeVar("Error", bound=DescriptionFileError)
 
 
-def cell_errors(
-    text: str, source: str, robots: RobotSource, folder: Path | None
-) -> tuple[CellFileError, ...]:
-    """All errors of the text of a cell, by line; none: it can be read."""
-    found: list[CellFileError] = []
+def document_errors(
+    text: str, source: str, kind: type[Error], read: Callable[[Item], object]
+) -> tuple[Error, ...]:
+    """All errors of a text, by line; none: `read` can read it. kind: what `read` raises."""
+    found: list[Error] = []
     try:
-        document = _Document(parse_yaml(text, source, CellFileError))
-    except CellFileError as error:
+        document = _Document(parse_yaml(text, source, kind))
+    except kind as error:
         return (error,)
     for _ in range(ERRORS_MAX):
         try:
-            cell_of(Item(document.root, source, CellFileError, ""), robots, folder)
+            read(Item(document.root, source, kind, ""))
             break
-        except CellFileError as error:
+        except kind as error:
             place = document.place_of(error.sentence)
             if not document.follows(error.sentence, place):
-                found.append(CellFileError(source, error.line, document.renumbered(error.sentence, place)))
+                found.append(kind(source, error.line, document.renumbered(error.sentence, place)))
             if not document.leave_out(place):
                 break
     return tuple(sorted(found, key=lambda error: error.line))

@@ -32,14 +32,18 @@ from ir_description.cell import (
     check_switch,
     shape_register,
 )
-from ir_description.errors import CellFileError, UnknownNameError
+from ir_description.errors import CellFileError, RobotFileError, UnknownNameError
+from ir_description.files.all_errors import document_errors
 from ir_description.files.body_reader import BodyReader, read_pose
 from ir_description.files.equipment_reader import read_equipment
 from ir_description.files.items import Item, Table, read_items
 from ir_description.files.load_reader import read_part, read_tool
+from ir_description.files.places import inside, is_path
 from ir_description.files.program_reader import read_signal, read_step
+from ir_description.files.robot_file import read_robot, robot_of
 from ir_description.robot import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 FORMAT = "ir_cell/1"
 RobotSource = Callable[[str], RobotModel]
@@ -74,9 +78,29 @@ def cell_of(root: Item, robots: RobotSource, folder: Path | None) -> Cell:
     """Return the cell of a document."""
     table = root.table(_REQUIRED, _OPTIONAL)
     table["format"].choice((FORMAT,))
-    with table["robot"].blamed():
-        robot = robots(table["robot"].name())
-    return _CellReader(root, table, robot, folder).cell()
+    return _CellReader(root, table, _robot(table["robot"], robots, folder), folder).cell()
+
+
+def cell_errors(
+    text: str, source: str, robots: RobotSource, folder: Path | None
+) -> tuple[CellFileError, ...]:
+    """All errors of the text of a cell, by line; none: it can be read."""
+    return document_errors(text, source, CellFileError, lambda root: cell_of(root, robots, folder))
+
+
+def _robot(item: Item, robots: RobotSource, folder: Path | None) -> RobotModel:
+    """A bundled robot by its name, one in a file beside the cell file, or one that is written out."""
+    if not item.is_scalar():
+        return robot_of(item, folder)
+    if not is_path(item.text()):
+        with item.blamed():
+            return robots(item.name())
+    with item.blamed():
+        path = inside(folder, item.text())
+        try:
+            return read_robot(path)
+        except RobotFileError as error:
+            raise InvalidValueError(str(error)) from error
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,11 @@ def _cell(cell: Cell) -> Iterator[str]:
     yield f"name: {cell.name}"
     if cell.description:
         yield f"description: {_quoted(cell.description)}"
-    yield f"robot: {cell.robot.name}"
+    if cell.robot.document:
+        yield "robot:"
+        yield from _indented(cell.robot.document.splitlines(), 2)
+    else:
+        yield f"robot: {cell.robot.name}"
     if not np.array_equal(cell.base_pose, _IDENTITY):
         yield f"base: {{{_pose(cell.base_pose)}}}"
     if cell.base_contacts:

@@ -12,7 +12,12 @@ def confidence_marks(text: str, source: str = "<text>") -> dict[str, str]:
     """Return H, M or L by place: "drives.friction_viscous_nms_rad", "links.link_2.mass_kg",
     "modes.HIBERNATION.controller_w". Entries of lists go by their name.
     """
-    return dict(_marks(parse_yaml(text, source, RobotFileError), ""))
+    return marks_of(parse_yaml(text, source, RobotFileError))
+
+
+def marks_of(node: Node) -> dict[str, str]:
+    """The same of a tree."""
+    return dict(_marks(node, ""))
 
 
 def _marks(node: Node, place: str) -> Iterator[tuple[str, str]]:

@@ -105,6 +105,11 @@ class Item:
         """Whether this is a mapping with that key."""
         return isinstance(self._content, dict) and key in self._content
 
+    @property
+    def node(self) -> Node:
+        """The value as it was read."""
+        return Node(self.line, self._content)
+
     def is_scalar(self) -> bool:
         """Whether this is a single value."""
         return isinstance(self._content, Scalar)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ir_description.errors import RobotFileError
+from ir_description.files.confidence import marks_of
+from ir_description.files.figures import figure
 from ir_description.files.items import Item, Table, read_items
-from ir_description.files.robot_file import figure
 from ir_description.robot import ControllerMode, DcLink, EnergyShare, MeasuredPower, PlcBit, PowerData
 
 FORMAT = "ir_description/power/1"
@@ -12,7 +13,11 @@ FORMAT = "ir_description/power/1"
 
 def power_from_yaml(text: str, source: str = "<text>") -> PowerData:
     """Return the power data a text describes; errors name file and line."""
-    root = read_items(text, source, RobotFileError)
+    return power_of(read_items(text, source, RobotFileError))
+
+
+def power_of(root: Item) -> PowerData:  # long: one line per field
+    """Return the power data of a document, or of a mapping in one."""
     top = root.table(
         (
             "format",
@@ -26,7 +31,8 @@ def power_from_yaml(text: str, source: str = "<text>") -> PowerData:
             "wake_on_lan",
             "table_2_w",
             "table_1_percent",
-        )
+        ),
+        ("table_2_robot",),
     )
     top["format"].choice((FORMAT,))
     modes = tuple(_mode(item) for item in top["modes"].list(1, 20))
@@ -42,12 +48,14 @@ def power_from_yaml(text: str, source: str = "<text>") -> PowerData:
             drives_and_brake_release=figure(top["drives_and_brake_release_w"]).number(0, 1e5, "W"),
             motors_to_brakes_in_program=figure(timers["in_program"]).number(0, 1e6, "s"),
             motors_to_brakes_in_command=figure(timers["in_command"]).number(0, 1e6, "s"),
-            dc_link=_dc_link(top["dc_link"]),
+            dc_link=dc_link(top["dc_link"]),
             plc_inputs=tuple(_bit(item) for item in plc["inputs"].list(0, 8)),
             plc_outputs=tuple(_bit(item) for item in plc["outputs"].list(0, 8)),
             wake_on_lan_ports=tuple(item.integer(1, 65535) for item in wake["ports"].list(1, 8)),
             table_2=tuple(_table_2_row(item, names) for item in top["table_2_w"].list(0, 100)),
             table_1=tuple(_table_1_row(item) for item in top["table_1_percent"].list(0, 100)),
+            table_2_robot=top["table_2_robot"].name() if "table_2_robot" in top else "",
+            marks=marks_of(root.node),
         )
 
 
@@ -70,7 +78,8 @@ def _seconds(table: Table, key: str) -> float:
     return figure(table[key]).number(0, 1e6, "s")
 
 
-def _dc_link(item: Item) -> DcLink:
+def dc_link(item: Item) -> DcLink:
+    """The drives' bus."""
     table = item.table(("capacitance_f", "voltage_v", "chopper_on_v", "chopper_off_v", "brake_resistor_ohm"))
     with item.blamed():
         return DcLink(

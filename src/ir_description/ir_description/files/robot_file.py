@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from ir_description.errors import RobotFileError
+from ir_description.files.all_errors import document_errors
+from ir_description.files.confidence import marks_of
+from ir_description.files.controller_reader import controller_document, read_controller
+from ir_description.files.figures import figure
 from ir_description.files.items import Item, Table, read_items
-from ir_description.robot import Counterbalance, RobotModel
+from ir_description.files.mesh import read_regular_file
+from ir_description.files.yaml_text import yaml_text
+from ir_description.files.yaml_tree import Entry, Node
+from ir_description.poses import rotation_from_abc
+from ir_description.robot import Counterbalance, RobotModel, without_table
 from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
 
 FORMAT = "ir_description/robot/1"
 BIG = 1e12
-CONFIDENCES = ("H", "M", "L")
-
-
-def figure(item: Item) -> Item:
-    """Return the value of a figure: a mapping of value, source, confidence and perhaps a note."""
-    table = item.table(("value", "source", "confidence"), ("note",))
-    table["source"].text()
-    table["confidence"].choice(CONFIDENCES)
-    if "note" in table:
-        table["note"].text(400)
-    return table["value"]
-
-
+BYTES_MAX = 1_000_000
+"""Largest robot file [bytes]."""
 _KEYS = (
     "format",
     "name",
@@ -35,11 +36,11 @@ _KEYS = (
     "joints",
     "drives",
     "links",
-    "counterbalance",
     "capsules",
     "self_pairs",
     "load_self_capsules",
 )
+_OPTIONAL = ("title", "controller", "counterbalance")
 _JOINT_KEYS = (
     "names",
     "origin_m",
@@ -62,12 +63,64 @@ _DRIVE_KEYS = (
 )
 
 
-def robot_from_yaml(text: str, source: str = "<text>") -> RobotModel:  # long: one line per field
-    """Return the robot a text describes; errors name file and line."""
-    root = read_items(text, source, RobotFileError)
-    top = root.table(_KEYS)
+def robot_from_yaml(text: str, source: str = "<text>", folder: Path | None = None) -> RobotModel:
+    """Return the robot a text describes; errors name file and line. folder: of its controller's file."""
+    return robot_of(read_items(text, source, RobotFileError), folder)
+
+
+def read_robot(path: Path) -> RobotModel:
+    """Return the robot of a file. Raises RobotFileError, InvalidValueError where it can't be opened."""
+    return robot_from_yaml(_decoded(path), str(path), path.parent)
+
+
+def robot_file_errors(path: Path) -> tuple[RobotFileError, ...]:
+    """Everything that is wrong with a robot file, by line; where read_robot reads it, nothing is."""
+    try:
+        return robot_errors(_decoded(path), str(path), path.parent)
+    except InvalidValueError as error:
+        return (RobotFileError(str(path), 0, str(error)),)
+
+
+def _decoded(path: Path) -> str:
+    try:
+        return read_regular_file(path, BYTES_MAX).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InvalidValueError(f"byte 0x{error.object[error.start]:02x} is not UTF-8 text") from error
+
+
+def robot_errors(text: str, source: str, folder: Path | None) -> tuple[RobotFileError, ...]:
+    """All errors of the text of a robot, by line; none: it can be read."""
+    found: dict[str, RobotFileError] = {}
+    for section in _SECTIONS:  # each by itself: what is wrong in one says nothing of the others
+        errors = document_errors(text, source, RobotFileError, partial(_read_section, section))
+        found.update({str(error): error for error in errors})
+    if not found:
+        return document_errors(text, source, RobotFileError, lambda root: robot_of(root, folder))
+    return tuple(sorted(found.values(), key=lambda error: error.line))
+
+
+def _read_section(section: Callable[[Table], object], root: Item) -> None:
+    section(root.table(_KEYS, _OPTIONAL))
+
+
+def robot_of(root: Item, folder: Path | None) -> RobotModel:
+    """Return the robot of a document, or of a mapping in one."""
+    robot = _robot(root)
+    controller = dict(root.pairs()).get("controller")
+    power = without_table() if controller is None else read_controller(controller, folder)
+    content = root.node.content
+    assert isinstance(content, dict)  # _robot has read it
+    if controller is not None:
+        own = controller_document(controller, power, folder)
+        content = {**content, "controller": Entry(controller.line, own)}
+    document = yaml_text(Node(root.line, content))
+    return replace(robot, controller=power, marks=marks_of(root.node), document=document)
+
+
+def _robot(root: Item) -> RobotModel:  # long: one line per field
+    top = root.table(_KEYS, _OPTIONAL)
     top["format"].choice((FORMAT,))
-    joints = top["joints"].table(_JOINT_KEYS)
+    joints = top["joints"].table(_JOINT_KEYS, ("rotation_abc_deg",))
     joint_names = tuple(item.name() for item in joints["names"].list(1, 16))
     n = len(joint_names)
     drives = top["drives"].table(_DRIVE_KEYS)
@@ -81,7 +134,7 @@ def robot_from_yaml(text: str, source: str = "<text>") -> RobotModel:  # long: o
             name=top["name"].name(),
             joint_names=joint_names,
             link_names=link_names,
-            joint_origin=_origins(figure(joints["origin_m"]).rows(3, -100, 100, "m", count=(n, n))),
+            joint_origin=_origins(joints, n),
             joint_axis=figure(joints["axis"]).rows(3, -1, 1, count=(n, n)),
             position_min=np.radians(_row(joints, "position_min_deg", n, -3600)),
             position_max=np.radians(_row(joints, "position_max_deg", n, -3600)),
@@ -98,13 +151,46 @@ def robot_from_yaml(text: str, source: str = "<text>") -> RobotModel:  # long: o
             copper_loss=_row(drives, "copper_loss_w_per_nm2", n),
             envelope_speed=speed,
             envelope_torque=torque,
-            counterbalance=_counterbalance(top["counterbalance"], joint_names),
+            counterbalance=_counterbalance(top.get("counterbalance"), joint_names),
             capsules=capsules,
             self_pairs=tuple(_pair(item) for item in top["self_pairs"].list(0, 1000)),
             load_self_capsules=tuple(item.name() for item in top["load_self_capsules"].list(0, 200)),
             machine_home=np.radians(_row(top, "machine_home_deg", n, -3600)),
             rated_payload=figure(top["rated_payload_kg"]).number(0, 1e4, "kg", above=True),
+            title=top["title"].text(64) if "title" in top else "",
         )
+
+
+def _read_joints(top: Table) -> None:
+    joints = top["joints"].table(_JOINT_KEYS, ("rotation_abc_deg",))
+    n = len(joints["names"].list(1, 16))
+    _origins(joints, n)
+    figure(joints["axis"]).rows(3, -1, 1, count=(n, n))
+    for key in _JOINT_KEYS[3:]:
+        _row(joints, key, n, -3600)
+
+
+def _read_drives(top: Table) -> None:
+    drives = top["drives"].table(_DRIVE_KEYS)
+    n = len(figure(drives["gear_ratio"]).list(1, 16))
+    for key in _DRIVE_KEYS[:-1]:
+        _row(drives, key, n)
+    _envelope(drives, n, _row(drives, "gear_ratio", n))
+
+
+def _read_capsules(top: Table) -> None:
+    names = tuple(dict(item.pairs())["name"].name() for item in top["links"].list(1, 17))
+    for item in top["capsules"].list(0, 200):
+        _capsule(item, names)
+
+
+_SECTIONS: tuple[Callable[[Table], object], ...] = (
+    lambda top: figure(top["rated_payload_kg"]).number(0, 1e4, "kg", above=True),
+    _read_joints,
+    _read_drives,
+    lambda top: [_link(item) for item in top["links"].list(1, 17)],
+    _read_capsules,
+)
 
 
 def inertia_matrix(entries: Sequence[float] | FloatArray) -> FloatArray:
@@ -117,9 +203,12 @@ def _row(table: Table, key: str, n: int, low: float = 0.0) -> FloatArray:
     return figure(table[key]).numbers(n, low, BIG)
 
 
-def _origins(offsets: FloatArray) -> FloatArray:
-    poses = np.tile(np.eye(4), (len(offsets), 1, 1))
-    poses[:, :3, 3] = offsets
+def _origins(joints: Table, n: int) -> FloatArray:
+    poses = np.tile(np.eye(4), (n, 1, 1))
+    poses[:, :3, 3] = figure(joints["origin_m"]).rows(3, -100, 100, "m", count=(n, n))
+    if "rotation_abc_deg" in joints:
+        angles = figure(joints["rotation_abc_deg"]).rows(3, -360, 360, "deg", count=(n, n))
+        poses[:, :3, :3] = [rotation_from_abc(abc) for abc in angles]
     return poses
 
 
@@ -159,7 +248,9 @@ def _envelope(drives: Table, n: int, gear_ratio: FloatArray) -> tuple[FloatArray
     return pairs[:, :, 0], np.hstack([peak[:, None], pairs[:, :, 1]])
 
 
-def _counterbalance(item: Item, joint_names: tuple[str, ...]) -> Counterbalance | None:
+def _counterbalance(item: Item | None, joint_names: tuple[str, ...]) -> Counterbalance | None:
+    if item is None:
+        return None
     if item.is_scalar():
         item.choice(("none",))
         return None

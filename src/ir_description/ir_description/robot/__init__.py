@@ -1,8 +1,18 @@
 """The robot, what it carries, and the power figures of its controller."""
 
-from ir_description.robot.frames import FramePose, fixed_frames, moving_frames
+from ir_description.robot.frames import TOOL0, FramePose, fixed_frames, moving_frames
 from ir_description.robot.load import MASS_MAX, Load, total_mass
-from ir_description.robot.power import ControllerMode, DcLink, EnergyShare, MeasuredPower, PlcBit, PowerData
+from ir_description.robot.power import (
+    NO_TABLE,
+    USUAL_LINK,
+    ControllerMode,
+    DcLink,
+    EnergyShare,
+    MeasuredPower,
+    PlcBit,
+    PowerData,
+    without_table,
+)
 from ir_description.robot.power_parameters import (
     AXIS_UNITS,
     SCALARS,
@@ -18,8 +28,11 @@ __all__ = [
     "AXIS_UNITS",
     "DATA_SHEET",
     "MASS_MAX",
+    "NO_TABLE",
     "RELATIVE_DEVIATION",
     "SCALARS",
+    "TOOL0",
+    "USUAL_LINK",
     "ControllerMode",
     "Counterbalance",
     "DcLink",
@@ -38,4 +51,5 @@ __all__ = [
     "physical_bounds",
     "prior",
     "total_mass",
+    "without_table",
 ]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from ir_description.arrays import in_range
 from ir_description.errors import UnknownNameError
@@ -28,8 +29,8 @@ class ControllerMode:
 
     def __post_init__(self) -> None:
         in_range(self.controller_watts, 0.0, 1e5, "W", f"controller_watts of {self.name}")
-        for field in ("time_to_pause", "regular_time_to_operate", "minimum_stay", "time_min_pause"):
-            in_range(getattr(self, field), 0.0, 1e6, "s", f"{field} of {self.name}")
+        for name in ("time_to_pause", "regular_time_to_operate", "minimum_stay", "time_min_pause"):
+            in_range(getattr(self, name), 0.0, 1e6, "s", f"{name} of {self.name}")
         in_range(self.pe_mode_id, 0, 255, "", f"pe_mode_id of {self.name}")
 
 
@@ -87,7 +88,11 @@ class EnergyShare:
 
 @dataclass(frozen=True)
 class PowerData:
-    """All of a controller's power figures; tool watts belong to the tool (Load)."""
+    """All of a controller's power figures; tool watts belong to the tool (Load).
+
+    table_2_robot: the robot that Table II was measured with, "" where there is no such table. marks: how sure
+    each figure is, by its place in the file.
+    """
 
     name: str
     modes: tuple[ControllerMode, ...]
@@ -101,6 +106,8 @@ class PowerData:
     wake_on_lan_ports: tuple[int, ...]
     table_2: tuple[MeasuredPower, ...]
     table_1: tuple[EnergyShare, ...]
+    table_2_robot: str = ""
+    marks: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         in_range(self.drives_and_brake_release, 0.0, 1e5, "W", "drives_and_brake_release")
@@ -115,12 +122,21 @@ class PowerData:
         """Energy [J] that fits into the DC link before braking energy is dissipated."""
         return self.dc_link.capacity_energy
 
+    @property
+    def has_table(self) -> bool:
+        """Whether there are modes to rest in; without, a robot that waits stands on its motors."""
+        return len(self.modes) > 1
+
     def mode(self, name: str) -> ControllerMode:
         """Return the mode of that name."""
         for mode in self.modes:
             if mode.name == name:
                 return mode
         raise UnknownNameError("power mode", name, (mode.name for mode in self.modes))
+
+    def resting(self, name: str) -> ControllerMode:
+        """The mode of that name; where there is no table that of standing on motors."""
+        return self.mode(name) if self.has_table else self.modes[0]
 
     def measured(self, payload: float, mode: str) -> float:
         """Return Table II's watts for a payload of 0 or 155 kg in a mode."""
@@ -130,3 +146,33 @@ class PowerData:
         raise UnknownNameError(
             "row of Table II", f"{payload:g} kg {mode}", (f"{r.payload:g} kg {r.mode}" for r in self.table_2)
         )
+
+
+NO_TABLE = "no_table"
+"""Name of the figures of a controller whose power modes are not known."""
+NEVER = 604_800.0
+"""s until brakes close that no controller closes by itself: a week, the longest pause there is."""
+USUAL_LINK = DcLink(capacitance=1e-3, voltage=560.0, chopper_on=688.0, chopper_off=668.0, brake_resistor=20.0)
+"""Of drives on 400 V mains (an estimate): 79 J of braking energy fit in."""
+
+
+def without_table(
+    watts: float = 0.0, link: DcLink = USUAL_LINK, marks: Mapping[str, str] | None = None
+) -> PowerData:
+    """A controller that only stands on motors, with `watts` [W] of its own (0: not counted)."""
+    standing = ControllerMode("STAND_ON_MOTORS", 0xFF, watts, 0.0, 0.0, 0.0, 0.0)
+    return PowerData(
+        name=NO_TABLE,
+        modes=(standing,),
+        operate_manual_pe_mode_id=0xF0,
+        drives_and_brake_release=0.0,
+        motors_to_brakes_in_program=NEVER,
+        motors_to_brakes_in_command=NEVER,
+        dc_link=link,
+        plc_inputs=(),
+        plc_outputs=(),
+        wake_on_lan_ports=(),
+        table_2=(),
+        table_1=(),
+        marks=marks or {},
+    )

@@ -5,11 +5,13 @@ Figures and their sources: data/robots/*.yaml, docs/robot_data.md. n joints, lin
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range
+from ir_description.robot.power import PowerData, without_table
 from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -67,6 +69,8 @@ class RobotModel:
     capsules: of the links, without tool. self_pairs: names of the robot's own capsules that can touch.
     load_self_capsules: robot capsules that every capsule of a load is checked against.
     machine_home (n,) rad: the posture of Table II. rated_payload kg: tool and part together.
+    title: maker and model, for people. controller: its power figures. marks: how sure each figure is, H, M or
+    L, by its place in the file. document: the robot file as text; "" for a bundled robot: its name is enough.
     """
 
     name: str
@@ -98,6 +102,10 @@ class RobotModel:
     iron_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
     inverter_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
     gear_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    title: str = field(default="", repr=False)
+    controller: PowerData = field(default_factory=without_table, repr=False)
+    marks: Mapping[str, str] = field(default_factory=dict, repr=False)
+    document: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
