@@ -68,7 +68,7 @@ class Chains:
         """Chains through stations from start (n,). Raises StageError where a stop has no configuration."""
         cell, settings = planner.cell, planner.settings
         steps = placed_steps(cell, steps_of(cell, stations), cell.parts_at_start())
-        scenes = Scenes(cell, planner.power, settings.drives, options.load == NO_LOAD)
+        scenes = Scenes(cell, planner.scene().power, settings.drives, options.load == NO_LOAD)
         route = Route.over(steps, scenes)
         context = Context(
             scenes.of(cell.parts_at_start()), options, _journal(planner, options, len(stations))

@@ -9,7 +9,7 @@ import pinocchio
 import pytest
 
 from ir_description import CellFileError, RobotModel, bundled_robots, cell_from_yaml, load_robot, robot_urdf
-from ir_kernels import Chain, DynamicsModel, SphericalWristIk
+from ir_kernels import Chain, DynamicsModel, inverse_kinematics
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, parse_goal
 from ir_sim_driver.controller.assembly import make_simulation
@@ -52,9 +52,9 @@ def test_pinocchio_reads_its_urdf_and_agrees_on_kinematics_and_dynamics(robot: R
         assert np.abs(chain.link_poses(q[k : k + 1])[0, -1] - last).max() < POSITION
 
 
-def test_the_closed_form_finds_every_configuration_from_its_pose(robot: RobotModel) -> None:
+def test_the_inverse_kinematics_finds_every_configuration_from_its_pose(robot: RobotModel) -> None:
     chain = Chain(robot)
-    solver = SphericalWristIk(chain, robot.position_min, robot.position_max)
+    solver = inverse_kinematics(chain, robot.position_min, robot.position_max)
     q = configurations(robot)
     solutions = solver.solve(chain.tcp_poses(q))
     for k, one in enumerate(q):
@@ -79,7 +79,8 @@ def test_a_movement_is_planned_certified_and_driven_at_the_planned_energy(robot:
     planner = Planner(itertools.repeat(0.0).__next__)
     cell = planner.set_cell(CELL.format(name=robot.name), "")
     home = np.array(robot.machine_home)
-    goal = parse_goal("A1 30 A2 -80 A3 80 A4 20 A5 -20 A6 30", cell)
+    there = np.degrees(home) + np.array([30.0, 10.0, -10.0, 20.0, -20.0, 30.0])
+    goal = parse_goal(" ".join(f"A{k} {angle:.6f}" for k, angle in enumerate(there, start=1)), cell)
     plan = planner.plan_regional(home, goal, PlanOptions())
     assert plan.status.ok, plan.status.message
     assert plan.report.certified

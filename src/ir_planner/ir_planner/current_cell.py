@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from threading import Lock
 
-from ir_description import Cell, cell_from_yaml, cell_hash, load_cell
+from ir_description import Cell, PowerData, cell_from_yaml, cell_hash, load_cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
@@ -24,13 +24,20 @@ def read_cell_here(cell_yaml: str, cell_file: str) -> Cell:
 class CurrentCell:
     """Holds one immutable cell after the other; a scene that was taken never changes.
 
-    heard: what the driver says. drives: asked for each scene, what is assumed of them.
+    heard: what the driver says. drives: asked for each scene, what is assumed of them. power: the
+    controller's figures, None: those of the cell's robot.
     Changes wait for each other, readers for none: a cell is replaced when it is read and its models are
     built.
     """
 
-    def __init__(self, heard: Heard, drives: Callable[[], Drives], read: ReadCell = read_cell_here) -> None:
-        self._heard, self._drives, self._read = heard, drives, read
+    def __init__(
+        self,
+        heard: Heard,
+        drives: Callable[[], Drives],
+        power: PowerData | None = None,
+        read: ReadCell = read_cell_here,
+    ) -> None:
+        self._heard, self._drives, self._power, self._read = heard, drives, power, read
         self._cell: Cell | None = None
         self._changing = Lock()
         self._hashed: tuple[Cell | None, str] = None, ""
@@ -84,18 +91,22 @@ class CurrentCell:
         so the tool.
         """
         cell = self.cell
-        key = self._key(load or self._attached(cell))
+        key = self._key(load or self._attached(cell), cell)
         known, scene = self._scenes.get(key, (None, None))
         if scene is None or known is not cell:
             scene = self._scene_of(cell, key[0])
             self._scenes[key] = cell, scene
         return scene
 
-    def _key(self, load: str) -> tuple[str, Drives, float]:
-        return load, self._drives(), self._heard.data.motors_to_brakes_in_program
+    def power(self, cell: Cell) -> PowerData:
+        """The figures of a cell's controller as planned with, with the timer that counts."""
+        return self._heard.of(self._drives().power(self._power or cell.robot.controller))
+
+    def _key(self, load: str, cell: Cell) -> tuple[str, Drives, float]:
+        return load, self._drives(), self.power(cell).motors_to_brakes_in_program
 
     def _scene_of(self, cell: Cell, load: str) -> PlanningScene:
-        scene = scene_with(cell, load, self._heard.data, self._drives())
+        scene = scene_with(cell, load, self.power(cell), self._drives())
         return replace(scene, cell_hash=self.hash_of(cell))
 
     def _replaced_by(self, cell: Cell) -> Cell:
@@ -106,7 +117,7 @@ class CurrentCell:
             load = load_text(cell)
         scene = self._scene_of(cell, load)
         scene.thresholds(0.0)
-        self._scenes = {self._key(load): (cell, scene)}  # nothing of former cells is kept
+        self._scenes = {self._key(load, cell): (cell, scene)}  # nothing of former cells is kept
         self._cell = cell
         return cell
 

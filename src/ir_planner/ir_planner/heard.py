@@ -9,21 +9,20 @@ from ir_msgs_py.transitions import TransitionTimes
 
 
 class Heard:
-    """timers, load: what the driver says, None while no driver does. data: the controller's figures as its
-    file has them; settings: asked for the transition times where no driver says them.
+    """timers, load: what the driver says, None while no driver does. settings: asked for the transition times
+    where no driver says them.
     """
 
-    def __init__(self, data: PowerData, settings: Callable[[], TransitionTimes]) -> None:
-        self._data, self._settings = data, settings
+    def __init__(self, settings: Callable[[], TransitionTimes]) -> None:
+        self._settings = settings
         self.timers: ControllerTimers | None = None
         self.load: CarriedLoad | None = None
 
-    @property
-    def data(self) -> PowerData:
-        """The controller's figures, with the timer that counts."""
-        if self.timers is None:
-            return self._data
-        return replace(self._data, motors_to_brakes_in_program=self.timers.brakes_after)
+    def of(self, data: PowerData) -> PowerData:
+        """A controller's figures as its file has them, with the timer that counts."""
+        if self.timers is None or not data.has_table:
+            return data
+        return replace(data, motors_to_brakes_in_program=self.timers.brakes_after)
 
     @property
     def transitions(self) -> TransitionTimes:

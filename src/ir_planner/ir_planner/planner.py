@@ -6,7 +6,7 @@ Every request takes one immutable snapshot of the cell; changing the cell meanwh
 from collections.abc import Callable
 from dataclasses import replace
 
-from ir_description import Cell, PowerData, load_power_data
+from ir_description import Cell, PowerData
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
@@ -73,7 +73,8 @@ _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 class Planner:
     """Answers requests about one cell. Methods raise RequestError for requests that make no sense.
 
-    clock: seconds, only for ceilings and for the times that answers report. read_cell: what reads cells.
+    clock: seconds, only for ceilings and for the times that answers report. power: the controller's figures,
+    None: those of the cell's robot. read_cell: what reads cells.
     """
 
     def __init__(
@@ -85,9 +86,8 @@ class Planner:
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
-        self.power = self.settings.drives.power(power or load_power_data())
-        self.heard = Heard(self.power, lambda: self.settings.transitions)
-        self._current = CurrentCell(self.heard, lambda: self.settings.drives, read_cell)
+        self.heard = Heard(lambda: self.settings.transitions)
+        self._current = CurrentCell(self.heard, lambda: self.settings.drives, power, read_cell)
         megabytes = self.settings.stored_megabytes
         self.trajectories = trajectory_store(self.settings.stored_trajectories, megabytes)
         self.programs = program_store(self.settings.stored_programs, megabytes)
@@ -268,7 +268,7 @@ class Planner:
         options, note = self._checked(options)
         start = within_limits(start, cell := self.cell, "start", StatusCode.START_STATE_INVALID)
         cycle = bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s")
-        data, settings = self.heard.data, replace(self.settings, transitions=self.heard.transitions)
+        data, settings = self._current.power(cell), replace(self.settings, transitions=self.heard.transitions)
         request = ProgramRequest(cell, data, stations, start, options, cycle, settings, savings, front_points)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._work(options, cancelled, stops), progress)

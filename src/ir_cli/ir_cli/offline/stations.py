@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ir_description import Cell, PartPlaces, Station, load_power_data
+from ir_description import Cell, PartPlaces, Station
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.program.steps import Scenes
 from ir_planner.scene import PlanningScene
@@ -27,7 +27,7 @@ def visits(cell: Cell) -> Iterator[Visit]:
     """Every station as the program finds it when it arrives and as it leaves it; as it is before the program
     where that does not go. Each situation once.
     """
-    scenes = Scenes(cell, load_power_data())
+    scenes = Scenes(cell, cell.robot.controller)
     start = cell.parts_at_start()
     found: dict[str, list[PartPlaces]] = {station.name: [] for station in cell.stations}
     places = start

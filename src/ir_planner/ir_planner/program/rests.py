@@ -127,6 +127,8 @@ class Rests:
         """The steps with the brakes that the controller closes by itself."""
         if steps and steps[0].at <= self.timer:
             return steps
+        if not self.modes:  # nothing to rest in: motors stay on
+            return steps
         brakes = Step(self.named(BRAKES), self.timer)
         return (
             brakes,
@@ -165,5 +167,6 @@ def rests_at(q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Res
                 times.leave(name),
             )
             for name in REST_MODES[1:]
+            if name in [mode.name for mode in scene.power.modes]
         ),
     )

@@ -126,7 +126,7 @@ def advice(lengths: Lengths, q: FloatArray, scene: PlanningScene, times: Transit
         saving_high=within.high,
         saving_on_motors=rests.motors * float(lengths.likely.mean()) - cost.expected,
         timer=rests.timer,
-        alternatives=tuple(_mode(name, q, scene, times) for name in REST_MODES),
+        alternatives=tuple(_mode(name, q, scene, times) for name in _known_modes(scene)),
         energies=_alone(rests, lengths, by_itself),
         modes=modes,
         switch_times=switches,
@@ -192,7 +192,7 @@ def _alone(rests: Rests, lengths: Lengths, by_itself: float) -> tuple[float, ...
 def _shown(rests: Rests, steps: Steps, most: float) -> tuple[tuple[str, ...], tuple[float, ...]]:
     """Names and switch times [s] of a sequence, from the mode that the pause begins in."""
     if not steps or steps[0].at > 0.0:
-        closed = not steps and most > rests.timer
+        closed = not steps and rests.modes and most > rests.timer
         brakes = (Step(rests.named(BRAKES), rests.timer),) if closed else ()
         shown = (*steps, *brakes)
         return (MOTORS, *(step.rest.name for step in shown)), (0.0, *(step.at for step in shown))
@@ -218,15 +218,21 @@ def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
     )
 
 
+def _known_modes(scene: PlanningScene) -> list[str]:
+    """Names of the modes that the controller has, shallow to deep."""
+    return [name for name in REST_MODES if name in [mode.name for mode in scene.power.modes]]
+
+
 def break_even(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
     """Pause [s] at q (n,) from which a mode saves against the next shallower one, both entered from motors;
     inf: never.
     """
-    k = REST_MODES.index(name)
+    known = _known_modes(scene)
+    k = known.index(name)
     if k == 0:
         return 0.0
     motors = mode_watts(MOTORS, q, scene)
-    shallower, deeper = REST_MODES[k - 1], name
+    shallower, deeper = known[k - 1], name
     watts = [mode_watts(mode, q, scene) for mode in (shallower, deeper)]
     extra = [
         (motors - power) * (times.enter(mode) + times.leave(mode))

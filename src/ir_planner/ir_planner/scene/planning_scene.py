@@ -19,9 +19,16 @@ from ir_description import (
     PowerParameters,
     Station,
     Zone,
-    data_sheet,
+    data_sheet_of,
 )
-from ir_kernels import Chain, CollisionModel, DcBusParameters, DynamicsModel, SphericalWristIk
+from ir_kernels import (
+    Chain,
+    CollisionModel,
+    DcBusParameters,
+    DynamicsModel,
+    InverseKinematics,
+    inverse_kinematics,
+)
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
@@ -89,9 +96,9 @@ class PlanningScene:
         return CollisionModel(self.chain, capsules, bodies, pairs, ignored)
 
     @cached_property
-    def inverse_kinematics(self) -> SphericalWristIk:
-        """Closed form, all branches and turns."""
-        return SphericalWristIk(self.chain, self.cell.robot.position_min, self.cell.robot.position_max)
+    def inverse_kinematics(self) -> InverseKinematics:
+        """All branches and turns, by the method that the arm allows."""
+        return inverse_kinematics(self.chain, self.cell.robot.position_min, self.cell.robot.position_max)
 
     @cached_property
     def weights(self) -> FloatArray:
@@ -122,7 +129,7 @@ class PlanningScene:
     @cached_property
     def parameters(self) -> PowerParameters:
         """What the joules follow from."""
-        return self.drives.parameters or data_sheet(self.cell.robot.name, self.power.name)
+        return self.drives.parameters or data_sheet_of(self.cell.robot, self.power)
 
     @cached_property
     def unloaded(self) -> DynamicsModel:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, data_sheet
+from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, data_sheet_of
 from ir_description.robot import DcLink
 from ir_kernels import KernelError
 from ir_msgs_py.errors import InvalidValueError
@@ -52,6 +52,9 @@ class _Analyser:
         power = recording.power if recording.power is not None and len(recording.power.time) > 1 else None
         meter = Meter(power) if power is not None else None
         cell = self._cell()
+        if cell is not None and not recording.power_yaml:  # the controller of its robot
+            self.data = cell.robot.controller
+            self.link = recorded_link(recording, self.data)
         loads = load_timeline(recording)
         results = self._results(executed_steps(recording), meter, cell)
         span = float(power.time[-1] - power.time[0]) if power is not None else recording.duration
@@ -107,7 +110,7 @@ class _Analyser:
             return self._resting(mode, result.step, cell)
 
         def change(mode: str) -> float:
-            own = self.data.mode(mode)
+            own = self.data.resting(mode)
             return own.time_to_pause + own.regular_time_to_operate
 
         timer = self.data.motors_to_brakes_in_program
@@ -163,7 +166,7 @@ class _Analyser:
     def _indirect(self, cell: Cell | None) -> IndirectMeter | None:
         if self.recording.joints is None or cell is None:
             return None
-        parameters = data_sheet(cell.robot.name, self.data.name)
+        parameters = data_sheet_of(cell.robot, self.data)
         link = self.data.dc_link
         return IndirectMeter(self.recording.joints, cell.robot, cell.base_pose, link, parameters)
 

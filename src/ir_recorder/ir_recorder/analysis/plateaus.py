@@ -82,7 +82,8 @@ def _plateau(mode: str, load: str, power: float, seconds: float, cell: Cell, dat
     known = load == NO_LOAD or len(loads) == len(load.split(LOAD_SEPARATOR))
     payload = float(sum(item.mass for item in loads)) if known else NAN
     expected = resting_watts(mode, cell.robot.machine_home, cell, loads, data) if known else NAN
-    table_2 = data.measured(round(payload), mode) if known and _of_the_paper(loads, payload, data) else NAN
+    of_the_paper = known and cell.robot.name == data.table_2_robot and _of_the_paper(loads, payload, data)
+    table_2 = data.measured(round(payload), mode) if of_the_paper else NAN
     return Plateau(mode, load, payload, power, expected, table_2, seconds)
 
 

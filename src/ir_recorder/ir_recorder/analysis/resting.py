@@ -15,7 +15,7 @@ _BUS_UP = (MOTORS, BRAKES)  # modes in which the drive bus feeds the tool
 
 def resting_watts(mode: str, q: FloatArray, cell: Cell, loads: tuple[Load, ...], data: PowerData) -> float:
     """W at the mains in a mode at q (n,): controller, tool, and with motors on drives and holding torque."""
-    watts = data.mode(mode).controller_watts + sum(load.watts_always for load in loads)
+    watts = data.resting(mode).controller_watts + sum(load.watts_always for load in loads)
     if mode in _BUS_UP:
         watts += sum(load.watts_drive_bus for load in loads)
     if mode != MOTORS:

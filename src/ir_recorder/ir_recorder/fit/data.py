@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description import Cell, Load, PowerParameters, load_power_data
+from ir_description import Cell, Load, PowerParameters
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis.loads import carried, load_timeline
 from ir_recorder.errors import FitError
@@ -57,7 +57,7 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
         runs = [(-np.inf, np.inf, carried(cell, source.load))]
     joints = _with(traces, cell.robot.joint_names)
     meter = _metered(traces)
-    model = PowerModel(cell.robot, load_power_data(prior.controller).dc_link, cell.base_pose, prior)
+    model = PowerModel(cell.robot, cell.robot.controller.dc_link, cell.base_pose, prior)
     notes = [problem for trace in traces for problem in trace.problems]
     if source.meter is not None:
         mapping = source.meter_mapping or TraceMapping()

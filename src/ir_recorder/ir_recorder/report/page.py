@@ -60,6 +60,7 @@ def report_html(
     known = not math.isnan(analysis.safety_distance)
     drawn = analysis.safety_distance if known else (tolerances or Tolerances()).safety_distance
     name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
+    controller = load_power_data() if analysis.cell is None else analysis.cell.robot.controller
     parts = {
         "title": text(f"{name} – report of a recording"),
         "name": text(name),
@@ -68,7 +69,7 @@ def report_html(
         "verdict": verdict(checks),
         "notes": notes(analysis),
         "tiles": tiles(analysis, costs or Costs()),
-        "capacity": text(joules(load_power_data().dc_link_capacity_energy)),
+        "capacity": text(joules(controller.dc_link_capacity_energy)),
         "costs": costs_section(analysis, costs or Costs()),
         "front": front_section(analysis, front),
         "levers": lever_section(analysis, costs or Costs()),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ir_description import Cell, PowerData, load_cell, load_power_data
+from dataclasses import replace
+
+from ir_description import Cell, PowerData, load_cell
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.plant import (
@@ -14,6 +16,7 @@ from ir_sim_driver.plant import (
     make_backend,
     plant_named,
 )
+from ir_sim_driver.power import IdleTimes
 
 CELL_TOOL = "cell"
 """Load text that means the tool of the cell."""
@@ -37,9 +40,12 @@ def make_simulation(
     cell = load_cell(cell) if isinstance(cell, str) else cell
     if load == CELL_TOOL:
         load = "none" if cell.tool is None else cell.tool.name
-    what, data = carried(cell, load), data or load_power_data()
+    what, data = carried(cell, load), data or cell.robot.controller
     plant = plant_named(plant, cell.robot, data) if isinstance(plant, str) else plant
     if backend == IDEAL:
         plant = ideal_plant(cell.robot, data)
+    if not data.has_table:  # no mode to rest in: the brakes stay open while the robot waits
+        timers = IdleTimes(data.motors_to_brakes_in_program, data.motors_to_brakes_in_command)
+        settings = replace(settings, idle=timers)
     robot = make_backend(backend, cell, settings.dt, settings.control, plant)
     return Simulation(cell, data, robot, what, settings, plant)

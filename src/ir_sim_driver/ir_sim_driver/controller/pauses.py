@@ -63,7 +63,7 @@ class Pauses:
         return self._entered_from(source)
 
     def _entered_from(self, source: Mode) -> tuple[PowerMode, ...]:
-        times = self._modes.times
+        times = {mode: rest for mode, rest in self._modes.times.items() if mode in self._pe_ids}
         if self._plc.no_hibernation:
             times = {mode: rest for mode, rest in times.items() if mode is not Mode.HIBERNATION}
         return mode_table(times, self._power, self._pe_ids, source)

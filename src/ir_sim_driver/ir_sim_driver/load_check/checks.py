@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ir_description import Cell, Load, load_power_parameters, robot_marks
+from ir_description import DATA_SHEET, Cell, Load, data_sheet_of, load_power_parameters
 from ir_sim_driver.load_check.estimate import Declared, LoadFinding, weighed
 from ir_sim_driver.load_check.settings import LoadCheckSettings
 from ir_sim_driver.load_check.uncertainty import Uncertainty
@@ -20,9 +20,11 @@ class LoadChecks:
     """
 
     def __init__(self, cell: Cell, settings: LoadCheckSettings, notices: Notices, period: float) -> None:
-        parameters = load_power_parameters(settings.parameters)
+        own = settings.parameters not in ("", DATA_SHEET)
+        sheet = data_sheet_of(cell.robot, cell.robot.controller)
+        parameters = load_power_parameters(settings.parameters) if own else sheet
         self._settings, self._notices = settings, notices
-        self._robot = Uncertainty(cell.robot, parameters, robot_marks(cell.robot.name), cell.base_pose)
+        self._robot = Uncertainty(cell.robot, parameters, cell.robot.marks, cell.base_pose)
         self._watch = LoadWatch(period)
         self._declared: Declared | None = None
         self.last: LoadFinding | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ir_description import RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import JointNamesError, TrajectoryError
 from ir_msgs_py.ros.conversions import (
@@ -21,7 +22,6 @@ from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
-_HARDWARE = "KR210 R2700 extra, simulated"
 _LABEL_MAX = 64  # four times a trajectory id; a longer one would be published 50 times a second
 
 
@@ -67,9 +67,14 @@ def _label(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text[:_LABEL_MAX])
 
 
-def condition_of(entry: Entry) -> Condition:
-    """A part of the driver for /diagnostics."""
-    return Condition(entry.name, entry.level, entry.sentence, entry.values, _HARDWARE)
+def hardware_id(robot: RobotModel) -> str:
+    """The robot as /diagnostics names it."""
+    return f"{robot.title or robot.name}, simulated"
+
+
+def condition_of(entry: Entry, hardware: str) -> Condition:
+    """A part of the driver for /diagnostics; hardware: see `hardware_id`."""
+    return Condition(entry.name, entry.level, entry.sentence, entry.values, hardware)
 
 
 def fill_joint_state(msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, torque: FloatArray) -> None:

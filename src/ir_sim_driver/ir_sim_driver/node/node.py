@@ -34,7 +34,7 @@ from ir_sim_driver.node.executions import Executions
 from ir_sim_driver.node.grid import FOREIGN, OWN, SYSTEM
 from ir_sim_driver.node.links import open_links
 from ir_sim_driver.node.markers import robot_markers
-from ir_sim_driver.node.messages import condition_of
+from ir_sim_driver.node.messages import condition_of, hardware_id
 from ir_sim_driver.node.parameters import DriverParameters
 from ir_sim_driver.node.plc_topic import PlcTopic
 from ir_sim_driver.node.real_time import GridThread, ScaledClock
@@ -76,6 +76,7 @@ class SimDriver(Node):
         )
         steps = round(1.0 / (options.joint_state_rate * simulation.settings.dt))
         self._driver = Driver(simulation, steps, configuration.wake_hint)
+        self._hardware = hardware_id(simulation.robot)
         self._frame: Frame | None = None
         self._last_words = 0.0
         self._open_topics()
@@ -236,7 +237,7 @@ class SimDriver(Node):
         snapshot = self._driver.snapshot(self._plant.worst_lag, self._plant.lag)
         for notice in shortened(snapshot.notices, _LINES_MAX):
             self._log(notice)
-        self._diagnostics.publish(condition_of(entry) for entry in snapshot.entries)
+        self._diagnostics.publish(condition_of(entry, self._hardware) for entry in snapshot.entries)
 
     def _log(self, notice: Notice) -> None:
         # a line of its own for each severity: rclpy lets a line log with one severity only

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ir_description import Cell, load_power_data
+from ir_description import Cell
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant.backend import Backend
 from ir_sim_driver.plant.control import ControlSettings
@@ -36,4 +36,4 @@ def make_backend(
     """
     if name not in BACKENDS:
         raise SettingsError(f"backend is {name[:80]!r}: known are {', '.join(BACKENDS)}")
-    return BACKENDS[name](cell, dt, control, plant or nominal_plant(cell.robot, load_power_data()))
+    return BACKENDS[name](cell, dt, control, plant or nominal_plant(cell.robot, cell.robot.controller))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ir_description import InvalidValueError, PowerData, RobotModel
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import MODES, Mode
 
 NOMINAL = "nominal"
 VOLTAGE_SHARE = 0.9
@@ -146,7 +146,7 @@ def torque_constants(robot: RobotModel, voltage: float) -> FloatArray:
 
 def standing_watts(data: PowerData) -> StandingWatts:
     """What the data say."""
-    controller = {Mode[mode.name]: mode.controller_watts for mode in data.modes}
+    controller = {row.mode: data.resting(row.mode.name).controller_watts for row in MODES}
     return StandingWatts(controller, data.drives_and_brake_release)
 
 

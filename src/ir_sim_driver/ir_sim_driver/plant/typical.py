@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_description import PowerData, RobotModel, power_marks, robot_marks
+from ir_description import PowerData, RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.plant.plant_parameters import (
     DriveFigures,
@@ -76,9 +76,9 @@ class _Draw:
 
 
 def typical_plant(robot: RobotModel, data: PowerData, seed: int) -> Plant:
-    """The plant of this seed. Raises UnknownNameError where the robot or controller is not a bundled one."""
+    """The plant of this seed."""
     draw = _Draw(np.random.default_rng(seed))
-    marks, power = robot_marks(robot.name), power_marks(data.name)
+    marks, power = robot.marks, data.marks
     nominal = nominal_plant(robot, data)
     return Plant(
         f"{TYPICAL}:{seed}",

@@ -1,0 +1,136 @@
+"""`ir robot check`: what a robot's data lack, before anything is planned with it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ir_description import Load, RobotModel
+from ir_kernels import (
+    Chain,
+    CollisionModel,
+    DynamicsModel,
+    InputError,
+    SearchedIk,
+    SphericalWristIk,
+    ThreeParallelIk,
+    inverse_kinematics,
+)
+from ir_kernels.arm_lines import arm_lines
+from ir_msgs_py.arrays import FloatArray
+
+MARGIN = 0.02  # m, the default of a request
+POSTURES = 2000  # random ones in which the drives hold the arm
+METHODS = {
+    SphericalWristIk: "closed form (spherical wrist)",
+    ThreeParallelIk: "closed form (axes 2, 3 and 4 parallel)",
+    SearchedIk: "search over axis 4 (no spherical wrist)",
+}
+
+
+class Remark(NamedTuple):
+    """error: nothing can be planned. warning: plans are possible, but. note: good to know."""
+
+    severity: Literal["error", "warning", "note"]
+    subject: str
+    sentence: str
+
+
+def remarks_on(robot: RobotModel) -> tuple[Remark, ...]:
+    """What is to be said of a robot, errors first."""
+    chain = Chain(robot)
+    try:
+        arm_lines(chain)
+    except InputError as error:
+        return (Remark("error", "axes", str(error)),)
+    solver = inverse_kinematics(chain, robot.position_min, robot.position_max)
+    found = [
+        Remark("note", "inverse kinematics", METHODS[type(solver)]),
+        *_home(robot, chain),
+        *_torque(robot),
+        *_speed(robot),
+        *_controller(robot),
+        *_marks(robot),
+    ]
+    order = ("error", "warning", "note")
+    return tuple(sorted(found, key=lambda remark: order.index(remark.severity)))
+
+
+def _home(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
+    if not robot.self_pairs:
+        yield Remark("warning", "self_pairs", "is empty: the robot is never checked against itself")
+        return
+    model = CollisionModel(chain, robot.capsules, (), robot.self_pairs)
+    distance = model.distances(robot.machine_home[None])[0]
+    for z in np.flatnonzero(distance <= MARGIN):
+        pair, depth = model.pairs[int(z)], 1e3 * float(distance[z])
+        yield Remark(
+            "error",
+            "machine_home_deg",
+            f"{pair.body_a} and {pair.body_b} are {depth:.1f} mm apart there, must be above "
+            f"{1e3 * MARGIN:g} mm: choose another posture, or smaller capsules",
+        )
+
+
+def _torque(robot: RobotModel) -> Iterator[Remark]:
+    """Whether the drives hold the arm, empty and with the rated payload at the flange."""
+    load = Load("payload", "tool", robot.rated_payload, np.zeros(3), np.eye(3) * 1e-6)
+    home = robot.machine_home[None]
+    postures = np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (POSTURES, robot.n))
+    for what, loads in (("empty", ()), (f"with {robot.rated_payload:g} kg at the flange", (load,))):
+        yield from _held(robot, home, loads, "error", f"at machine home, {what},")
+        yield from _held(robot, postures, loads, "warning", f"in one of {POSTURES} postures, {what},")
+
+
+def _held(
+    robot: RobotModel,
+    q: FloatArray,
+    loads: tuple[Load, ...],
+    severity: Literal["error", "warning"],
+    where: str,
+) -> Iterator[Remark]:
+    still = np.zeros_like(q)
+    torque = np.abs(DynamicsModel(robot, loads).inverse_dynamics(q, still, still)).max(axis=0)
+    for i in np.flatnonzero(torque >= robot.envelope_torque[:, 0]):
+        yield Remark(
+            severity,
+            robot.joint_names[i],
+            f"{where} gravity needs {torque[i]:.0f} Nm, the drive has {robot.envelope_torque[i, 0]:.0f} Nm",
+        )
+
+
+def _speed(robot: RobotModel) -> Iterator[Remark]:
+    for i, name in enumerate(robot.joint_names):
+        ramp = robot.velocity_max[i] / robot.acceleration_max[i]
+        if not 0.02 <= ramp <= 5.0:
+            limits = f"{robot.velocity_max[i]:.3g} rad/s and {robot.acceleration_max[i]:.3g} rad/s^2"
+            yield Remark(
+                "warning", name, f"reaches full speed in {ramp:.3g} s ({limits}), usual are 0.02 to 5 s"
+            )
+        needed = robot.acceleration_max[i] * robot.reflected_inertia[i]
+        if needed > robot.envelope_torque[i, 0]:
+            have = f"the drive has {robot.envelope_torque[i, 0]:.0f} Nm"
+            yield Remark(
+                "warning", name, f"the rotor alone needs {needed:.0f} Nm at full acceleration, {have}"
+            )
+
+
+def _controller(robot: RobotModel) -> Iterator[Remark]:
+    power = robot.controller
+    if power.has_table:
+        return
+    watts = power.modes[0].controller_watts
+    counted = f"{watts:g} W while it stands" if watts else "no watts of its own: energies leave it out"
+    yield Remark("note", "controller", f"without a table of power modes, pauses stay on motors; {counted}")
+
+
+def _marks(robot: RobotModel) -> Iterator[Remark]:
+    count = Counter(robot.marks.values())
+    if count["L"]:
+        guessed = sorted(place for place, mark in robot.marks.items() if mark == "L")
+        listed = ", ".join(guessed[:8]) + (f" and {len(guessed) - 8} more" if len(guessed) > 8 else "")
+        total = sum(count.values())
+        yield Remark("note", "estimates", f"{count['L']} of {total} figures are estimates: {listed}")
