@@ -50,10 +50,10 @@ def export_krl(
             StatusCode.INVALID_MOTION_PLAN,
             "timing is asynchronous: a controller's motions end all axes together, plan with synchronous",
         )
-    cell, power, drives = planner.cell, planner.heard.data, planner.settings.drives
-    judge = judge_of(movements, cell, power, drives, chosen.safety_distance)
+    scene = planner.scene("")
+    judge = judge_of(movements, planner.cell, scene.power, planner.settings.drives, chosen.safety_distance)
     try:
-        return export(movements, name, planner.scene(""), judge)
+        return export(movements, name, scene, judge)
     except KrlError as error:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, str(error)) from error
 
