@@ -9,7 +9,7 @@ import pytest
 from mcap.reader import make_reader
 
 from ir_recorder.errors import PathError, SplitError
-from ir_recorder.format.parts import Split, part_path
+from ir_recorder.format.parts import Split, is_further_part, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.read.raw import RawRecording, read_raw
 from ir_recorder.write.session import CellFiles, RecordingSession
@@ -95,6 +95,14 @@ def test_files_that_are_missing_or_of_another_recording_are_named_or_left_out(tm
     other = recorded(tmp_path / "other.mcap", Split(duration=1.5), 11)
     other.paths[1].rename(parts.paths[2])
     assert len(messages_of(read_raw(parts.path))["/joint_states"]) == count - own
+
+
+def test_a_folder_counts_a_recording_in_several_files_once(tmp_path: Path) -> None:
+    parts = recorded(tmp_path / "parts.mcap", Split(duration=3.0), 12)
+    further = [is_further_part(path, read_raw(path).fact("part")) for path in parts.paths]
+    assert further == [False, *[True] * (len(further) - 1)]
+    parts.path.unlink()
+    assert not is_further_part(parts.paths[1], "1")  # nothing else gives what it holds
 
 
 def test_files_that_are_too_small_or_would_meet_others_are_refused(tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.external_meter import with_meter
 from ir_recorder.arguments import add_roots
 from ir_recorder.errors import ReadError, RecorderError
+from ir_recorder.format import contents
+from ir_recorder.format.parts import is_further_part
 from ir_recorder.read.front import recorded_front
 from ir_recorder.read.reader import read_recording
 from ir_recorder.read.recording import Recording
@@ -65,6 +67,8 @@ def _analyses(options: argparse.Namespace, roots: FileRoots) -> list[Analysis]:
     for path, named in _paths(options.files, roots):
         try:
             recording = read_recording(path, roots, namespace=options.namespace)
+            if not named and is_further_part(path, recording.fact(contents.PART)):
+                continue  # its first file has given all
             analysis = analyse(_metered(recording, options, roots))
         except ReadError as error:
             if named:

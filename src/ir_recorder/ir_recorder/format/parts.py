@@ -44,6 +44,12 @@ def part_path(first: Path, part: int) -> Path:
     return first if part == 0 else first.with_name(f"{first.stem}_{part}{first.suffix}")
 
 
+def is_further_part(path: Path, part: str) -> bool:
+    """Whether a file with the fact `part` goes on what a first file beside it begins."""
+    first = path.with_name(f"{path.stem.removesuffix(f'_{part}')}{path.suffix}")
+    return part not in ("", "0") and first != path and first.exists()
+
+
 def part_facts(recording: str, part: int, repeated: Mapping[str, int]) -> dict[str, str]:
     """The metadata record of a part; repeated: how many messages of a topic it has again at its begin."""
     return {
