@@ -58,6 +58,15 @@ def test_without_a_meter_there_are_no_flows_and_no_levers(analysis: Analysis) ->
     assert levers(bare) == ()
 
 
+def test_a_meter_of_the_mains_alone_shows_no_flows(analysis: Analysis) -> None:
+    power = analysis.recording.power
+    assert power is not None
+    alone = replace(power, joint_power=np.full_like(power.joint_power, np.nan))
+    bare = analyse(replace(analysis.recording, power=alone))
+    assert sankey_section(bare) == ""
+    assert levers(bare) == ()
+
+
 def test_levers_are_at_most_the_joules_of_the_run(analysis: Analysis) -> None:
     found, program = levers(analysis), analysis.program
     assert program is not None

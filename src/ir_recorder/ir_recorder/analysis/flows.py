@@ -76,7 +76,8 @@ def energy_flows(analysis: Analysis) -> EnergyFlows | None:
     start, end = _span(analysis)
     inside = (power.time > start + 1e-9) & (power.time <= end + 1e-9)
     step = np.diff(power.time, prepend=power.time[:1])[inside]
-    axes = np.nan_to_num(power.joint_power[inside])
+    axes = power.joint_power[inside]
+    axes = np.nan_to_num(axes) if np.isfinite(axes).any() else axes  # a meter of the mains alone knows none
     tool = float(np.nan_to_num(power.tool_power[inside]) @ step)
     work, lifted, lowered = _mechanical(analysis, start, end)
     taken = float(step @ np.maximum(axes, 0.0).sum(axis=1))

@@ -10,7 +10,7 @@
   if (!data.axes.length) find("axes").hidden = true;
   let motion = null;
   if (data.scene) {
-    motion = new Motion(find("view"), timeline, data.scene);
+    motion = new Motion(find("view"), timeline, data.scene, data.safetyDistance);
     find("trail-max").textContent = `${motion.mostPower} W`;
   } else {
     find("no-motion").hidden = false;

@@ -4,7 +4,8 @@
 const RAMP = ["#2c6fd1", "#12b5cb", "#58c45b", "#f5c211", "#e8590c", "#c92a2a"];
 
 class Motion {
-  constructor(canvas, timeline, scene) {
+  constructor(canvas, timeline, scene, bound) {
+    this.bound = bound; /* m: a nearest pair below it is drawn in red */
     this.canvas = canvas;
     this.timeline = timeline;
     this.scene = scene;
@@ -229,7 +230,7 @@ class Motion {
     const hit = this.pairAt(time);
     if (!hit) return;
     const ends = (s) => [...s.subarray(3 * hit.k, 3 * hit.k + 3)].map((v) => v * 5e-4);
-    const tint = hit.c.distance[hit.k] < 0.02 ? this.tints.bad : this.tints.a3;
+    const tint = hit.c.distance[hit.k] < this.bound ? this.tints.bad : this.tints.a3;
     const line = this.renderer.path(new Float32Array([...ends(hit.c.a), ...ends(hit.c.b)]), new Float32Array([...tint, ...tint]), false);
     this.renderer.drawPath(line, { wide: 3, onTop: true });
     this.renderer.release(line);
