@@ -87,6 +87,30 @@ def test_forty_random_loads_are_carried_or_refused(cell: Cell, capfd: pytest.Cap
     assert "Bad inertia" not in said
 
 
+def needle(generator: np.random.Generator) -> np.ndarray:
+    """Inertia (6,) of a body whose least moment is what rounding leaves."""
+    turn = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+    tensor: np.ndarray = (turn @ np.diag([1e-17, 1.0, 1.0]) @ turn.T)[np.triu_indices(3)]
+    return tensor * 10.0 ** generator.uniform(-6.0, 0.0)
+
+
+def test_what_is_taken_as_a_load_can_be_scaled_and_weighed(cell: Cell) -> None:
+    """The load check compares with heavier loads in proportion, whose inertia rounding turned negative."""
+    generator, simulation = np.random.default_rng(0), make_simulation(cell, backend="ideal")
+    refused = 0
+    for _ in range(60):
+        tensor = needle(generator)
+        try:
+            load = custom_load(cell, 10.0, np.array([0.1, 0.0, 0.0]), tensor, 0.0, 0.0)
+        except RequestRefusedError as error:
+            assert "principal moment" in str(error)
+            refused += 1
+            continue
+        simulation.set_load(load)
+        assert simulation.load is load
+    assert refused == 60
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
 def test_two_thousand_random_loads_are_carried_or_refused(cell: Cell, seed: int) -> None:

@@ -63,18 +63,26 @@ def _is_rigid(rows: list[list[float]]) -> bool:
     return all(within) and right_handed and last == [0.0, 0.0, 0.0, 1.0]
 
 
+NEEDLE = 1e-12
+"""Least principal moment of inertia over the largest: that of a rod of 1 m and a thousandth of a millimetre."""
+
+
 def frozen_inertia(value: ArrayLike, name: str) -> FloatArray:
     """Return a read-only (3, 3) inertia [kg m^2], refusing what no body can have.
 
     A body's inertia is symmetric and positive definite, and its principal moments satisfy the triangle
-    inequality (each is at most the sum of the other two).
+    inequality (each is at most the sum of the other two). What only rounding keeps positive is refused too:
+    scaled or turned it would be none.
     """
     inertia = frozen(value, (3, 3), name)
     if np.abs(inertia - inertia.T).max() > 1e-12 * max(1.0, float(np.abs(inertia).max())):
         raise InvalidValueError(f"{name} is not symmetric")
     moments = np.linalg.eigvalsh(inertia)
-    if moments[0] <= 0.0:
-        raise InvalidValueError(f"{name} has a principal moment of {moments[0]:.4g} kg m^2, must be above 0")
+    if moments[0] <= NEEDLE * moments[2]:
+        least = NEEDLE * moments[2] if moments[0] > 0.0 else 0.0
+        raise InvalidValueError(
+            f"{name} has a principal moment of {moments[0]:.4g} kg m^2, must be above {least:.2g}"
+        )
     if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
         raise InvalidValueError(
             f"{name} breaks the triangle inequality: principal moment {moments[2]:.4g} kg m^2 is above "
