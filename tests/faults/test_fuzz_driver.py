@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_description import load_cell
+from ir_description import Cell, load_cell
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
@@ -70,10 +70,12 @@ Judge = neighbour("judging").Judge
 class Fuzz:
     """One driver under attack; generator: whatever is random."""
 
-    def __init__(self, generator: np.random.Generator, backend: str = "ideal") -> None:
+    def __init__(
+        self, generator: np.random.Generator, backend: str = "ideal", cell: str | Cell = BARE
+    ) -> None:
         self.random = generator
         settings = SimulationSettings(transitions=SHORT, controller=ControllerSettings(enabling_switch=True))
-        self.simulation = make_simulation(BARE, backend=backend, settings=settings)
+        self.simulation = make_simulation(cell, backend=backend, settings=settings)
         self.driver = Driver(self.simulation, steps=1)
         self.tables = ControllerTables(self.driver.plc, 2.0)
         self.judge = Judge(self.simulation.robot)
@@ -145,6 +147,22 @@ def harmless_goal(fuzz: Fuzz) -> None:
     kinds = ((), (rest,), (rest, rest))
     trajectory = JointTrajectory.from_seconds(names, [duration], target[None], *fuzz.some(*kinds[1:]))
     fuzz.execute(TrajectoryGoal(trajectory))
+
+
+def colliding_goal(fuzz: Fuzz) -> None:
+    """One that may touch something, said to be known; within the limits, and driven."""
+    names, home = fuzz.simulation.robot.joint_names, np.array(fuzz.simulation.cell.machine_home)
+    reach = np.array([2.0, 0.9, 0.9, 2.0, 1.5, 2.0])
+    target, rest = home + fuzz.random.uniform(-reach, reach), np.zeros((1, 6))
+    path = JointTrajectory.from_seconds(names, [fuzz.some(2.5, 4.0)], target[None], rest, rest)
+    fuzz.execute(TrajectoryGoal(path, allow_collision=True))
+    fuzz.ride(int(fuzz.random.integers(1, 4_000)))
+
+
+def machine_signal(fuzz: Fuzz) -> None:
+    """A machine that closes onto the robot, or opens; a name that nobody has."""
+    switches = [each.switch.signal for each in fuzz.simulation.cell.equipment if each.switch is not None]
+    fuzz.driver.cell_side.hear_signal(fuzz.some("", "x" * 100_000, *switches), bool(fuzz.random.integers(2)))
 
 
 def broken_message(fuzz: Fuzz) -> None:
@@ -252,17 +270,19 @@ def parameters(fuzz: Fuzz) -> None:
 Act = Callable[[Fuzz], None]
 RATES: dict[Act, float] = {
     goal: 25, harmless_goal: 15, broken_message: 10, cancel: 5, scale: 6, press: 6, bit: 8, switch: 4,
-    modbus: 6, load: 5, pause: 3, sleep_and_wake: 2, parameters: 4,
+    modbus: 6, load: 5, pause: 3, sleep_and_wake: 2, parameters: 4, colliding_goal: 4, machine_signal: 3,
 }  # fmt: skip
 ACTS = list(RATES)
 WEIGHTS = np.array(list(RATES.values())) / sum(RATES.values())
 
 
-def attacked(cases: int, seed: int, backend: str = "ideal") -> tuple[Counter[str], list[str]]:
+def attacked(
+    cases: int, seed: int, backend: str = "ideal", cell: str | Cell = BARE
+) -> tuple[Counter[str], list[str]]:
     """Counts of what was done and refused, and what broke a law."""
     generator, done, wrong = np.random.default_rng(seed), Counter[str](), []
     for first in range(0, cases, 250):
-        fuzz = Fuzz(generator, backend)
+        fuzz = Fuzz(generator, backend, cell)
         for case in range(first, min(first + 250, cases)):
             fuzz.case()
             wrong += [f"case {case} of seed {seed}: {each}" for each in fuzz.judge.wrong]
@@ -287,6 +307,19 @@ def test_twenty_thousand_hostile_requests_break_no_law(seed: int) -> None:
 
 def test_sixty_hostile_requests_to_the_physics_break_no_law() -> None:
     assert attacked(60, seed=2, backend="pybullet")[1] == []
+
+
+def test_hostile_requests_among_machines_break_no_law() -> None:
+    """Contacts and machines that close are part of it."""
+    done, wrong = attacked(100, seed=3, cell="demo")
+    assert wrong == []
+    assert min(done[name] for name in ("colliding_goal", "machine_signal")) > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(4))
+def test_four_thousand_hostile_requests_among_machines_break_no_law(seed: int) -> None:
+    assert attacked(1_000, seed=300 + seed, cell="demo")[1] == []
 
 
 @pytest.mark.long

@@ -64,7 +64,7 @@ def _is_rigid(rows: list[list[float]]) -> bool:
 
 
 NEEDLE = 1e-12
-"""Least principal moment of inertia over the largest: that of a rod of 1 m and a thousandth of a millimetre."""
+"""Least principal moment of inertia over the largest: a rod of 1 m, a thousandth of a millimetre thick."""
 
 
 def frozen_inertia(value: ArrayLike, name: str) -> FloatArray:
