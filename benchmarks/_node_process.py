@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+ENDED = 60.0  # s; a busy machine takes long to end a node
 DOMAIN = "83"  # ROS_DOMAIN_ID where the caller has none: nobody else listens there
 
 
@@ -24,4 +25,4 @@ def running(module: str, **parameters: str | int) -> Iterator[subprocess.Popen[b
         yield process
     finally:
         process.send_signal(signal.SIGINT)
-        process.wait(10.0)
+        process.wait(ENDED)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+import rclpy
 from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -13,8 +15,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import QueryModes, SetPlcInput
+from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.quality import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_sim_driver.node import SimDriver
+from ir_sim_driver.node.plc_topic import PlcTopic
 
 PRESSED = PlcInputs(emergency_stop=True, move_enable=True)
 RELEASED = PlcInputs(move_enable=True)
@@ -35,6 +39,55 @@ def modes(ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any) -> 
     wait_for(lambda: len(heard) > 10, what="the driver publishes")
     assert PowerMode.EMERGENCY_STOP not in heard
     return heard
+
+
+class Heard:
+    """A driver that notes what the topic writes, and what it warns of."""
+
+    def __init__(self) -> None:
+        self.plc, self.warn = self, lambda sentence: self.said.append(sentence)
+        self.written: list[Any] = []
+        self.pressed: list[Any] = []
+        self.said: list[str] = []
+
+    def write_all_inputs(self, _writer: str, *levels: Any) -> None:
+        self.written.append(levels)
+
+    def write_inputs(self, _writer: str, levels: Any) -> None:
+        self.pressed.append(levels)
+
+
+def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    """A node that gets no processor for a while takes all that have come in one turn."""
+    driver, server = Heard(), BackgroundExecutor(ros_context)
+    held, go_on = threading.Event(), threading.Event()
+    try:
+        node = server.add_node(rclpy.create_node("busy", context=ros_context))
+        server.run(lambda: PlcTopic(node, driver))  # type: ignore[arg-type]
+        topic = "/ir_sim_driver/plc_inputs"
+        publisher = ros_executor.run(
+            lambda: ros_node.create_publisher(PlcInputs, topic, QoSProfile(depth=1000))
+        )
+        wait_for(publisher.get_subscription_count, what="the driver listens")
+        server._executor.create_task(lambda: (held.set(), go_on.wait(60.0)))
+        wait_for(held.is_set, what="the node is busy")
+        messages = [RELEASED] * 300 + [PRESSED] + [RELEASED] * 100
+        ros_executor.run(lambda: [publisher.publish(each) for each in messages])
+        ros_executor.run(lambda: publisher.publish(PlcInputs(emergency_stop=True, operating_mode=99)))
+        wait_for(lambda: publisher.wait_for_all_acked(), what="all have come")
+        go_on.set()
+        wait_for(lambda: driver.pressed, what="the last one is taken")
+    finally:
+        go_on.set()
+        server.close()
+    taken = [levels for turn in driver.written for levels in turn]
+    assert len(driver.written) < 10
+    assert [k for k, levels in enumerate(taken) if levels.emergency_stop] == [300]
+    assert len(taken) == 401
+    assert driver.pressed == [{"emergency_stop": True}]
+    assert "99" in driver.said[0]
 
 
 @pytest.mark.parametrize("durability", [DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE])

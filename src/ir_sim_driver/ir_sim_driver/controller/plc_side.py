@@ -52,10 +52,17 @@ class PlcSide:
         with self._access.writing() as simulation:
             simulation.plc.write(writer, levels)
 
-    def write_all_inputs(self, writer: str, inputs: PlcInputs) -> None:
-        """Set all levels at once. Raises RequestRefusedError."""
+    def write_all_inputs(self, writer: str, *inputs: PlcInputs) -> None:
+        """Set all levels at once, several times in a row. Raises RequestRefusedError when all are written."""
+        refusal: RequestRefusedError | None = None
         with self._access.writing() as simulation:
-            simulation.plc.write_all(writer, inputs)
+            for levels in inputs:
+                try:
+                    simulation.plc.write_all(writer, levels)
+                except RequestRefusedError as error:
+                    refusal = error
+            if refusal is not None:
+                raise refusal
 
     def write_mode_and_pause(self, writer: str, mode: OperatingMode | None, pause: float | None) -> None:
         """Turn the mode switch and start or end a pause, both or neither. Raises RequestRefusedError."""
