@@ -121,7 +121,7 @@ def test_a_press_by_service_counts_in_a_burst_and_all_are_answered(
     wait_for(client.service_is_ready, what="set_plc_input is offered")
     requests = [SetPlcInput.Request(name="emergency_stop", value=k == 0) for k in range(200)]
     futures = ros_executor.run(lambda: [client.call_async(request) for request in requests])
-    wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+    wait_for(lambda: all(future.done() for future in futures), timeout=120.0, what="all are answered")
     wait_for(lambda: PowerMode.EMERGENCY_STOP in modes, what="the stop is latched")
 
 
@@ -134,7 +134,7 @@ def test_more_requests_than_may_wait_are_all_answered(
     wait_for(client.service_is_ready, what="query_modes is offered")
     sent = range(REQUESTS_WAITING + 200)
     futures = ros_executor.run(lambda: [client.call_async(QueryModes.Request()) for _ in sent])
-    wait_for(lambda: all(future.done() for future in futures), timeout=60.0, what="all are answered")
+    wait_for(lambda: all(future.done() for future in futures), timeout=120.0, what="all are answered")
     refusals = {future.result().status.message for future in futures} - {""}
     assert all("are waiting: send fewer at once" in sentence for sentence in refusals)
 
