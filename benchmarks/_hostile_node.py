@@ -220,9 +220,7 @@ def _written(driver: Prey, requests: Sequence[bytes]) -> bool:
 def _latched(driver: Prey) -> bool:
     """Whether the stop shows and stays; however late, on a loaded machine."""
     executor, modes = driver.client._executor, driver.modes
-    executor.wait_until(
-        lambda: bool(modes) and modes[-1] == Mode.EMERGENCY_STOP, ANSWERED
-    )
+    executor.wait_until(lambda: bool(modes) and modes[-1] == Mode.EMERGENCY_STOP, ANSWERED)
     del modes[:]
     executor.wait_until(lambda: len(modes) >= 5, ANSWERED)
     return set(modes) == {int(Mode.EMERGENCY_STOP)}

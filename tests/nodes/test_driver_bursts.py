@@ -71,7 +71,12 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
             lambda: ros_node.create_publisher(PlcInputs, topic, QoSProfile(depth=1000))
         )
         wait_for(publisher.get_subscription_count, what="the driver listens")
-        server._executor.create_task(lambda: (held.set(), go_on.wait(60.0)))
+
+        def busy() -> None:
+            held.set()
+            go_on.wait(60.0)
+
+        server._executor.create_task(busy)
         wait_for(held.is_set, what="the node is busy")
         messages = [RELEASED] * 300 + [PRESSED] + [RELEASED] * 100
         ros_executor.run(lambda: [publisher.publish(each) for each in messages])
