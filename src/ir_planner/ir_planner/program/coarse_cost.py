@@ -2,9 +2,8 @@
 
 The descent is that of movements, on a spline with fewer points, without clearance. A movement that keeps
 clear of everything has one constraint more, so it costs as much or more, but for two things: the descent may
-end in a poorer local minimum than the planner's, and a coarse spline bends less. Both are small: over all
-edges of the bundled cells' programs the planner's movements cost 0.97 times the coarse solution or more
-(benchmarks/program.py prints the least ratio). MARGIN covers that.
+end in a poorer local minimum than the planner's, and a coarse spline bends less. MARGIN is for both;
+benchmarks/program.py judges it by what chosen chains cost above the best of all chains.
 """
 
 import numpy as np
