@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.action import CancelResponse
@@ -86,7 +86,7 @@ class ProgramRunnerNode(Node):
         self._signals = self.create_publisher(SignalMsg, "~/signals", _SIGNALS)
         self._machine_signals = self.create_publisher(SignalMsg, "~/machine_signals", _SIGNALS)
         self._program_state = self.create_publisher(ProgramStateMsg, "~/program_state", _KEPT)
-        CommandTopic(self, SignalMsg, "~/signals", self._hear_signal, of=lambda msg: msg.name)
+        CommandTopic(self, SignalMsg, "~/signals", self._hear_signals, of=lambda msg: msg.name)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
         self._last, self._diagnostics = Status.success(), RunnerDiagnostics(self)
@@ -207,6 +207,10 @@ class ProgramRunnerNode(Node):
     def _set_signal(self, signal: Signal) -> None:
         self._machines.set(signal, self._now())
         self._machine_signals.publish(signal_to_msg(self._stamped(signal)))
+
+    def _hear_signals(self, messages: Sequence[SignalMsg]) -> None:
+        for msg in messages:
+            self._hear_signal(msg)
 
     def _hear_signal(self, msg: SignalMsg) -> None:
         try:

@@ -5,7 +5,7 @@ Load, robot, timers and states of machines are latched; contacts are not.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -100,8 +100,9 @@ class Announcements:
             touched.header.stamp = self._now()
             self._contacts.publish(touched)
 
-    def _signalled(self, msg: Signal) -> None:
-        self._driver.cell_side.hear_signal(msg.name, bool(msg.value))
+    def _signalled(self, messages: Sequence[Signal]) -> None:
+        for msg in messages:
+            self._driver.cell_side.hear_signal(msg.name, bool(msg.value))
 
     def _now(self) -> Any:
         return self._node.get_clock().now().to_msg()
