@@ -101,11 +101,14 @@ class Chains:
         steps = zip(self.costs, chosen, chosen[1:], strict=False)
         return float(sum(cost[a, b] for cost, a, b in steps))
 
-    def nearest(self, stops: list[FloatArray]) -> list[int]:
-        """Index of the node at each stop whose interaction configuration is nearest to stops [(n,)]."""
+    def nearest(self, stops: list[tuple[FloatArray, FloatArray]]) -> list[int]:
+        """Index of the node at each stop whose configuration there, and the one outside, are nearest to those
+        of stops [((n,), (n,))]: one configuration may have several withdrawals.
+        """
         chosen = [0]
-        for layer, q in zip(self.layers[1:], stops, strict=True):
-            chosen.append(int(np.argmin([np.abs(node.interaction - q).max() for node in layer])))
+        for layer, (q, outside) in zip(self.layers[1:], stops, strict=True):
+            off = [np.abs([node.interaction - q, node.outside - outside]).max() for node in layer]
+            chosen.append(int(np.argmin(off)))
         return chosen
 
     def _shortest(self) -> tuple[list[int], float]:

@@ -145,14 +145,18 @@ def _ratios(plan: ProgramPlan, chains: Chains, best: float, options: PlanOptions
     return answer / best, along / best
 
 
-def _stops(plan: ProgramPlan) -> list[FloatArray]:
-    """Configuration (n,) at each stop: where an entry ends, or a regional movement that no entry follows."""
+def _stops(plan: ProgramPlan) -> list[tuple[FloatArray, FloatArray]]:
+    """Configuration (n,) at each stop, and where its line in begins: of an entry; or of a regional movement
+    that no entry follows, which ends at both.
+    """
     kinds = [str(movement.kind) for movement in plan.movements]
     ends = []
     for movement, following in zip(plan.movements, [*kinds[1:], ""], strict=True):
+        entry = movement.kind == MovementKind.SERVICE_ENTRY
         last = movement.kind == MovementKind.REGIONAL and following != MovementKind.SERVICE_ENTRY
-        if movement.trajectory is not None and (last or movement.kind == MovementKind.SERVICE_ENTRY):
-            ends.append(movement.trajectory.positions[-1])
+        if movement.trajectory is not None and (last or entry):
+            q = movement.trajectory.positions
+            ends.append((q[-1], q[0] if entry else q[-1]))
     return ends
 
 
