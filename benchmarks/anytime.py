@@ -21,7 +21,7 @@ from _program_chains import CEILING
 from _results import Claim, at_least, at_most, command_line, finish, line_of
 from _scaling_cells import tour, with_turns
 
-from ir_description import cell_to_yaml, load_cell
+from ir_description import load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, ProgramPlan, RequestError
 
@@ -75,8 +75,11 @@ class Watch:
 
 def planner_of(name: str, clock: Callable[[], float], turns: bool = False) -> Planner:
     """A planner with a cell, its scene built. turns: A4 and A6 turn farther."""
-    cell, planner = load_cell(name), Planner(clock)
-    planner.set_cell(cell_to_yaml(with_turns(cell, FAR) if turns else cell), "")
+    cell = with_turns(load_cell(name), FAR) if turns else load_cell(name)
+    planner = Planner(
+        clock, read_cell=lambda *_: cell
+    )  # the text of a cell doesn't say how far its robot turns
+    planner.set_cell("", name)
     planner.check_state(planner.cell.machine_home, 0.0, 1, "", "")
     return planner
 
