@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,17 @@ def replanned(folder: Path, demo: Path | None) -> dict[str, Any]:
     return {"case": "replan", "file": path.name, "requests": requests, "equal": equal, "ids": ids}
 
 
+def measured(folder: Path, given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """All rows, one after the other."""
+    yield streamed(folder, given.seconds)
+    row, run = reported(folder, given.minutes)
+    yield row
+    yield from reader_rows(run, 20_000)
+    yield replanned(folder, given.demo)
+    for number in range(given.kills):
+        yield {"case": "killed", "lost_s": seconds_lost(folder, number)}
+
+
 def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     """The figures that were asked for."""
 
@@ -145,12 +157,10 @@ def main() -> None:
         given.seconds, given.minutes, given.kills = 10.0, 2.0, 5
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        rows = [streamed(folder, given.seconds)]
-        row, run = reported(folder, given.minutes)
-        rows += [row, *reader_rows(run, 20_000), replanned(folder, given.demo)]
-        rows += [{"case": "killed", "lost_s": seconds_lost(folder, k)} for k in range(given.kills)]
-    for row in rows:
-        print(line_of(row))
+        rows: list[dict[str, Any]] = []
+        for row in measured(folder, given):
+            print(line_of(row), flush=True)
+            rows.append(row)
     finish(given.json, rows, claims_of(rows))
 
 
