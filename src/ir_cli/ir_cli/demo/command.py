@@ -18,8 +18,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     demo.add_argument("--seed", type=int, default=0, help="seed of the planner (0)")
     demo.add_argument(
         "--plant",
-        default="nominal",
-        help="the simulated plant: nominal (default; the watts of the data), typical:SEED, or a file",
+        default="typical",
+        help="the simulated plant: typical (default), typical:SEED, nominal (the watts of the data), or a file",
     )
     demo.set_defaults(run=run)
 
