@@ -7,6 +7,11 @@ import socket
 
 from ir_msgs_py.errors import InvalidValueError
 
+CONTROLLER_MAC = "02:00:00:c4:02:10"
+"""MAC address of the simulated controller, where nobody says another: driver and program runner have one."""
+WAKE_PORT = 9009
+"""UDP port that it listens on; the real one, 9, needs rights."""
+
 _SYNC = b"\xff" * 6
 _REPEATS = 16
 _PASSWORD_LENGTHS = (0, 4, 6)  # SecureOn

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ir_msgs_py.settings import check_settings, setting
-from ir_msgs_py.wake_on_lan import mac_bytes
+from ir_msgs_py.wake_on_lan import CONTROLLER_MAC, WAKE_PORT, mac_bytes
 
 _HOUR = 3600.0
 
@@ -53,12 +53,12 @@ class LinkSettings:
         "Cell file or bundled cell whose machines are simulated; empty: signals come from outside.",
         read_only=True,
     )
-    mac: str = setting("02:00:00:c4:02:10", "MAC address of the robot's controller.", read_only=True)
+    mac: str = setting(CONTROLLER_MAC, "MAC address of the robot's controller.", read_only=True)
     wake_address: str = setting(
         "127.0.0.1", "Where Wake-on-LAN packets go; may be a broadcast.", read_only=True
     )
     wake_port: int = setting(
-        9009, "UDP port of Wake-on-LAN; the real one is 9.", minimum=1, maximum=65535, read_only=True
+        WAKE_PORT, "UDP port of Wake-on-LAN; the real one is 9.", minimum=1, maximum=65535, read_only=True
     )
     response_timeout: float = setting(
         2.0,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ir_msgs_py.settings import check_settings, setting
-from ir_msgs_py.wake_on_lan import mac_bytes, wakes
+from ir_msgs_py.wake_on_lan import CONTROLLER_MAC, WAKE_PORT, mac_bytes, wakes
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc.port import Controller, OpenLink
 
@@ -24,12 +24,10 @@ class WakeOnLan:
     name: ClassVar[str] = "wake_on_lan"
     sets_inputs: ClassVar[bool] = False
 
-    mac: str = setting(
-        "02:00:00:c4:02:10", "MAC address that a Wake-on-LAN packet has to carry.", read_only=True
-    )
+    mac: str = setting(CONTROLLER_MAC, "MAC address that a Wake-on-LAN packet has to carry.", read_only=True)
     wake_host: str = setting("127.0.0.1", "Address the Wake-on-LAN listener is bound to.", read_only=True)
     wake_port: int = setting(
-        9009,
+        WAKE_PORT,
         "UDP port of the Wake-on-LAN listener; 0 takes a free one. The real one is 9.",
         minimum=0,
         maximum=65535,
