@@ -53,6 +53,19 @@ def planned(client: Client, goal: str = "A1 20 A2 -90 A3 90 A4 0 A5 0 A6 0") -> 
     return report_from_msg(answer.report), trajectory_from_msg(found.trajectory)
 
 
+def test_a_change_of_load_has_the_time_of_the_plant_which_may_lag(
+    make_driver: Any, client: Client, wait_for: Any
+) -> None:
+    make_driver()
+    client.ask(names.SET_LOAD, SetLoad.Request(load="none"))
+
+    def changed() -> Any:
+        heard = client.next_message(names.CARRIED_LOAD, CarriedLoad)
+        return heard if heard.load == "none" else None
+
+    assert wait_for(changed).header.stamp.nanosec % 2_000_000 == 0  # the grid of joint_states
+
+
 @pytest.mark.parametrize("latched", [True, False])
 def test_a_signal_that_was_sent_before_the_driver_started_counts(
     make_driver: Any, ros_context: Any, ros_executor: Any, client: Client, wait_for: Any, latched: bool

@@ -19,7 +19,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     demo.add_argument(
         "--plant",
         default="typical",
-        help="the simulated plant: typical (default), typical:SEED, nominal (the watts of the data), or a file",
+        help="the simulated plant: typical (default), typical:SEED, nominal (the data), or a file",
     )
     demo.set_defaults(run=run)
 

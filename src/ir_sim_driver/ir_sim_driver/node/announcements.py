@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.time import Time
 from std_msgs.msg import String
 
 from ir_description import DescriptionError, cell_from_yaml
@@ -105,7 +106,9 @@ class Announcements:
             self._driver.cell_side.hear_signal(msg.name, bool(msg.value))
 
     def _now(self) -> Any:
-        return self._node.get_clock().now().to_msg()
+        """Time of the plant, which may lag; before its first tick, of the clock."""
+        stamp = self._driver.stamp_ns
+        return Time(nanoseconds=stamp).to_msg() if stamp else self._node.get_clock().now().to_msg()
 
     def _heard(self, msg: CellState) -> None:
         self._cells.submit(self._read, msg)
