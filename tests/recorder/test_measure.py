@@ -47,7 +47,7 @@ def test_torques_are_those_of_the_kernels(seed: int, turned: bool) -> None:
         pose[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         pose[:3, 0] *= np.linalg.det(pose[:3, :3])
     loads = cell.loads(cell.parts[0].name)
-    own = arm_torques(cell.robot, loads, pose, q, qd, qdd)
+    own = arm_torques(cell.robot, loads, pose, np.stack([q, qd, qdd]))
     model = DynamicsModel(cell.robot, loads, pose)
     total = own.links + own.loads + own.rotors - own.counterbalance
     robot = cell.robot

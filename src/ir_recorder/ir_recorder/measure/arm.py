@@ -44,14 +44,10 @@ class _Frame:
 
 
 def arm_torques(
-    robot: RobotModel,
-    loads: Sequence[Load],
-    base_pose: FloatArray,
-    q: FloatArray,
-    qd: FloatArray,
-    qdd: FloatArray,
+    robot: RobotModel, loads: Sequence[Load], base_pose: FloatArray, motion: FloatArray
 ) -> ArmTorques:
-    """Torques at q, qd, qdd (N, n) of the robot with loads, mounted at base_pose (4, 4)."""
+    """Torques at motion (3, N, n), which is q, qd, qdd, of the robot with loads at base_pose (4, 4)."""
+    q, qd, qdd = motion
     N, n = q.shape
     axes, places = np.empty((n, N, 3)), np.empty((n, N, 3))
     links, held = np.zeros((N, n)), np.zeros((N, n))

@@ -35,7 +35,7 @@ class Prepared:
 
 class PowerModel:
     """Watts of one robot; `layout` names the parameters, the vectors of which the methods take; `bodies`
-    computes torques as `arm_torques` does at q, qd, qdd (N, n).
+    computes torques at motion (3, N, n) as `arm_torques` does.
     """
 
     def __init__(
@@ -55,14 +55,14 @@ class PowerModel:
     def prepare(self, samples: Samples) -> Prepared:
         """Torques of the bodies at every sample; where the motion is unknown the robot counts as at rest."""
         known = samples.known[:, None]
-        q, qd, qdd = (np.where(known, each, 0.0) for each in (samples.q, samples.qd, samples.qdd))
-        q = np.where(known, q, self._robot.machine_home)
+        motion = np.where(known, [samples.q, samples.qd, samples.qdd], 0.0)
+        motion[0] = np.where(known, samples.q, self._robot.machine_home)
         parts = [np.zeros((len(samples), self._robot.n)) for _ in range(4)]
         watts = np.zeros(len(samples))
         bus_up = np.isin(samples.mode, [k for k, mode in enumerate(self.layout.modes) if mode in _BUS_UP])
         for k in np.unique(samples.load):
             rows, loads = samples.load == k, samples.loads[k] if k >= 0 else ()
-            own = self._bodies(self._robot, loads, self._pose, q[rows], qd[rows], qdd[rows])
+            own = self._bodies(self._robot, loads, self._pose, motion[:, rows])
             for part, each in zip(parts, (own.links, own.loads, own.rotors, own.counterbalance), strict=True):
                 part[rows] = each
             watts[rows] = sum(load.watts_always for load in loads)
