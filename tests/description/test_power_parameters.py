@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import (
+    DescriptionError,
     DescriptionFileError,
     InvalidValueError,
     PowerParameters,
@@ -114,6 +115,17 @@ def test_what_a_file_does_not_name_stays_as_the_data_have_it(sheet: PowerParamet
         ("parameters: [{name: gear.joint_a1, value: 0.95, deviation: 1}]", "[0, 0.9]"),
         ("parameters: [{name: drives_watts, value: 1, deviation: 1, unit: Nm}]", "must be W"),
         ("parameters: [{name: load_mass, value: 1, deviation: -1}]", "must be in [0"),
+        ("parameters: [{name: load_mass, value: .nan, deviation: 1}]", "value is"),
+        ("parameters: [{name: load_mass, value: 1, deviation: .inf}]", "deviation is"),
+        (
+            "parameters: [{name: load_mass, value: 1, deviation: 1e308}]",
+            "deviation is 1e308, must be in [0, 1e+12]",
+        ),
+        ("parameters: [{name: load_mass, value: 1e308, deviation: 1}]", "value is 1e308, must be"),
+        ("parameters: [{name: load_mass, value: one, deviation: 1}]", "one"),
+        ("parameters: {load_mass: 1}", "must be a list"),
+        ("parameters: []\ncorrelation: {names: [load_mass, link_mass], below: [[.nan]]}", "nan"),
+        ("parameters: []\ncorrelation: {names: [load_mass, load_mass], below: [[0]]}", "twice"),
         (
             "parameters:\n" + 2 * "- {name: load_mass, value: 1, deviation: 1}\n",
             "named twice",
@@ -131,6 +143,42 @@ def test_a_file_that_makes_no_sense_is_refused_by_name(rest: str, named: str, tm
     with pytest.raises(DescriptionFileError) as refused:
         load_power_parameters(str(path))
     assert named in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "named"),
+    [
+        (HEAD.replace("kr_c4", "kr_c5"), "kr_c5"),
+        (HEAD.replace("kr210_r2700_extra", "arm"), "arm"),
+        (HEAD.replace("/1", "/2"), "ir_description/power_parameters/1"),
+        ("\0", "other.yaml"),
+    ],
+)
+def test_a_file_of_something_else_is_refused_by_name(head: str, named: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "other.yaml"
+    path.write_text(head + "parameters: []\n", encoding="utf-8")
+    with pytest.raises(DescriptionError, match=named):
+        load_power_parameters(str(path))
+
+
+def test_what_a_file_leaves_open_is_drawn_within_physics(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "open.yaml"
+    rows = ["{name: load_mass, value: 1, deviation: 1e12}", "{name: gear.joint_a1, value: 0, deviation: 1e9}"]
+    below = "correlation: {names: [load_mass, gear.joint_a1], below: [[0.999999]]}\n"
+    path.write_text(f"{HEAD}parameters: [{', '.join(rows)}]\n{below}", encoding="utf-8")
+    read = load_power_parameters(str(path))
+    low, high = physical_bounds(read.names)
+    draws = read.draws(50, 0)
+    assert ((draws >= low) & (draws <= high)).all()
+
+
+def test_a_file_of_100_mb_is_refused_before_it_is_read(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "huge.yaml"
+    with path.open("w", encoding="utf-8") as file:
+        file.write(HEAD)
+        file.truncate(100_000_000)
+    with pytest.raises(DescriptionFileError, match="bytes"):
+        load_power_parameters(str(path))
 
 
 def test_unknown_names_list_the_known(sheet: PowerParameters) -> None:
