@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from _driven_movements import Driven, all_predicted
+from _over_seeds import over_seeds
 from _results import at_least, at_most
 from _truth_section import Asked, Found
 
@@ -21,10 +23,8 @@ def measured(asked: Asked) -> Found:
     cells = QUICK if asked.quick else asked.cells
     for objective in QUICK_OBJECTIVES if asked.quick else OBJECTIVES:
         every = all_predicted(cells, objective)
-        rows += [
-            {"plant": f"typical:{seed}", "objective": objective, **_driven(every, seed)}
-            for seed in range(asked.seeds)
-        ]
+        work = partial(_driven, every, objective)
+        rows += over_seeds(work, range(asked.seeds))
     kept = sum(row["movements"] - row["failed"] for row in rows) / sum(row["movements"] for row in rows)
     return Found(
         rows,
@@ -35,7 +35,7 @@ def measured(asked: Asked) -> Found:
     )
 
 
-def _driven(every: Sequence[Any], seed: int) -> dict[str, Any]:
+def _driven(every: Sequence[Any], objective: str, seed: int) -> dict[str, Any]:
     """What a plant makes of all movements; energies of those that ended successful."""
     plants: dict[str, Driven] = {}
     off, tool, error, settling, failed = [], [0.0], [0.0], [0.0], 0
@@ -52,6 +52,8 @@ def _driven(every: Sequence[Any], seed: int) -> dict[str, Any]:
             failed += 1
     shares = np.array(off)
     return {
+        "plant": f"typical:{seed}",
+        "objective": objective,
         "movements": len(every),
         "failed": failed,
         "tool_mm": 1e3 * max(tool),

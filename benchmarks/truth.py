@@ -8,11 +8,11 @@ Each section is a module `_truth_NAME.py` with a TITLE and a function `measured(
 
 from __future__ import annotations
 
-import time
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from _over_seeds import processor_time
 from _results import Claim, command_line, finish, line_of
 from _truth_section import Asked
 
@@ -40,11 +40,11 @@ def main() -> None:
     for name in arguments.only or sections():
         module = import_module(f"_truth_{name}")
         print(f"-- {name}: {module.TITLE}", flush=True)
-        begun = time.process_time()
+        begun = processor_time()
         found = module.measured(asked)
         for row in found.rows:
             print(line_of(row), flush=True)
-        print(f"   {time.process_time() - begun:.1f} s of processor", flush=True)
+        print(f"   {processor_time() - begun:.1f} s of processor", flush=True)
         rows += [{"section": name, **row} for row in found.rows]
         claims += found.claims
     finish(arguments.json, rows, claims)
