@@ -7,12 +7,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from ir_description import DescriptionError, PowerParameters, load_power_parameters
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.external_meter import with_meter
 from ir_recorder.arguments import add_roots
-from ir_recorder.errors import ReadError, RecorderError
+from ir_recorder.errors import FitError, ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.parts import is_further_part
 from ir_recorder.read.front import recorded_front
@@ -33,6 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
     parser.add_argument("--namespace", help="of the cell, where the recording holds several")
+    words = "what joules are predicted and rebuilt by, as a fit writes it (the plan's, and the data sheet)"
+    parser.add_argument("--power-parameters", default="", metavar="FILE", help=words)
     add_roots(parser)
     parser.add_argument("--costs", default="", help="prices, shifts and CO2 (YAML); else as assumed")
     meter = "a power meter's file (.csv, .parquet) in place of the recorded watts, of one recording"
@@ -63,13 +66,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _analyses(options: argparse.Namespace, roots: FileRoots) -> list[Analysis]:
     """The recordings asked for; one of a folder that can't be read is named and left out."""
-    analyses = []
+    analyses, parameters = [], _parameters(options.power_parameters)
     for path, named in _paths(options.files, roots):
         try:
             recording = read_recording(path, roots, namespace=options.namespace)
             if not named and is_further_part(path, recording.fact(contents.PART)):
                 continue  # its first file has given all
-            analysis = analyse(_metered(recording, options, roots))
+            analysis = analyse(_metered(recording, options, roots), parameters)
         except ReadError as error:
             if named:
                 raise
@@ -102,6 +105,13 @@ def _paths(files: Sequence[str], roots: FileRoots) -> list[tuple[Path, bool]]:
     if len(paths) > MOST:
         raise ReadError(f"{len(paths)} recordings are too many to compare: at most {MOST}")
     return paths
+
+
+def _parameters(path: str) -> PowerParameters | None:
+    try:
+        return load_power_parameters(path) if path else None
+    except DescriptionError as error:
+        raise FitError(str(error)) from error
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,12 +5,19 @@ stations, power at rest, the grid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, PowerData, cell_from_yaml, data_sheet_of
-from ir_description.robot import DcLink
+from ir_description import (
+    Cell,
+    DescriptionError,
+    PowerData,
+    PowerParameters,
+    cell_from_yaml,
+    data_sheet_of,
+)
+from ir_description.robot import DATA_SHEET, DcLink
 from ir_kernels import KernelError
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES
@@ -21,6 +28,7 @@ from ir_recorder.analysis.loads import carried, load_timeline
 from ir_recorder.analysis.meter import Meter
 from ir_recorder.analysis.plateaus import plateaus
 from ir_recorder.analysis.power_data import recorded_link, recorded_power_data
+from ir_recorder.analysis.predicted import Predictor
 from ir_recorder.analysis.resting import MOTORS, resting_watts
 from ir_recorder.analysis.results import NAN, Analysis, StepResult, Unshortened
 from ir_recorder.analysis.shares import mode_shares, station_uses
@@ -30,14 +38,18 @@ from ir_recorder.format import contents
 from ir_recorder.read.recording import Recording
 
 
-def analyse(recording: Recording) -> Analysis:
-    """All results that a recording allows; missing topics leave gaps and a sentence."""
-    return _Analyser(recording).analysis()
+def analyse(recording: Recording, parameters: PowerParameters | None = None) -> Analysis:
+    """All results that a recording allows; missing topics leave gaps and a sentence.
+
+    parameters: what joules of movements are predicted and rebuilt by; None: the plan's own, and the data's.
+    """
+    return _Analyser(recording, parameters).analysis()
 
 
 @dataclass
 class _Analyser:
     recording: Recording
+    parameters: PowerParameters | None = None
     problems: list[str] = field(default_factory=list)
     data: PowerData = field(init=False)
     link: DcLink = field(init=False)
@@ -56,7 +68,8 @@ class _Analyser:
             self.data = cell.robot.controller
             self.link = recorded_link(recording, self.data)
         loads = load_timeline(recording)
-        results = self._results(executed_steps(recording), meter, cell)
+        steps = self._predicted(executed_steps(recording), cell)
+        results = self._results(steps, meter, cell)
         span = float(power.time[-1] - power.time[0]) if power is not None else recording.duration
         energy = meter.energy(-np.inf, np.inf) if meter is not None else NAN
         return Analysis(
@@ -166,9 +179,31 @@ class _Analyser:
     def _indirect(self, cell: Cell | None) -> IndirectMeter | None:
         if self.recording.joints is None or cell is None:
             return None
-        parameters = data_sheet_of(cell.robot, self.data)
+        parameters = self.parameters or data_sheet_of(cell.robot, self.data)
         link = self.data.dc_link
         return IndirectMeter(self.recording.joints, cell.robot, cell.base_pose, link, parameters)
+
+    def _predicted(self, steps: Sequence[ExecutedStep], cell: Cell | None) -> Sequence[ExecutedStep]:
+        """The steps with the energies that the given parameters predict for their movements."""
+        parameters = self.parameters
+        if parameters is None or cell is None:
+            named = {step.movement.report.power_parameters for step in steps} - {"", DATA_SHEET}
+            if named and parameters is None:
+                self.problems.append(
+                    f"planned by the power parameters {min(named)[:80]}; energies from positions follow the "
+                    f"data sheet: name their file with --power-parameters"
+                )
+            return steps
+        predictor = Predictor(cell.robot, self.link, cell.base_pose, parameters)
+        found = []
+        for step in steps:
+            movement = step.movement
+            if movement.trajectory is not None:
+                loads = carried(cell, movement.load)
+                report = predictor.report(movement.report, movement.trajectory, loads)
+                step = replace(step, movement=replace(movement, report=report))
+            found.append(step)
+        return found
 
     def _clearances(
         self, steps: Sequence[ExecutedStep], cell: Cell | None

@@ -1,0 +1,49 @@
+"""What given power parameters predict for planned movements, with the 90 % interval.
+
+The plan's own figures are of the parameters that it was planned with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ir_description import Load, PowerParameters, RobotModel
+from ir_description.robot import DcLink
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_recorder.measure import PowerModel, planned_samples
+
+_DRAWS = 400
+_LEVELS = (0.05, 0.95)
+
+
+class Predictor:
+    """Energies of movements of one robot, mounted at base_pose (4, 4), by these parameters."""
+
+    def __init__(
+        self, robot: RobotModel, link: DcLink, base_pose: FloatArray, parameters: PowerParameters
+    ) -> None:
+        self._model, self._parameters = PowerModel(robot, link, base_pose, parameters), parameters
+        self._draws = parameters.draws(_DRAWS, 0)
+
+    def report(
+        self, planned: TrajectoryReport, trajectory: JointTrajectory, loads: Sequence[Load]
+    ) -> TrajectoryReport:
+        """The plan's report with energy [J], interval and name of these parameters."""
+        samples = planned_samples(trajectory, loads, self._parameters.modes)
+        prepared, expected = self._model.prepare(samples), self._draws.mean(axis=0)
+        energy = samples.step * float(self._model.watts(self._parameters.mean, prepared).sum())
+        watts, slopes = self._model.watts_and_slopes(expected, prepared)
+        drawn = samples.step * (watts.sum() + (self._draws - expected) @ slopes.sum(axis=0))
+        low, high = np.quantile(drawn, _LEVELS)
+        return replace(
+            planned,
+            energy=energy,
+            energy_low=min(float(low), energy),
+            energy_high=max(float(high), energy),
+            power_parameters=self._parameters.name,
+        )
