@@ -1,21 +1,13 @@
-"""The programme: excursions by load and posture, the movements between postures, and pauses in every mode.
-
-Written as a folder: `programme.yaml` names the steps in their order, each movement a CSV file that `ir
-evaluate` reads.
-"""
+"""The programme: excursions by load and posture, the movements between postures, and pauses in every mode."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-
-import yaml
 
 from ir_cli.errors import CommandError
 from ir_cli.excitation.choice import REST, Design, Identified
 from ir_cli.excitation.pool import Excursion, excursions, postures
-from ir_cli.offline.trace_file import write_trace
 from ir_description import PowerParameters, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
@@ -24,7 +16,6 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, Planner
 from ir_recorder.measure import PowerModel
 
-FORMAT = "ir_programme/1"
 STAY = 6.0  # s in each mode
 MODES = ("STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
 DEEP = "HIBERNATION"  # takes minutes; only where it is asked for
@@ -146,23 +137,6 @@ def _transfer(
     if trajectory is None:
         raise CommandError(f"the movement {name} with {load} was found with another load and is not any more")
     return [Step(name, load, trajectory), Step("at rest", load, mode=MODES[0], seconds=REST)]
-
-
-def write_programme(programme: Programme, folder: Path, cell: str) -> Path:
-    """Write all steps into a folder; the path of its `programme.yaml`."""
-    rows: list[dict[str, object]] = []
-    for number, step in enumerate(programme.steps, start=1):
-        row: dict[str, object] = {"name": step.name, "load": step.load}
-        if step.trajectory is None:
-            row |= {"mode": step.mode, "seconds": step.seconds}
-        else:
-            row["trajectory"] = f"{number:03d}.csv"
-            write_trace(folder / f"{number:03d}.csv", step.trajectory)
-        rows.append(row)
-    page = {"format": FORMAT, "cell": cell, "seconds": round(programme.seconds, 1), "steps": rows}
-    path = folder / "programme.yaml"
-    path.write_text(yaml.safe_dump(page, sort_keys=False), encoding="utf-8")
-    return path
 
 
 def advice(missing: Sequence[str]) -> tuple[str, ...]:

@@ -1,5 +1,5 @@
 """`ir energy`: direct against indirect measurement, parameters fitted to a meter, movements that identify
-them.
+them, and a simulated plant that drives these.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ PARAMETERS_START = b"format: ir_description/power_parameters/"
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add energy compare."""
+    """Add energy compare, fit, excite and drive."""
     energy = commands.add_parser(
         "energy",
         help="compare measurements, fit power parameters, plan what identifies them; needs no ROS",
@@ -54,6 +54,16 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     compare.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.mcap)")
     add_formats(compare)
     compare.set_defaults(run=run_compare)
+    _add_fit(verbs)
+    _add_excite(verbs)
+    drive = verbs.add_parser("drive", help="drive such a programme on a simulated plant")
+    drive.add_argument("folder", type=Path, metavar="FOLDER", help="what ir energy excite wrote")
+    drive.add_argument("--plant", default="typical", help="nominal, typical:SEED or a file (typical)")
+    drive.add_argument("--output", type=Path, metavar="CSV", help="file to write (FOLDER/run.csv)")
+    drive.set_defaults(run=run_drive)
+
+
+def _add_fit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     fitted = verbs.add_parser("fit", help="power parameters from a meter, with what is left uncertain")
     fitted.add_argument("motion", type=Path, metavar="RECORDING", help="a recording, or CSV of the joints")
     fitted.add_argument("--meter", type=Path, metavar="FILE", help="CSV of a power meter beside it")
@@ -67,6 +77,9 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     fitted.add_argument("--picture", type=Path, metavar="PNG", help="picture to write as well")
     add_formats(fitted, comma=False)
     fitted.set_defaults(run=run_fit)
+
+
+def _add_excite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     excite = verbs.add_parser("excite", help="plan movements that identify power parameters")
     add_cell(excite)
     excite.add_argument("--seconds", type=float, default=180.0, help="s of excursions, at most (180)")
@@ -152,7 +165,8 @@ def run_fit(arguments: argparse.Namespace) -> int:
 
 def run_excite(arguments: argparse.Namespace) -> int:
     """Plan the programme, write its folder, print what it identifies and what it does not."""
-    from ..excitation.programme import Asked, advice, plan_programme, write_programme
+    from ..excitation.programme import Asked, advice, plan_programme
+    from ..excitation.programme_file import write_programme
 
     if not 1 <= arguments.postures <= 20 or not 0.0 < arguments.seconds <= 3600.0:
         raise InputError("--postures must be 1 to 20 and --seconds above 0, at most 3600")
@@ -181,4 +195,21 @@ def run_excite(arguments: argparse.Namespace) -> int:
         str(path),
     ]
     sys.stdout.write("\n".join(lines) + "\n")
+    return 0
+
+
+def run_drive(arguments: argparse.Namespace) -> int:
+    """Drive a programme as fast as the plant can be stepped, write its readings, print where they are."""
+    from ..excitation.programme_file import read_programme
+    from ..excitation.simulated_run import driven
+    from .trace_file import write_readings
+
+    cell, steps = read_programme(arguments.folder)
+    trace = driven(cell, arguments.plant, steps)
+    path = arguments.output or arguments.folder / "run.csv"
+    write_readings(path, trace)
+    joules = trace.columns["energy"][-1]
+    sys.stdout.write(
+        f"{len(steps)} steps in {trace.time[-1]:.0f} s, {joules / 1e3:.1f} kJ ({trace.source})\n{path}\n"
+    )
     return 0

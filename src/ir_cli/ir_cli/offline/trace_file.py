@@ -18,7 +18,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces import read_traces
+from ir_recorder.traces import Trace, read_traces
 from ir_recorder.traces.trace import ACCELERATION, VELOCITY
 
 from ..errors import InputError
@@ -39,6 +39,18 @@ def write_trace(path: Path, trajectory: JointTrajectory) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows([repr(value) for value in row] for row in rows.tolist())
+
+
+def write_readings(path: Path, trace: Trace) -> None:
+    """Write all columns of a measured trace; `ir_recorder.traces` reads them back."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    numbers = zip(trace.time.tolist(), *(values.tolist() for values in trace.columns.values()), strict=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# {trace.source}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["time", *trace.columns, *trace.texts])
+        for row, words in zip(numbers, zip(*trace.texts.values(), strict=True), strict=True):
+            writer.writerow([*(f"{value:.9g}" for value in row), *words])
 
 
 def read_trace(path: Path, joint_names: Sequence[str]) -> JointTrajectory:

@@ -10,7 +10,8 @@ import numpy as np
 
 from ir_description import Cell, Load, PowerParameters
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.analysis.loads import carried, load_timeline
+from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
+from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import FitError
 from ir_recorder.fit.cells import attached_cell
 from ir_recorder.measure import PowerModel, Samples, samples_of
@@ -18,6 +19,7 @@ from ir_recorder.measure.on_one_grid import LoadRuns
 from ir_recorder.read.reader import read_recording
 from ir_recorder.traces import Trace, TraceMapping, clock_offset, read_traces
 from ir_recorder.traces.recorded import recorded_traces
+from ir_recorder.traces.trace import LOAD
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +54,7 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
         runs = _recorded_loads(cell, load_timeline(recording).certain(recording.duration))
     else:
         traces = read_traces(source.motion, source.motion_mapping, cell.robot.joint_names)
-        runs = []
+        runs = _written_loads(cell, _with(traces, cell.robot.joint_names))
     if source.load or not runs:
         runs = [(-np.inf, np.inf, carried(cell, source.load))]
     joints = _with(traces, cell.robot.joint_names)
@@ -72,6 +74,21 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
         raise FitError(f"{source.motion}: there is neither a column power nor energy; name the meter's file")
     names, modes = cell.robot.joint_names, prior.modes
     return FitData(samples_of(joints, meter, names, modes, runs), model, tuple(notes))
+
+
+def _written_loads(cell: Cell, trace: Trace) -> list[tuple[float, float, tuple[Load, ...]]]:
+    """Runs of the words of a column `load`; none where there is no such column. FitError for what the cell
+    does not have.
+    """
+    words = trace.texts.get(LOAD, ())
+    known = {NO_LOAD, *(load.name for load in cell.loads("")), *(part.name for part in cell.parts)}
+    for word in dict.fromkeys(words):
+        if strange := set(normal(word).split(LOAD_SEPARATOR)) - known:
+            raise FitError(
+                f"{trace.source}: load {min(strange)[:40]!r} is unknown, known are {', '.join(sorted(known))}"
+            )
+    times = zip(trace.time.tolist(), map(normal, words), strict=False)
+    return _recorded_loads(cell, LoadTimeline(tuple(times)).certain(float(trace.time[-1])))
 
 
 def _recorded_loads(
