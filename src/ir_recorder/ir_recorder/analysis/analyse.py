@@ -194,7 +194,7 @@ class _Analyser:
                     f"data sheet: name their file with --power-parameters"
                 )
             return steps
-        predictor = Predictor(cell.robot, self.link, cell.base_pose, parameters)
+        predictor = Predictor(cell.robot, self.data.dc_link, cell.base_pose, parameters)
         found = []
         for step in steps:
             movement = step.movement
