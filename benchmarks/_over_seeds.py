@@ -15,7 +15,10 @@ def over_seeds(work: Callable[[int], Any], seeds: Sequence[int]) -> list[Any]:
     global _work
     _work = work
     with multiprocessing.get_context("fork").Pool(os.cpu_count()) as pool:
-        return pool.map(_one, seeds, chunksize=1)
+        found = pool.map(_one, seeds, chunksize=1)
+        pool.close()
+        pool.join()  # so that their processor time counts
+    return found
 
 
 def _one(seed: int) -> Any:
