@@ -45,7 +45,7 @@ HELP = {
     "send_goal": "send a goal: send_goal /ir_planner/plan '{}'; Ctrl-C cancels",
     "cancel": "cancel all goals of an action: cancel /ir_planner/plan",
     "front": "energy over cycle time: front home infeed_pick park",
-    "report": "write the HTML report of a recording",
+    "report": "write the HTML report of a recording, or compare several",
     "replan": "plan a recording's requests again and compare the ids",
     "plan": "plan a cell's program: seconds, joules, clearance; needs no ROS",
     "move": "plan one movement from START to GOAL; needs no ROS",
@@ -54,9 +54,9 @@ HELP = {
     "standby": "the power mode of least energy for a pause; needs no ROS",
     "evaluate": "joules, limits and clearance of a trajectory in a file; needs no ROS",
     "energy": "compare measurements, fit power parameters, plan what identifies them; needs no ROS",
-    "krl": "what a KUKA program costs in a cell; planned programs as KRL; needs no ROS",
+    "krl": "KUKA programs: what one costs in a cell, and planned ones as KRL",
     "cell": "check cell files, list the bundled cells",
-    "robot": "list the bundled robots",
+    "robot": "check robot files, make one from a URDF, list the bundled ones",
     "completion": "completion for bash: source <(ir completion)",
 }
 """What `ir --help` prints without importing any of the modules."""
