@@ -73,6 +73,16 @@ def test_a_radian_in_a_millisecond_is_refused_however_it_is_interpolated(
     assert within(excesses(ride(simulation, 0.05), simulation))
 
 
+@pytest.mark.parametrize("joint", range(6))
+def test_five_percent_more_than_an_axis_may_accelerate_is_refused(simulation: Simulation, joint: int) -> None:
+    q, rest, angle = simulation.backend.q, np.zeros((2, 6)), 0.2
+    most = 1.05 * simulation.robot.acceleration_max[joint]
+    time = (10.0 / np.sqrt(3.0) * angle / most) ** 0.5  # of a quintic from rest to rest
+    there = q + angle * np.eye(6)[joint]
+    with pytest.raises(DriverError, match=r"needs .* rad/s\^2"):
+        simulation.vet(TrajectoryGoal(trajectory(simulation, [0.0, time], [q, there], rest, rest)), 1)
+
+
 def test_what_happens_between_milliseconds_is_seen(simulation: Simulation) -> None:
     """A spike of 0.4 ms, at rest at every whole millisecond."""
     q = simulation.backend.q
