@@ -43,7 +43,7 @@ OTHERWISE = {
 NEEDS = re.compile(
     r"pybullet|pinocchio|\bcoal\b|coal_scene|oracles"  # their modules
     r"|sim_driver.node|SimDriver|program_runner|run_program"  # nodes that drive on physics
-    r"|make_simulation\(cell\)"  # on physics
+    r"|make_simulation\(cell\)|typical_plant"  # on physics
 )
 """Words of the test files that are left out with LEFT_OUT."""
 _ROS_OF_ANOTHER = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "AMENT_PREFIX_PATH")
