@@ -19,7 +19,11 @@ def judge_of(
     scenes: dict[int, PlanningScene] = {}
     places = cell.parts_at_start()
     for step in steps:
-        scenes[id(step)] = PlanningScene(with_parts(cell, places), cell.loads(places.held), power, drives)
+        standing = with_parts(cell, places)
+        for text in step.states:  # of machines: those that the step was planned with
+            machine, _, state = text.partition("=")
+            standing = standing.with_equipment(machine, state=state)
+        scenes[id(step)] = PlanningScene(standing, cell.loads(places.held), power, drives)
         if step.attach or step.detach:
             places = places.after(
                 ProgramStep("STATION", step.to_station, attach=step.attach, detach=step.detach)
