@@ -88,7 +88,7 @@ def deviation_row(cases: int, seed: int) -> dict[str, Any]:
 
 def driving_row(seconds: float) -> dict[str, Any]:
     """Simulated driving without a pause, stepped: memory of this process after a tenth and at the end."""
-    simulation = make_simulation("open", backend="ideal")
+    simulation = make_simulation(cases_of("test_runaway_goals").BARE, backend="ideal")
     driver = Driver(simulation)
     generator, home = np.random.default_rng(FIRST_SEED), np.array(simulation.cell.machine_home)
     stamp, early = 0, 0.0
