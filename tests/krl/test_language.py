@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from ir_krl import (
     Followed,
+    KrlError,
     KrlRunError,
     KrlSyntaxError,
     Motion,
@@ -96,6 +98,10 @@ REFUSED = {
     "an unknown command of BAS": ("BAS(#NOBODY,1)", "1:1", "BAS(#NOBODY) isn't known"),
     "a tool that stands in the cell": ("$IPO_MODE=#TCP", "1:1", "a tool that stands in the cell isn't read"),
     "EXIT outside of a loop": ("EXIT", None, "EXIT stands outside of a loop"),
+    "a REAL beyond its range": ("WAIT SEC 1E400", "1:10", "a REAL is at most"),
+    "an INT beyond its range": ("WAIT SEC 99999*99999", "1:10", "an INT is at most 2147483647"),
+    "an INT of many digits": ("WAIT SEC " + "9" * 6000, "1:10", "6000 digits"),
+    "a loop that squares": ("X=2\nWHILE TRUE\nX=X*X\nENDWHILE", None, "an INT is at most"),
     "a component twice": ("PTP {A1 0,A1 1}", "1:11", "component A1 is given twice"),
 }
 
@@ -127,6 +133,32 @@ def test_what_is_no_krl_is_named_with_line_and_column(name: str) -> None:
     with pytest.raises(KrlSyntaxError) as refused:
         parse(f"DEF TEST( )\n{lines}\nEND\n", "test.src")
     assert (refused.value.place.line, refused.value.place.column) == (line, column)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    ["IF TRUE THEN\n" * 2000 + "ENDIF\n" * 2000, "WAIT SEC " + "-" * 3000 + "1", "WAIT SEC 1" + "+1" * 3000],
+)
+def test_what_is_nested_too_deeply_ends_with_a_sentence(lines: str, followed: Follow) -> None:
+    with pytest.raises((KrlSyntaxError, KrlRunError), match="nested too deeply"):
+        followed(lines)
+
+
+def test_damaged_programs_end_with_a_sentence() -> None:
+    """Law: whatever a text holds, it is followed or refused with a KrlError."""
+    whole = (
+        "DEF T( )\nDECL INT I\nBAS(#INITMOV,0)\nPTP XHOME\nFOR I=1 TO 3\nLIN_REL {Z 10} C_DIS\nENDFOR\n"
+        "IF (I>2) AND NOT $IN[3] THEN\n$OUT[2]=TRUE\nENDIF\n"
+        "SPTP {A1 5} WITH $VEL_AXIS[1]=SVEL_JOINT(50)\nEND\n"
+    )
+    rng = np.random.default_rng(7)
+    marks = "()[]{},.:;=#\"'$-+*/ABX019 \n\0é"
+    for _ in range(400):
+        text = list(whole)
+        for at in rng.integers(0, len(text), rng.integers(1, 6)):
+            text[at] = marks[rng.integers(len(marks))]
+        with contextlib.suppress(KrlError):
+            follow([parse("".join(text), "t.src")], np.zeros(6), np.eye(4), inputs={3: True})
 
 
 def test_subprograms_and_functions() -> None:

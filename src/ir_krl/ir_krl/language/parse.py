@@ -111,6 +111,8 @@ def parse(text: str, file: str) -> Source:
         raise KrlSyntaxError(f"{len(text)} characters: at most {TEXT_MAX} are read", Place(file))
     try:
         units = _tree(_parser().parse(_prepared(text) + "\n")).children
+    except RecursionError:
+        raise KrlSyntaxError("brackets, signs or blocks are nested too deeply", Place(file)) from None
     except UnexpectedInput as error:
         raise KrlSyntaxError(_complaint(error, text), Place(file, error.line, error.column)) from None
     routines = [_routine(unit, file) for unit in units if unit.data in ("routine", "function")]

@@ -11,8 +11,20 @@ from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
 from ir_krl.run.frames import FRAME_NAMES, frame, pose
 from ir_krl.run.memory import Memory, Step
-from ir_krl.run.values import Structure, Symbol, Value, copied, integer, kind_of, number, truth
+from ir_krl.run.values import (
+    INT_MAX,
+    Structure,
+    Symbol,
+    Value,
+    copied,
+    in_range,
+    integer,
+    kind_of,
+    number,
+    truth,
+)
 
+DIGITS_MAX = 12
 _COMPARED: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
     "<=": operator.le,
@@ -81,7 +93,9 @@ class Expressions:
 
     def _number(self, tree: Tree, place: Place) -> Value:
         text = str(tree.children[0])
-        return int(text) if text.isdigit() else float(text)
+        if text.isdigit() and len(text) > DIGITS_MAX:
+            raise KrlRunError(f"an INT is at most {INT_MAX}; this one has {len(text)} digits", place)
+        return in_range(int(text) if text.isdigit() else float(text), place)
 
     def _true(self, tree: Tree, place: Place) -> Value:
         return True
@@ -98,7 +112,7 @@ class Expressions:
     def _bits(self, tree: Tree, place: Place) -> Value:
         text = str(tree.children[0])[1:-1]
         try:
-            return int(text[1:], 2 if text[0] == "B" else 16)
+            return in_range(int(text[1:], 2 if text[0] == "B" else 16), place)
         except ValueError:
             raise KrlRunError(f"'{text}' is no bit pattern", place) from None
 
@@ -128,18 +142,18 @@ class Expressions:
     def _added(self, tree: Tree, place: Place) -> Value:
         left, sign, right = tree.children
         a, b = self._numbers(left, right, str(sign))
-        return a + b if sign == "+" else a - b
+        return in_range(a + b if sign == "+" else a - b, place)
 
     def _multiplied(self, tree: Tree, place: Place) -> Value:
         left, sign, right = tree.children
         a, b = self._numbers(left, right, str(sign))
         if sign == "*":
-            return a * b
+            return in_range(a * b, place)
         if b == 0:
             raise KrlRunError("division by 0", place)
         if isinstance(a, int) and isinstance(b, int):
-            return int(a / b)  # of two INT the INT towards zero
-        return a / b
+            return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # towards zero
+        return in_range(a / b, place)
 
     def _numbers(self, left: Tree, right: Tree, sign: str) -> tuple[int | float, int | float]:
         values = []

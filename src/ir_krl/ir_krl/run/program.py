@@ -18,6 +18,7 @@ from ir_krl.run.system import system_variables
 from ir_krl.run.values import Array, Symbol, Value, copied, kind_of, typed
 from ir_msgs_py.arrays import FloatArray
 
+NESTED = "brackets, signs or blocks are nested too deeply"
 DEPTH_MAX = 60
 """Calls within calls."""
 
@@ -80,10 +81,13 @@ def follow(
         there = ", ".join(list(routines)[:8]) or "none"
         raise KrlRunError(f"there is no routine {name or 'at all'}; routines: {there}")
     run = _Run(routines, Memory(system_variables(home, tool)), dict(inputs or {}), loop_passes)
-    for source in sources:
-        for body in source.data:
-            run.data(body, source.file)
-    run.routine(routines[name], [], Place(routines[name].file))
+    try:
+        for source in sources:
+            for body in source.data:
+                run.data(body, source.file)
+        run.routine(routines[name], [], Place(routines[name].file))
+    except RecursionError:
+        raise KrlRunError(NESTED, Place(run.expressions.file)) from None
     return Followed(name, tuple(run.commands), tuple(run.notes))
 
 

@@ -50,6 +50,19 @@ def copied(value: Value) -> Value:
     return value.copied() if isinstance(value, Structure | Array) else value
 
 
+INT_MAX = 2**31 - 1
+REAL_MAX = 3.4e38
+
+
+def in_range(value: int | float, place: Place) -> int | float:
+    """An INT of 32 bits or a REAL of single range, as the controller has them. Raises KrlRunError."""
+    if isinstance(value, int) and abs(value) > INT_MAX:
+        raise KrlRunError(f"an INT is at most {INT_MAX}; this one has {value.bit_length()} bits", place)
+    if isinstance(value, float) and not abs(value) <= REAL_MAX:
+        raise KrlRunError(f"a REAL is at most {REAL_MAX:g}; this one is {value:g}", place)
+    return value
+
+
 def number(value: Value, what: str, place: Place) -> float:
     """An INT or a REAL as a float. Raises KrlRunError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
