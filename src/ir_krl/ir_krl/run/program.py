@@ -22,27 +22,9 @@ NESTED = "brackets, signs or blocks are nested too deeply"
 DEPTH_MAX = 60
 """Calls within calls."""
 
-_MODELLED = (
-    "$VEL_AXIS",
-    "$ACC_AXIS",
-    "$VEL",
-    "$ACC",
-    "$APO",
-    "$OV_PRO",
-    "$TOOL",
-    "$BASE",
-    "$OUT",
-    "$ORI_TYPE",
-)
-_HARMLESS = (
-    "$ADVANCE",
-    "$BWDSTART",
-    "$H_POS",
-    "$GEAR_JERK",
-    "$COLLMON_TOL_PRO",
-    "$CIRC_TYPE",
-    "$JERK",
-    "$IPO_MODE",
+_MODELLED = frozenset("$VEL_AXIS $ACC_AXIS $VEL $ACC $APO $OV_PRO $TOOL $BASE $OUT $ORI_TYPE".split())
+_HARMLESS = frozenset(
+    "$ADVANCE $BWDSTART $H_POS $GEAR_JERK $COLLMON_TOL_PRO $CIRC_TYPE $JERK $IPO_MODE".split()
 )
 
 
