@@ -14,18 +14,13 @@ from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import Library
 from ir_krl.run.memory import Memory
 from ir_krl.run.motions import Motions
-from ir_krl.run.system import system_variables
+from ir_krl.run.system import HARMLESS, MODELLED, system_variables
 from ir_krl.run.values import Array, Symbol, Value, copied, kind_of, typed
 from ir_msgs_py.arrays import FloatArray
 
 NESTED = "brackets, signs or blocks are nested too deeply"
 DEPTH_MAX = 60
 """Calls within calls."""
-
-_MODELLED = frozenset("$VEL_AXIS $ACC_AXIS $VEL $ACC $APO $OV_PRO $TOOL $BASE $OUT $ORI_TYPE".split())
-_HARMLESS = frozenset(
-    "$ADVANCE $BWDSTART $H_POS $GEAR_JERK $COLLMON_TOL_PRO $CIRC_TYPE $JERK $IPO_MODE".split()
-)
 
 
 @dataclass(frozen=True)
@@ -148,7 +143,7 @@ class _Run(Control):
             raise KrlRunError(
                 f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", self.place(tree)
             )
-        elif name.startswith("$") and name not in _MODELLED and name not in _HARMLESS:
+        elif name.startswith("$") and name not in MODELLED and name not in HARMLESS:
             self.note(tree, f"{name} isn't modelled")
         self.memory.set(path, value, self.place(tree))
 

@@ -16,6 +16,14 @@ TURNING_VELOCITY = 200.0  # deg/s, likewise of $VEL.ORI1
 TURNING_ACCELERATION = 100.0  # deg/s^2, likewise of $ACC.ORI1
 TOOLS = 16  # numbers of TOOL_DATA
 BASES = 32  # numbers of BASE_DATA
+MODELLED = frozenset(
+    ("$VEL_AXIS", "$ACC_AXIS", "$VEL", "$ACC", "$APO", "$OV_PRO", "$TOOL", "$BASE", "$OUT", "$ORI_TYPE")
+)
+"""System variables that motions follow from."""
+HARMLESS = frozenset(
+    ("$ADVANCE", "$BWDSTART", "$H_POS", "$GEAR_JERK", "$COLLMON_TOL_PRO", "$CIRC_TYPE", "$JERK", "$IPO_MODE")
+)
+"""Set by nearly every program; nothing here follows from them."""
 NULL: dict[str, Value] = dict.fromkeys(FRAME_NAMES, 0.0)
 
 
