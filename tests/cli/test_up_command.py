@@ -30,13 +30,13 @@ while not ended.wait(0.02):
 Path({end!r}).write_text("finished")
 """
 PARENT = """
-import signal, sys, time
+import signal, sys
 from pathlib import Path
 from ir_cli.processes import NodeCommand, NodeProcesses
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignore it, as nohup does
 with NodeProcesses(Path(sys.argv[1]), {"PYTHONPATH": sys.argv[2]}) as nodes:
     nodes.start([NodeCommand("waiting")])
-    time.sleep(600)
+    signal.pause()
 """
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from typing import Any
 
 import pytest
@@ -63,24 +62,27 @@ class Middleware:
     """Drops the first `lost` responses, each after waiting for the client's reader."""
 
     def __init__(self, lost: int) -> None:
-        self.lost, self.sent = lost, 0
+        self.lost, self.sent, self.now = lost, 0, 0.0
+
+    def clock(self) -> float:
+        return self.now
 
     def send(self, _response: Any, _header: Any) -> None:
         self.sent += 1
         if self.sent <= self.lost:
-            time.sleep(UNDISCOVERED)
+            self.now += 2.0 * UNDISCOVERED
 
 
 def test_a_response_is_sent_again_until_the_server_has_discovered_its_client() -> None:
     middleware = Middleware(lost=2)
-    PatientSender(middleware.send).send("response", "header")
+    PatientSender(middleware.send, middleware.clock).send("response", "header")
     assert middleware.sent == 3
 
 
 def test_a_client_that_is_never_discovered_costs_a_second_and_no_more() -> None:
     """Its other responses are sent once; with a client that listens patience is back."""
     middleware = Middleware(lost=SENDS + 2)
-    sender = PatientSender(middleware.send)
+    sender = PatientSender(middleware.send, middleware.clock)
     counts = []
     for _ in range(4):
         before = middleware.sent

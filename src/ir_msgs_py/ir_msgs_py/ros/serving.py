@@ -151,15 +151,15 @@ class PatientSender:
     that is never discovered has died: what follows is sent once, until a client takes its answer at once.
     """
 
-    def __init__(self, send: Callable[[Any, Any], None]) -> None:
-        self._send, self._patient = send, True
+    def __init__(self, send: Callable[[Any, Any], None], clock: Callable[[], float] = time.monotonic) -> None:
+        self._send, self._clock, self._patient = send, clock, True
 
     def send(self, response: Any, header: Any) -> None:
         """Send it, for about a second at most."""
         for _ in range(SENDS if self._patient else 1):
-            begun = time.monotonic()
+            begun = self._clock()
             self._send(response, header)
-            if time.monotonic() - begun < UNDISCOVERED:
+            if self._clock() - begun < UNDISCOVERED:
                 self._patient = True
                 return
         self._patient = False
