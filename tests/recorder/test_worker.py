@@ -22,7 +22,7 @@ from ir_recorder.write.writer import RecordingWriter
 
 STRING = "std_msgs/msg/String"
 RECORD = """
-import itertools, mmap, struct, sys, time
+import itertools, mmap, struct, sys, threading
 from pathlib import Path
 from ir_recorder.format.parts import Split
 from ir_recorder.write import worker
@@ -45,7 +45,10 @@ recording = worker.RecordingWorker(session, 10_000_000)
 for k in itertools.count():
     recording.write([worker.Message("/text", struct.pack("<q", k) * 100, k)])
     shown[0:8] = struct.pack("<q", k + 1)
-    time.sleep(0.0002)
+    if k % 20 == 0:  # no faster than the file is written
+        written = threading.Event()
+        recording.do(lambda _, written=written: written.set())
+        written.wait()
 """
 
 
@@ -88,6 +91,7 @@ def test_a_disk_that_refuses_ends_the_recording_with_its_sentence(tmp_path: Path
 
 def killed(folder: Path, number: int, wait_for: Any) -> None:
     """Kill a recording process; what it had handed to the system is there, as a prefix of what it wrote."""
+    folder.mkdir(exist_ok=True)
     path, counts = folder / f"{number}.mcap", folder / f"{number}.counts"
     counts.write_bytes(bytes(16))
     with counts.open("r+b") as file, mmap.mmap(file.fileno(), 16) as shown:
@@ -100,6 +104,7 @@ def killed(folder: Path, number: int, wait_for: Any) -> None:
                 timeout=60.0,
                 what="messages are with the system",
             )
+            assert process.poll() is None, "the recording process has ended by itself"
         finally:
             process.send_signal(signal.SIGKILL)
             process.wait()
@@ -118,4 +123,4 @@ def test_a_killed_recording_holds_what_was_flushed(tmp_path: Path, wait_for: Any
 @pytest.mark.long
 def test_fifty_killed_recordings_hold_what_was_flushed(tmp_path: Path, wait_for: Any) -> None:
     for number in range(50):
-        killed(tmp_path, number % 10, wait_for)
+        killed(tmp_path / str(number), number % 10, wait_for)
