@@ -27,6 +27,7 @@ from ir_sim_driver.node import SimDriver
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs" / "srv"
 LINE = re.compile(r'# ros2 service call (\S+) (\S+) "(.*)"')
 UNKNOWN = "0123456789abcdef"  # the id that examples give
+LATER = {"PlanCartesianMovement"}  # defined before a node offers it
 DRIVER = {"cell": "demo", "backend": "ideal", "wake_port": 0, "transitions.stand_on_brakes_minimum_stay": 0.1}
 
 # in this order: a pause ends before a bit is set, a recording starts before it stops; code and a word of the
@@ -77,7 +78,7 @@ def recorded(path: Path) -> RawRecording:
 
 
 def test_an_answer_is_expected_of_every_service() -> None:
-    assert set(EXPECTED) == {file.stem for file in SRV_FOLDER.glob("*.srv")}
+    assert set(EXPECTED) | LATER == {file.stem for file in SRV_FOLDER.glob("*.srv")}
 
 
 @pytest.mark.usefixtures("planner_node")

@@ -218,15 +218,12 @@ def test_interfaces_that_are_named_exist(page: Path) -> None:
     assert set(named) <= {f"{path.parent.name}/{path.stem}" for path in files}
 
 
-NOT_OFFERED_YET = {"ir_planner/export_program"}  # the page says so
-
-
 def test_the_page_of_interfaces_names_everything_that_the_nodes_offer() -> None:
     page = (ROOT / "docs" / "interfaces.md").read_text("utf-8")
     sections = re.findall(r"^## (ir_\w+)\n(.*?)(?=^## )", page, re.DOTALL | re.MULTILINE)
     named = {f"{node}/{name}" for node, text in sections for name in re.findall(r"`~/(\w+)`", text)}
     offered = {value for key, value in vars(names).items() if key.isupper() and "/" in str(value)}
-    assert named == {value for value in offered if not value.startswith("/")} - NOT_OFFERED_YET
+    assert named == {value for value in offered if not value.startswith("/")}
 
 
 def test_decisions_are_numbered_without_a_gap_or_a_double() -> None:
