@@ -71,7 +71,7 @@ class AxesChart extends TimeChart {
   describe(time) {
     const i = floorIndex(this.times, time), n = this.curves.count, names = this.names();
     const rows = this.used().map((k) => `${names[k]}  ${(+this.high[i * n + k].toPrecision(4))} ${this.curves.unit}`);
-    return rows.length ? [`${time.toFixed(2)} s  ${this.curves.name}`, ...rows].join("\n") : "";
+    return rows.length ? [`${this.timeline.label(time)}  ${this.curves.name}`, ...rows].join("\n") : "";
   }
 }
 

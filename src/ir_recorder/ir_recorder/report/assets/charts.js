@@ -39,6 +39,10 @@ class Timeline {
     this.notify();
   }
   notify() { for (const listener of this.listeners) listener(); }
+  /* A time as people read it. */
+  label(time) { return `${time.toFixed(2)} s`; }
+  /* The same below an axis. */
+  tick(time) { return `${+time.toFixed(3)} s`; }
 }
 
 const MODE_STYLE = /^m-/;
@@ -145,7 +149,7 @@ class TimeChart {
     g.textAlign = "center";
     for (let t = Math.ceil(this.timeline.from / step) * step; t <= this.timeline.to + 1e-9; t += step) {
       line(g, this.x(t), this.top, this.x(t), this.height - this.bottom);
-      g.fillText(`${+t.toFixed(3)} s`, this.x(t), this.height - this.bottom / 2 + 2);
+      g.fillText(this.timeline.tick(t), this.x(t), this.height - this.bottom / 2 + 2);
     }
   }
   valueAxis(g, low, high, unit, y) {
@@ -192,12 +196,16 @@ function tickStep(raw) {
 class PowerChart extends TimeChart {
   constructor(canvas, timeline, tip, data) {
     super(canvas, timeline, tip);
-    this.lanes = data.lanes;
     this.power = data.power && { time: floats(data.power.time), low: floats(data.power.low), high: floats(data.power.high) };
     this.most = this.power ? this.power.high.reduce((a, b) => Math.max(a, b), 100) : 100;
-    const tall = this.lanes.reduce((sum, lane) => sum + (lane.thin ? 15 : 26), 0);
+    this.take(data.lanes);
+  }
+  /* The lanes to draw; the chart grows with them. */
+  take(lanes) {
+    this.lanes = lanes;
+    const tall = lanes.reduce((sum, lane) => sum + (lane.thin ? 15 : 26), 0);
     this.top = tall + 16;
-    canvas.style.height = `${tall + 320}px`;
+    this.canvas.style.height = `${tall + 320}px`;
   }
   draw() {
     const g = this.begin();
@@ -294,7 +302,7 @@ class PowerChart extends TimeChart {
     return span ? span[2] : "";
   }
   describe(time) {
-    const rows = [`${time.toFixed(2)} s`];
+    const rows = [this.timeline.label(time)];
     if (this.power) rows.push(`${Math.round(this.at(time))} W`);
     for (const label of ["mode", "program", "load"]) {
       const words = this.inLane(label, time);
@@ -343,6 +351,6 @@ class ClearanceChart extends TimeChart {
   }
   describe(time) {
     const part = this.parts.find((p) => time >= p.time[0] && time <= p.time[p.time.length - 1]);
-    return part ? `${time.toFixed(2)} s\n${(part.low[floorIndex(part.time, time)] * 1000).toFixed(1)} mm\n${part.label}` : "";
+    return part ? `${this.timeline.label(time)}\n${(part.low[floorIndex(part.time, time)] * 1000).toFixed(1)} mm\n${part.label}` : "";
   }
 }

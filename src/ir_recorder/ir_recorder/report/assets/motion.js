@@ -8,13 +8,23 @@ class Motion {
     this.bound = bound; /* m: a nearest pair below it is drawn in red */
     this.canvas = canvas;
     this.timeline = timeline;
-    this.scene = scene;
     this.renderer = GlRenderer.create(canvas) || new PlainRenderer(canvas);
+    this.show = { zones: false, trail: true, nearest: true, capsules: false };
+    this.take(scene);
+    this.home = this.overview();
+    this.eye = { ...this.home };
+    this.recolour();
+    this.listen();
+    timeline.onChange(() => this.schedule());
+    new ResizeObserver(() => this.schedule()).observe(canvas);
+  }
+  /* The scene to draw: surfaces, and the motion if it has one. */
+  take(scene) {
+    this.scene = scene;
     this.q = shorts(scene.angles);
     this.power = shorts(scene.power);
     this.n = scene.jointOrigins.length;
     this.frames = scene.frames;
-    this.show = { zones: false, trail: true, nearest: true, capsules: false };
     this.shapes = scene.shapes.map((s) => ({ ...s, mesh: this.upload(s) }));
     this.bodies = scene.bodies.map((b) => ({ ...b, mesh: this.upload(b) }));
     this.parts = scene.parts.map((p) => ({ ...p, meshes: p.meshes.map((m) => ({ pose: m.pose, mesh: this.upload(m) })) }));
@@ -23,12 +33,6 @@ class Motion {
     this.mostPower = Math.max(this.power.reduce((a, b) => Math.max(a, b), 0), 1);
     this.path = this.toolPath();
     this.labels = this.machineLabels();
-    this.home = this.overview();
-    this.eye = { ...this.home };
-    this.recolour();
-    this.listen();
-    timeline.onChange(() => this.schedule());
-    new ResizeObserver(() => this.schedule()).observe(canvas);
   }
   upload(shape) {
     const scaled = (text, step) => Float32Array.from(shorts(text), (v) => v * step);

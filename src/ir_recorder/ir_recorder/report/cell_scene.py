@@ -1,0 +1,111 @@
+"""The cell as it stands, for the picture in 3D: triangles and poses of robot, loads, machines and parts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ir_description import Cell
+from ir_msgs_py.arrays import FloatArray
+from ir_recorder.report.robot_shapes import robot_parts
+from ir_recorder.report.series import Json, indices, quantised
+from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh
+
+
+def cell_scene(cell: Cell) -> dict[str, Json]:
+    """What motion.js draws of a cell, whatever the robot does."""
+    return {
+        "base": matrix(cell.base_pose),
+        "tcp": matrix(cell.tcp),
+        "jointOrigins": [matrix(pose) for pose in cell.robot.joint_origin],
+        "jointAxes": [[round(float(x), 9) for x in axis] for axis in cell.robot.joint_axis],
+        "shapes": [*_robot_shapes(cell), *_load_shapes(cell)],
+        "bodies": _bodies(cell),
+        "labels": _labels(cell),
+        "zones": _zones(cell),
+        "floor": cell.floor,
+    }
+
+
+def part_meshes(cell: Cell, name: str) -> list[dict[str, Json]]:
+    """The surface of a part that lies, in the frame of its station."""
+    meshes = []
+    for body in cell.part(name).lying(np.eye(4)):
+        mesh = body_mesh(body)
+        if mesh is not None:
+            meshes.append({"pose": matrix(body.pose), **_mesh(mesh)})
+    return meshes
+
+
+def _robot_shapes(cell: Cell) -> list[dict[str, Json]]:
+    """The robot twice: as its collision capsules, and as a robot looks."""
+    capsules = [
+        (c.link, "base" if c.link == 0 else "link", "capsules", capsule_mesh(c)) for c in cell.robot.capsules
+    ]
+    looks = [(part.link, part.kind, "robot", part.mesh) for part in robot_parts(cell.robot)]
+    return [
+        {"link": link, "kind": kind, "look": look, "owner": "", **_mesh(mesh)}
+        for link, kind, look, mesh in (*looks, *capsules)
+    ]
+
+
+def _load_shapes(cell: Cell) -> list[dict[str, Json]]:
+    """Tool and parts as they are held; each is drawn while its name is in the load."""
+    shapes = []
+    loads = list(cell.loads())
+    loads += [load for part in cell.parts for load in cell.loads(part.name) if load.name == part.name]
+    for load in loads:
+        for capsule in load.capsules:
+            kind = "tool" if load.kind == "tool" else "part"
+            mesh = _mesh(capsule_mesh(capsule))
+            shapes.append({"link": capsule.link, "kind": kind, "look": "", "owner": load.name, **mesh})
+    return shapes
+
+
+def _bodies(cell: Cell) -> list[dict[str, Json]]:
+    bodies = []
+    for machine in cell.equipment:
+        for body in machine.world_bodies():
+            mesh = body_mesh(body)
+            if mesh is not None:
+                pose = matrix(body.pose)
+                bodies.append({"name": body.name, "owner": machine.name, "pose": pose, **_mesh(mesh)})
+    return bodies
+
+
+def _labels(cell: Cell) -> list[dict[str, Json]]:
+    """Where the name of each machine stands: above the middle of its bodies."""
+    labels: list[dict[str, Json]] = []
+    for machine in cell.equipment:
+        bounds = [body.bounds() for body in machine.world_bodies() if body.kind != "plane"]
+        if bounds:
+            low = np.min([b[0] for b in bounds], axis=0)
+            high = np.max([b[1] for b in bounds], axis=0)
+            point = [*(low[:2] + high[:2]) / 2.0, high[2] + 0.08]
+            labels.append({"name": machine.name, "point": [round(float(x), 3) for x in point]})
+    return labels
+
+
+def _zones(cell: Cell) -> list[dict[str, Json]]:
+    return [
+        {
+            "name": machine.name,
+            "kind": machine.zone.kind,
+            "pose": matrix(machine.zone.pose),
+            "size": [round(float(edge), 4) for edge in machine.zone.size],
+        }
+        for machine in cell.equipment
+        if machine.enabled
+    ]
+
+
+def _mesh(mesh: Mesh) -> dict[str, Json]:
+    return {
+        "points": quantised(mesh.points, 5e-4),
+        "normals": quantised(mesh.normals, 1.0 / 32767),
+        "triangles": indices(mesh.triangles),
+    }
+
+
+def matrix(pose: FloatArray) -> list[float]:
+    """Column-major, as WebGL wants it."""
+    return [round(float(x), 6) for x in np.asarray(pose).T.ravel()]
