@@ -9,6 +9,7 @@ Everything a user needs is exported here; the rooms below are the planner's own.
 """
 
 from ir_msgs_py.options import PlanOptions
+from ir_planner.before_after import Stretch, Today, before_after, before_after_common, today_of_krl
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError
@@ -42,10 +43,15 @@ __all__ = [
     "Standby",
     "StateCheck",
     "StoredProgram",
+    "Stretch",
     "TimingError",
+    "Today",
     "UnknownNameError",
+    "before_after",
+    "before_after_common",
     "evaluate_krl",
     "export_krl",
     "parse_goal",
+    "today_of_krl",
     "tool_in_flange",
 ]

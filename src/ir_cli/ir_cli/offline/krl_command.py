@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from ir_krl import follow, parse
+from ir_description import Cell
+from ir_krl import Followed, follow, parse
 from ir_planner import EvaluatedProgram, Planner, PlanOptions, evaluate_krl, export_krl, tool_in_flange
 
 from ..errors import InputError
@@ -53,20 +55,38 @@ def _add_import(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "files", nargs="+", type=Path, metavar="FILE", help=".src first, then .dat and subprograms"
     )
     read.add_argument("--cell", default="demo", help="name of a bundled cell, or a file (demo)")
-    read.add_argument("--routine", default="", metavar="NAME", help="the first of the first file without it")
-    read.add_argument(
-        "--input",
-        action="append",
-        default=[],
-        metavar="N=VALUE",
-        help="what $IN[N] reads: 3=true; repeatable",
-    )
-    read.add_argument("--loop-passes", type=int, default=1, metavar="N", help="of a LOOP without EXIT (1)")
+    add_followed(read)
     read.add_argument("--compare", action="store_true", help="plan the same stations and show the difference")
     add_margin(read)
     add_parameters(read)
     add_formats(read)
     read.set_defaults(run=run_import)
+
+
+def add_followed(parser: argparse.ArgumentParser) -> None:
+    """What decides how a KRL program is followed."""
+    parser.add_argument("--routine", default="", metavar="NAME", help="of KRL: the first of the first file")
+    parser.add_argument(
+        "--input",
+        action="append",
+        default=[],
+        metavar="N=VALUE",
+        help="of KRL: what $IN[N] reads: 3=true; repeatable",
+    )
+    passes = "of KRL: of a LOOP without EXIT (1)"
+    parser.add_argument("--loop-passes", type=int, default=1, metavar="N", help=passes)
+
+
+def followed(files: Sequence[Path], cell: Cell, arguments: argparse.Namespace) -> Followed:
+    """The commands of the program in these files, as the options of `add_followed` say."""
+    return follow(
+        [parse(_text(path), path.name) for path in files],
+        cell.machine_home,
+        tool_in_flange(cell.tcp),
+        routine=arguments.routine,
+        inputs=_inputs(arguments.input),
+        loop_passes=arguments.loop_passes,
+    )
 
 
 def _add_export(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -89,16 +109,7 @@ def run_import(arguments: argparse.Namespace) -> int:
     """Print what the program costs; exit code 1 where it violates a limit or the clearance."""
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        cell = planner.cell
-        sources = [parse(_text(path), path.name) for path in arguments.files]
-        program = follow(
-            sources,
-            cell.machine_home,
-            tool_in_flange(cell.tcp),
-            routine=arguments.routine,
-            inputs=_inputs(arguments.input),
-            loop_passes=arguments.loop_passes,
-        )
+        program = followed(arguments.files, planner.cell, arguments)
         found = evaluate_krl(planner, program, arguments.safety_distance, arguments.load)
     rows = rows_of(found)
     compared = _compared(planner, found) if arguments.compare else {}

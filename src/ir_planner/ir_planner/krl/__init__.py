@@ -4,6 +4,7 @@ from ir_planner.krl.evaluated import EvaluatedProgram, EvaluatedStep
 from ir_planner.krl.export import DEVIATION_MAX, KrlExport
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.krl.requests import evaluate_krl, export_krl, one_movement
+from ir_planner.krl.stations import posture_at, station_at
 
 __all__ = [
     "DEVIATION_MAX",
@@ -13,5 +14,7 @@ __all__ = [
     "evaluate_krl",
     "export_krl",
     "one_movement",
+    "posture_at",
+    "station_at",
     "tool_in_flange",
 ]

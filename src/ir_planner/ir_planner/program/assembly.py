@@ -117,5 +117,5 @@ def _moves(leg: Leg, charge: Charge, reliance: Reliance) -> list[PlannedMovement
             load=leg.scene.load_text,
             states=reliance.of(movement.trajectory, leg.scene, station),
         )
-        moves.append(charge.moved(step, movement))
+        moves.append(charge.moved(step, movement.evaluation.energy, movement.context.scene))
     return moves

@@ -9,9 +9,9 @@ from dataclasses import replace
 from ir_msgs_py.modes import modes_of
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.transitions import TransitionTimes
-from ir_planner.checks import carried, holding_watts, peak_power
+from ir_planner.checks import MovementEnergy, carried, holding_watts, peak_power
 from ir_planner.program.pauses import Pause
-from ir_planner.timing import Movement
+from ir_planner.scene import PlanningScene
 
 
 class Charge:
@@ -20,15 +20,17 @@ class Charge:
     def __init__(self, times: TransitionTimes) -> None:
         self.stored, self._times = 0.0, times
 
-    def moved(self, step: PlannedMovement, movement: Movement) -> PlannedMovement:
-        """The step of a movement with the energy that it takes from the mains now."""
-        alone = movement.evaluation.energy
-        scene, charge = movement.context.scene, self.stored
+    def moved(self, step: PlannedMovement, alone: MovementEnergy, scene: PlanningScene) -> PlannedMovement:
+        """The step of a movement with the energy that it takes from the mains now; alone: what it takes with
+        an empty capacitor.
+        """
+        assert step.trajectory is not None  # it moves
+        charge = self.stored
         energy = carried(alone, charge, scene)
         self.stored = energy.capacitor
         report = step.report
         if energy is not alone:
-            peak = peak_power(movement.trajectory, scene, charge)
+            peak = peak_power(step.trajectory, scene, charge)
             report = replace(report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=peak)
         return replace(step, report=report)
 

@@ -20,11 +20,12 @@ _ENDED = "planning_time or max_iterations ended before the common program was co
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Savings, of which steps, and what was compared, in words."""
+    """Savings, of which steps, what was compared in words, and the steps of the common program."""
 
     savings: ProgramSavings
     steps: Steps
     compared: str
+    common: Steps
 
 
 def held_against_common(
@@ -50,7 +51,7 @@ def held_against_common(
                 if len(waiting) > len(plain):
                     words += f", of which the common program waits {waiting[-1].duration:.2f} s at its end"
                 savings = savings_of(waiting, own, _pauses(plain), common, added)
-                return Comparison(savings, own, words)
+                return Comparison(savings, own, words, waiting)
             if context.work.exhausted:
                 notes.append("none")
                 return f"no savings: {_ENDED}"
@@ -60,7 +61,7 @@ def held_against_common(
             return f"no savings: {error}"
         words = f"both in the common program's {seconds:.2f} s"
         words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
-        return Comparison(savings_of(plain, steps, _pauses(plain), common, added), steps, words)
+        return Comparison(savings_of(plain, steps, _pauses(plain), common, added), steps, words, plain)
 
 
 def _pauses(steps: Steps) -> int:

@@ -73,7 +73,7 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
         else:
             compared = _planned(comparison.steps)
             savings = named(comparison.savings, compared.program_id, comparison.compared)
-            plan = replace(plan, savings=savings, compared=compared)
+            plan = replace(plan, savings=savings, compared=compared, common=_planned(comparison.common))
     if request.front_points:
         with context.journal.stage("pareto front"):
             front = front_of(choice, request.front_points, standing, progress)

@@ -24,7 +24,8 @@ class ProgramPlan:
     """The answer: movements and pauses in order; empty unless the status is SUCCESS.
 
     gap [%]: how far above the best chain of configurations it can be at most. savings: with `compared`, the
-    program that they are of. front: programs by cycle time.
+    program that they are of, and `common`, the program that it is held against. front: programs by cycle
+    time.
     """
 
     status: Status
@@ -35,6 +36,7 @@ class ProgramPlan:
     gap: float = 0.0
     savings: ProgramSavings = NOT_ASKED
     compared: "ProgramPlan | None" = None
+    common: "ProgramPlan | None" = None
     front: tuple["ProgramPlan", ...] = ()
 
 

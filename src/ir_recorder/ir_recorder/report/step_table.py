@@ -51,9 +51,17 @@ def _row(analysis: Analysis, result: StepResult) -> dict[str, Cell]:
 
 def write_table(analyses: Sequence[Analysis], path: str | Path, roots: FileRoots = ANYWHERE) -> Path:
     """Writes the steps as .csv or .parquet below `roots`; RecorderError for another ending."""
-    columns = step_columns(analyses)
+    return write_columns(step_columns(analyses), path, CSV_START, roots)
+
+
+def write_columns(
+    columns: Mapping[str, Sequence[Cell]], path: str | Path, start: bytes, roots: FileRoots = ANYWHERE
+) -> Path:
+    """Writes columns as .csv or .parquet below `roots`, in place of a table that begins alike; RecorderError
+    for another ending.
+    """
     if str(path).endswith(".csv"):
-        return write_output(path, _csv(columns), CSV_START, roots)
+        return write_output(path, _csv(columns), start, roots)
     if str(path).endswith(".parquet"):
         return write_output(path, _parquet(columns), PARQUET_START, roots)
     raise PathError(f"{path}: a table ends in .csv or .parquet")

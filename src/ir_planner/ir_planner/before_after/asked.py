@@ -1,0 +1,127 @@
+"""Where today's program stops to work, as steps that a planner can be asked for.
+
+A standstill at a station, at a posture, before a pause, and where outputs are set, is a stop. Other
+standstills are only passed through: no program needs them. A stop that is nowhere in the cell becomes a
+station of its own there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ir_description import Cell, Equipment, ProgramStep, Station, Zone
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.status import StatusCode
+from ir_planner.before_after.today import Stretch, Today
+from ir_planner.errors import RequestError
+from ir_planner.krl import posture_at, station_at
+from ir_planner.program import AUTO
+from ir_planner.scene import PlanningScene
+
+POINTS = "todays_points"  # the equipment that stations of today's own stand at
+_ZONE = 1e-3  # m: there is no machine
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A step of the program, and what today's program does in it."""
+
+    step: ProgramStep
+    stretches: tuple[Stretch, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class AskedProgram:
+    """The cell with the stations that were added, its program, and what was noticed."""
+
+    cell: Cell
+    steps: tuple[Asked, ...]
+    notes: tuple[str, ...]
+
+
+def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
+    """Today's program as the planner is asked for it. Raises RequestError where it goes nowhere."""
+    stops = _Stops(scene)
+    steps: list[Asked] = []
+    moves: list[Stretch] = []
+    last = len(today.stretches) - 1
+    for k, one in enumerate(today.stretches):
+        if one.trajectory is not None:
+            moves.append(one)
+            waits = k < last and today.stretches[k + 1].trajectory is None
+            name = stops.name(one.q, needed=one.works or waits or k == last)
+            if name:
+                steps.append(Asked(stops.step(name), tuple(moves)))
+                moves = []
+        elif one.seconds > 0.0:
+            pause = ProgramStep("PAUSE", dwell=one.seconds, power_mode=AUTO)
+            steps.append(Asked(pause, (one,)))
+    if not any(step.step.kind != "PAUSE" for step in steps):
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN, f"{today.name} has no movement: there is nothing to compare"
+        )
+    steps, notes = _handled(steps, scene.cell)
+    cell = replace(stops.cell(), program=tuple(step.step for step in steps))
+    return AskedProgram(cell, tuple(steps), (*stops.notes(), *notes))
+
+
+def _handled(steps: list[Asked], cell: Cell) -> tuple[list[Asked], list[str]]:
+    """The steps with what the cell's program handles at its stops, where it makes the same ones."""
+    own = [step for step in cell.program if step.kind != "PAUSE"]
+    stopping = [step.step for step in steps if step.step.kind != "PAUSE"]
+    if not own or [s.target for s in own] != [s.target for s in stopping]:
+        held = cell.tool.name if cell.tool is not None else "nothing"
+        handles = any(step.attach or step.detach for step in own)
+        return steps, [f"what is held all along: {held}"] if handles else []
+    handling = iter(own)
+    result = []
+    for step in steps:
+        if step.step.kind == "PAUSE":
+            result.append(step)
+        else:
+            result.append(replace(step, step=replace(next(handling), dwell=0.0)))
+    return result, ["parts and signals at the stops are those of the cell's own program"]
+
+
+class _Stops:
+    """Names of places: the cell's, and those that are added."""
+
+    def __init__(self, scene: PlanningScene) -> None:
+        self._scene = scene
+        self._added: list[tuple[str, FloatArray]] = []
+
+    def name(self, q: FloatArray, needed: bool) -> str:
+        """Of the stop at q (n,); "" where there is none and none is needed."""
+        found = station_at(self._scene, q) or posture_at(self._scene, q)
+        if found or not needed:
+            return found
+        pose = self._scene.chain.tcp_poses(q[None])[0]
+        for name, known in self._added:
+            if np.abs(known - pose).max() < 2e-3:
+                return name
+        taken = {station.name for station in self._scene.cell.stations}
+        name = next(n for k in range(1, 10_000) if (n := f"point_{k}") not in {*taken, *dict(self._added)})
+        self._added.append((name, pose))
+        return name
+
+    def step(self, name: str) -> ProgramStep:
+        """The step that goes there."""
+        postures = name in ("home", "park") and name not in [s.name for s in self._scene.cell.stations]
+        return ProgramStep("POSTURE" if postures else "STATION", name)
+
+    def cell(self) -> Cell:
+        """The cell with the added stations."""
+        cell = self._scene.cell
+        if not self._added:
+            return cell
+        zone = Zone("OPEN", np.eye(4), np.full(3, _ZONE))
+        holder = Equipment(POINTS, np.eye(4), (), zone)
+        added = [Station(name, POINTS, pose, zone.kind, pose) for name, pose in self._added]
+        return replace(
+            cell, equipment=(*cell.equipment, holder), stations=(*cell.stations, *added), program=()
+        )
+
+    def notes(self) -> list[str]:
+        """What was added, in words."""
+        names = ", ".join(name for name, _ in self._added)
+        return [f"stops that are no station of the cell: {names}"] if names else []

@@ -1,0 +1,65 @@
+"""What a robot does today, wherever that is known from: movements between standstills, and waits."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_krl import Place
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.krl import EvaluatedProgram, EvaluatedStep
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One movement, or a standstill of `seconds` (trajectory None), that ends at q (n,) [rad].
+
+    works: something is done where it ends (an output, a wait for a machine), so that the stop is not only
+    passed through. label: where it stands in its source.
+    """
+
+    trajectory: JointTrajectory | None
+    q: FloatArray
+    seconds: float
+    works: bool = False
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Today:
+    """A program as it runs, from `start` (n,) [rad]; kind: what it is read from; notes: what was assumed."""
+
+    name: str
+    kind: str
+    start: FloatArray
+    stretches: tuple[Stretch, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def seconds(self) -> float:
+        """Its cycle time."""
+        return sum(one.seconds for one in self.stretches)
+
+
+def today_of_krl(found: EvaluatedProgram) -> Today:
+    """A KRL program as a KR C4 drives it."""
+    stretches = tuple(_stretch(step) for step in found.steps)
+    start = np.asarray(found.steps[0].step.trajectory.positions[0])
+    notes = [str(note) for note in found.notes]
+    waits = [step.step for step in found.steps if step.step.waits_for]
+    if waits:
+        notes.append(f"{len(waits)} waits for machines count no time: how long they take is not in a program")
+    return Today(found.name, "KRL program", start, stretches, tuple(notes))
+
+
+def _stretch(one: EvaluatedStep) -> Stretch:
+    step = one.step
+    end = np.asarray(step.trajectory.positions[-1])
+    works = bool(step.outputs or step.waits_for)
+    trajectory = step.trajectory if step.moves else None
+    return Stretch(trajectory, end, step.trajectory.duration, works, _lines(step.places))
+
+
+def _lines(places: tuple[Place, ...]) -> str:
+    first, last = places[0], places[-1]
+    return f"{first}" if first.line == last.line else f"{first} to line {last.line}"

@@ -1,0 +1,50 @@
+"""Joules of a cycle as those of a shift and a year, and as money and CO2, bounds included."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ir_msgs_py.before_after import BeforeAfter, Side
+from ir_recorder.report.costs import Costs
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A value with the ends of its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def of(self, unit: Callable[[float], float]) -> Amount:
+        """The same in another unit."""
+        return Amount(unit(self.value), unit(self.low), unit(self.high))
+
+    def times(self, count: float) -> Amount:
+        """So many of it."""
+        return self.of(lambda value: value * count)
+
+
+@dataclass(frozen=True)
+class Year:
+    """A program in production: its cycles, the energy [J] of a shift and of a year, and what it saves a year
+    [J].
+    """
+
+    cycles_a_shift: float
+    cycles_a_year: float
+    shift: Amount
+    energy: Amount
+    saved: Amount
+
+
+def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
+    """A side in production: as many cycles as today's program makes, or as the line asks for."""
+    asked = side.cycle_time if side.cycle_time > 0.0 and side is not found.today else 0.0
+    seconds = asked or found.today.report.duration
+    shift, year = costs.cycles_per_shift(seconds), costs.cycles_per_year(seconds)
+    report, saving = side.report, side.saving
+    cycle = Amount(report.energy, report.energy_low, report.energy_high)
+    saved = Amount(saving.saved, saving.saved_low, saving.saved_high)
+    return Year(shift, year, cycle.times(shift), cycle.times(year), saved.times(year))

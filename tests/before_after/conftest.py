@@ -1,0 +1,29 @@
+"""Today's programs of several kinds, compared once."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from ir_krl import follow, parse
+from ir_msgs_py.before_after import BeforeAfter
+from ir_planner import Planner, before_after, evaluate_krl, today_of_krl, tool_in_flange
+
+OLD = (Path(__file__).parent / "old.src").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def planner() -> Planner:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "open")
+    return planner
+
+
+@pytest.fixture(scope="session")
+def compared(planner: Planner) -> BeforeAfter:
+    """An old program with detours and pauses, and a line that needs more time than it takes."""
+    cell = planner.cell
+    program = follow([parse(OLD, "old.src")], cell.machine_home, tool_in_flange(cell.tcp))
+    return before_after(planner, today_of_krl(evaluate_krl(planner, program)), 60.0)

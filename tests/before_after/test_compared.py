@@ -1,0 +1,105 @@
+"""Today's program against the planner's: the same stops, sums that agree, savings by common draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ir_msgs_py.before_after import BeforeAfter
+from ir_msgs_py.options import PlanOptions
+from ir_planner import Planner, RequestError, Stretch, Today, before_after, before_after_common
+
+
+def test_all_programs_make_the_same_stops_and_pauses(compared: BeforeAfter) -> None:
+    names = [
+        "start to point_1",
+        "pause at point_1",
+        "point_1 to point_2",
+        "pause at point_2",
+        "point_2 to home",
+    ]
+    for side in (compared.today, *compared.sides):
+        assert [hop.name for hop in side.hops][:5] == names
+        assert [hop.seconds for hop in side.hops if hop.is_pause][:2] == pytest.approx([5.0, 40.0])
+        assert side.certified
+    ends = [
+        np.array([step.trajectory.positions[-1] for step in side.movements if step.trajectory is not None])[
+            -1
+        ]
+        for side in (compared.today, *compared.sides)
+    ]
+    assert np.ptp(ends, axis=0) == pytest.approx(np.zeros(6), abs=1e-6)
+
+
+def test_cycle_times_are_those_that_were_asked_for(compared: BeforeAfter) -> None:
+    same, free, line = compared.sides
+    assert same.report.duration == pytest.approx(compared.today.report.duration, abs=1e-3)
+    assert line.report.duration == pytest.approx(60.0, abs=1e-3)
+    assert free.report.duration < 60.0
+
+
+def test_energies_of_hops_and_of_the_power_are_those_of_the_programs(compared: BeforeAfter) -> None:
+    for side in (compared.today, *compared.sides):
+        assert sum(hop.energy for hop in side.hops) == pytest.approx(side.report.energy)
+        step = side.report.duration / len(side.time)
+        assert float(side.watts.sum()) * step == pytest.approx(side.report.energy, rel=1e-9)
+
+
+def test_a_saving_is_known_better_than_the_energies_that_it_is_the_difference_of(
+    compared: BeforeAfter,
+) -> None:
+    for side in compared.sides:
+        saving = side.saving
+        assert saving.saved_low <= saving.saved <= saving.saved_high
+        apart = (compared.today.report.energy_high - compared.today.report.energy_low) + (
+            side.report.energy_high - side.report.energy_low
+        )
+        assert saving.saved_high - saving.saved_low < 0.7 * apart
+        assert saving.certain
+
+
+def test_a_line_that_needs_more_time_lets_todays_program_wait_as_well(compared: BeforeAfter) -> None:
+    """Today's robot waits on motors, by the controller's timer on brakes after 20 s."""
+    line, today = compared.sides[2], compared.today.report
+    watts = (line.saving.common - today.energy) / (60.0 - today.duration)
+    assert 600.0 < watts < 800.0
+
+
+def test_changes_are_the_largest_savings_and_the_least_work_comes_first(compared: BeforeAfter) -> None:
+    works = [change.work for change in compared.changes]
+    assert works == sorted(works)
+    assert compared.changes[0].name == "pause at point_2"
+    assert "stand on brakes" in compared.changes[0].words
+    by_hop = {hop.name: hop.energy for hop in compared.today.hops}
+    for change in compared.changes:
+        assert change.saving.common == pytest.approx(by_hop[change.name])
+    passed = next(change for change in compared.changes if change.name == "point_1 to point_2")
+    assert "1 stop less" in passed.words
+
+
+def test_the_common_program_saves_what_the_planner_says(planner: Planner) -> None:
+    """Two computations of one figure: the answer's savings, and the sides of the comparison."""
+    park = planner.cell.park
+    found = before_after_common(planner, ("p1", "home"), park)
+    plan = planner.plan_program(("p1", "home"), 0.0, PlanOptions(), park, savings=True)
+    total, saving = plan.savings.total, found.sides[0].saving
+    assert saving.common == pytest.approx(total.common)
+    assert saving.saved == pytest.approx(total.saved)
+    assert (saving.saved_low, saving.saved_high) == pytest.approx((total.saved_low, total.saved_high))
+
+
+def test_the_planners_own_program_as_todays_saves_next_to_nothing(planner: Planner) -> None:
+    """Law: what is optimal already can't be improved by much."""
+    plan = planner.plan_program(("p1", "home"), 0.0, PlanOptions(), planner.cell.machine_home)
+    moves = [step.trajectory for step in plan.movements if step.trajectory is not None]
+    stretches = tuple(Stretch(one, one.positions[-1], one.duration) for one in moves)
+    found = before_after(planner, Today("own", "trace", planner.cell.machine_home, stretches))
+    assert found.today.report.energy == pytest.approx(plan.report.energy, rel=1e-6)
+    assert abs(found.planned.saving.share) < 0.01
+
+
+def test_a_program_that_goes_nowhere_is_a_sentence(planner: Planner) -> None:
+    home = planner.cell.machine_home
+    nothing = Today("still", "trace", home, (Stretch(None, home, 5.0),))
+    with pytest.raises(RequestError, match="still has no movement"):
+        before_after(planner, nothing)

@@ -1,0 +1,92 @@
+"""The page of a comparison, its table, and the command."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_cli.main import main
+from ir_msgs_py.before_after import BeforeAfter
+from ir_planner import Planner
+from ir_recorder.report.before_after import before_after_columns, before_after_html, write_before_after_table
+from ir_recorder.report.costs import Costs
+
+
+def data_of(page: str) -> dict:
+    return json.loads(page.partition('id="data">')[2].partition("</script>")[0])
+
+
+def test_the_page_has_both_motions_and_all_figures(compared: BeforeAfter, planner: Planner) -> None:
+    page = before_after_html(compared, planner.cell)
+    data = data_of(page)
+    assert [side["name"] for side in data["sides"]] == ["today", "same cycle time", "free", "for the line"]
+    today = data["sides"][0]
+    angles = np.frombuffer(base64.b64decode(today["angles"]), "<i2").reshape(-1, 6) * today["angleStep"]
+    assert angles[0] == pytest.approx(planner.cell.machine_home, abs=2e-4)
+    first = compared.today.movements[0].trajectory
+    assert first is not None
+    row = round(0.3 / today["step"])
+    assert angles[row] == pytest.approx(first.sample(np.array([row * today["step"]])).q[0], abs=2e-4)
+    for words in ("saved a year", "CO2", "peak power", "pause at point_2", "(assumed)"):
+        assert words in page
+
+
+def test_an_interval_with_zero_in_it_says_so(compared: BeforeAfter, planner: Planner) -> None:
+    doubtful = tuple(replace(side, saving=replace(side.saving, saved_low=-1.0)) for side in compared.sides)
+    page = before_after_html(replace(compared, sides=doubtful), planner.cell)
+    assert "zero lies in it: it is open whether anything is saved" in page
+    assert "zero lies in it" not in before_after_html(compared, planner.cell)
+
+
+def test_names_of_a_program_cannot_write_into_the_page(compared: BeforeAfter, planner: Planner) -> None:
+    page = before_after_html(replace(compared, name="<script>x()", notes=("</script>",)), planner.cell)
+    assert "<script>x()" not in page
+    assert page.count("</script>") == 2
+
+
+def test_the_table_has_the_years_of_the_costs(compared: BeforeAfter, tmp_path: Path) -> None:
+    columns = before_after_columns(compared, Costs(price=0.5))
+    row = columns["program"].index("same cycle time")
+    side = compared.sides[0]
+    cycles = 8 * 3600 * 0.85 * 2 * 240 / compared.today.report.duration
+    assert columns["year_saved_money"][row] == pytest.approx(cycles * side.saving.saved / 3.6e6 * 0.5)
+    path = write_before_after_table(compared, tmp_path / "table.csv")
+    with path.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(columns["program"])
+    assert float(rows[row]["energy_j"]) == side.report.energy
+
+
+def test_the_command_writes_the_page_and_prints_the_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, old = tmp_path / "page.html", Path(__file__).parent / "old.src"
+    arguments = ["compare", "open", str(old), "-o", str(page), "--json"]
+    assert main(arguments) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [row["program"] for row in answer["programs"]] == ["today", "same cycle time", "free"]
+    assert answer["programs"][1]["saved_low"] > 0.0
+    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["open", "there.pdf"], 2, "today's program is read from .src"),
+        (["open", "missing.src"], 2, "missing.src: No such file"),
+        (["open", "missing.src", "--stations", "p1"], 2, "--stations are of PTP at 100 %"),
+        (["open", "--stations", "nowhere"], 2, "nowhere"),
+        (["open", "--costs", "no.yaml"], 1, "no.yaml"),
+    ],
+)
+def test_what_makes_no_sense_is_a_sentence(
+    arguments: list[str], code: int, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", *arguments]) == code
+    assert words in capsys.readouterr().err
