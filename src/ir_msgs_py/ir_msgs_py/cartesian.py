@@ -1,0 +1,93 @@
+"""A path of the tool as a value: lines, circles and splines through poses, with the speed that is kept along
+it. Names and defaults are those of ir_msgs/CartesianSegment and ir_msgs/PlanCartesianMovement.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.checks import finite, one_of, read_only, set_field
+from ir_msgs_py.errors import InvalidValueError
+
+LINE, CIRCLE, SPLINE = "line", "circle", "spline"
+KINDS = (LINE, CIRCLE, SPLINE)
+GIVEN, CONSTANT, TANGENT = "given", "constant", "tangent"
+ORIENTATIONS = (GIVEN, CONSTANT, TANGENT)
+POSES_MAX = 2000  # of a path
+SPEED_MIN, SPEED_MAX = 1e-4, 10.0  # m/s
+LENGTH_MAX = 10.0  # m: of an approach, a retract and a blending radius
+_POSES = {LINE: (1, 1), CIRCLE: (2, 2), SPLINE: (1, POSES_MAX)}
+
+
+def _within(value: float, low: float, high: float, name: str, unit: str = "") -> float:
+    number = finite(value, name, unit)
+    if not low <= number <= high:
+        suffix = f" {unit}" if unit else ""
+        raise InvalidValueError(
+            f"{name} is {number:g}{suffix}: it must be in [{low:g}, {high:g}]{suffix}"
+        )
+    return number
+
+
+@dataclass(frozen=True, eq=False)
+class CartesianSegment:
+    """One part of a path; it begins where the part before it ends.
+
+    poses (4, 4) [m] of the tcp in the cell. line: the end; circle: a point between and the end; spline: every
+    point it passes. tool_speed [m/s], 0: that of the path. Raises InvalidValueError.
+    """
+
+    kind: str
+    poses: tuple[FloatArray, ...]
+    tool_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        one_of(self.kind, KINDS, "kind")
+        fewest, most = _POSES[self.kind]
+        if not fewest <= len(self.poses) <= most:
+            wanted = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+            raise InvalidValueError(f"a {self.kind} has {len(self.poses)} poses: it must have {wanted}")
+        set_field(self, "poses", tuple(read_only(pose, "pose", (4, 4)) for pose in self.poses))
+        if self.tool_speed != 0.0:
+            set_field(self, "tool_speed", _within(self.tool_speed, SPEED_MIN, SPEED_MAX, "tool_speed", "m/s"))
+
+
+@dataclass(frozen=True, eq=False)
+class CartesianPath:
+    """Where the tool begins, (4, 4) [m] in the cell, its segments, and what is kept along them.
+
+    tool_speed [m/s]; speed_tolerance: share of it that may be lost, 1: as slow as the axes need.
+    blending_radius [m] around the corners between segments. orientation: of the poses (given), of the start
+    (constant), or turning with the path about the tool's axis (tangent). free_angle [rad]: how far the tool
+    may turn about its own axis, either way. approach, retract [m]: straight along the tool's axis.
+    Raises InvalidValueError.
+    """
+
+    start: FloatArray
+    segments: tuple[CartesianSegment, ...]
+    tool_speed: float = 0.1
+    speed_tolerance: float = 0.01
+    blending_radius: float = 0.0
+    orientation: str = GIVEN
+    free_angle: float = 0.0
+    approach: float = 0.0
+    retract: float = 0.0
+
+    def __post_init__(self) -> None:
+        set_field(self, "start", read_only(self.start, "start", (4, 4)))
+        set_field(self, "segments", tuple(self.segments))
+        poses = sum(len(segment.poses) for segment in self.segments)
+        if not 1 <= poses <= POSES_MAX:
+            raise InvalidValueError(f"segments have {poses} poses: it must be 1 to {POSES_MAX}")
+        one_of(self.orientation, ORIENTATIONS, "orientation")
+        for name, low, high, unit in (
+            ("tool_speed", SPEED_MIN, SPEED_MAX, "m/s"),
+            ("speed_tolerance", 1e-4, 1.0, ""),
+            ("blending_radius", 0.0, LENGTH_MAX, "m"),
+            ("free_angle", 0.0, math.pi + 1e-6, "rad"),
+            ("approach", 0.0, LENGTH_MAX, "m"),
+            ("retract", 0.0, LENGTH_MAX, "m"),
+        ):
+            set_field(self, name, _within(getattr(self, name), low, high, name, unit))

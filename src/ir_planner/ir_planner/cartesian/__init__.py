@@ -1,0 +1,16 @@
+"""Paths of the tool: lines, circles and splines at a given speed, over all configurations and a free angle."""
+
+from ir_planner.cartesian.answer import CartesianPlan
+from ir_planner.cartesian.places import Arc, ArcLength, Line, Through, arc_through
+from ir_planner.cartesian.plan import checked_request, plan_path
+
+__all__ = [
+    "Arc",
+    "ArcLength",
+    "CartesianPlan",
+    "Line",
+    "Through",
+    "arc_through",
+    "checked_request",
+    "plan_path",
+]

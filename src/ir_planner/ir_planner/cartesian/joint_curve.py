@@ -1,0 +1,127 @@
+"""The axes along a path: configurations of one chain at dense samples, joined by a spline of degree five."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.status import StatusCode
+from ir_planner.cartesian.layers import JUMP, Chain
+from ir_planner.cartesian.orientations import about_tool
+from ir_planner.cartesian.refusal import PathRefusedError
+from ir_planner.cartesian.tool_path import ToolPath
+from ir_planner.scene import PlanningScene
+
+SPLINE_ERROR = 5e-6  # m by which the spline may leave the path between its samples
+_SPLINE_TURN = 1e-5  # rad
+_DEGREE = 5
+_FEWEST = 12  # intervals of a stroke
+_FINER = (1, 2, 4, 8, 16)
+_WRIST = np.radians(5.0)  # an axis 5 nearer to 0 than this is near the singularity of the wrist
+
+Angle = Callable[[FloatArray], FloatArray]
+"""The angle (M,) rad about the tool's axis at s (M,) m."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointCurve:
+    """q over the arc length s in [begin, end] m."""
+
+    spline: BSpline
+    begin: float
+    end: float
+
+    def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """q and its first three derivatives by s, (M, n) each, at s (M,)."""
+        q, first, second, third = (np.asarray(self.spline(s, nu=k)) for k in range(4))
+        return q, first, second, third
+
+
+def tool_poses(path: ToolPath, angle: Angle | None, s: FloatArray) -> FloatArray:
+    """Poses (M, 4, 4) of the tcp at s (M,), turned about the tool's axis."""
+    poses = path.poses(s)
+    if angle is not None:
+        poses[:, :3, :3] = poses[:, :3, :3] @ about_tool(angle(s))
+    return poses
+
+
+def curve_of(
+    path: ToolPath, chain: Chain, angle: Angle | None, ends: tuple[float, float], scene: PlanningScene
+) -> JointCurve:
+    """The axes between two arc lengths [m] of a path, near a chain. Raises PathRefusedError."""
+    inside = (chain.s > ends[0] + 1e-9) & (chain.s < ends[1] - 1e-9)
+    rough = np.concatenate([ends[:1], chain.s[inside], ends[1:]])
+    rough = _at_least(rough, _FEWEST)
+    worst, place = np.inf, 0.0
+    for finer in _FINER:
+        s = _divided(rough, finer)
+        q = followed(tool_poses(path, angle, s), s, chain, scene)
+        curve = JointCurve(make_interp_spline(s, q, k=_DEGREE), *ends)
+        middle = 0.5 * (s[1:] + s[:-1])
+        error = _errors(curve.spline(middle), tool_poses(path, angle, middle), scene)
+        worst, place = float(error.max()), float(middle[int(np.argmax(error))])
+        if worst <= 1.0:
+            return curve
+    raise PathRefusedError(
+        f"the axes can't follow the path at {place:.3f} m{singularity(curve.spline(place), scene)}: between "
+        f"samples {1e3 * (s[1] - s[0]):.2g} mm apart they leave it by {worst * SPLINE_ERROR * 1e3:.3g} mm"
+    )
+
+
+def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScene) -> FloatArray:
+    """Configurations (M, n) at poses (M, 4, 4) at s (M,), each the nearest to the chain there."""
+    near = np.column_stack([np.interp(s, chain.s, column) for column in chain.q.T])
+    found = scene.inverse_kinematics.solve(poses)
+    away = np.abs(found.q - near[found.pose_index]).max(axis=1)
+    order = np.lexsort((away, found.pose_index))
+    first = order[np.concatenate([[True], np.diff(found.pose_index[order]) > 0])] if len(order) else order
+    reached = np.zeros(len(s), dtype=bool)
+    reached[found.pose_index[first]] = away[first] <= JUMP
+    if not reached.all():
+        k = int(np.argmin(reached))
+        raise PathRefusedError(
+            f"the path leaves the reach or an axis limit at {s[k]:.3f} m", StatusCode.NO_IK_SOLUTION
+        )
+    q = np.asarray(found.q[first])
+    jump = np.abs(np.diff(q, axis=0)).max(axis=1)
+    if jump.max() > JUMP:
+        k = int(np.argmax(jump))
+        j = int(np.argmax(np.abs(q[k + 1] - q[k])))
+        name = scene.cell.robot.joint_names[j]
+        raise PathRefusedError(
+            f"{name} would have to jump by {np.degrees(jump[k]):.0f} deg at {s[k]:.3f} m"
+            f"{singularity(q[k], scene)}"
+        )
+    return q
+
+
+def singularity(q: FloatArray, scene: PlanningScene) -> str:
+    """", where ..." for a configuration (n,) near a singularity, "" else."""
+    jacobian = scene.chain.jacobian(q[None])[0]
+    if abs(q[4]) < _WRIST:
+        return f", near the singularity of the wrist ({scene.cell.robot.joint_names[4]} is {np.degrees(q[4]):.1f} deg)"
+    least = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
+    return ", near a singularity of the arm" if least < _SINGULAR else ""
+
+
+_SINGULAR = 0.05  # least singular value of the Jacobian in m and rad
+
+
+def _errors(q: FloatArray, poses: FloatArray, scene: PlanningScene) -> FloatArray:
+    """How far configurations (M, n) leave poses (M, 4, 4): 1 is what is allowed."""
+    there = scene.chain.tcp_poses(q)
+    away = np.linalg.norm(there[:, :3, 3] - poses[:, :3, 3], axis=1)
+    turned = np.linalg.norm(there[:, :3, :3] - poses[:, :3, :3], axis=(1, 2)) / np.sqrt(2.0)
+    return np.asarray(np.maximum(away / SPLINE_ERROR, turned / _SPLINE_TURN))
+
+
+def _at_least(s: FloatArray, count: int) -> FloatArray:
+    return s if len(s) > count else _divided(s, int(np.ceil(count / (len(s) - 1))))
+
+
+def _divided(s: FloatArray, parts: int) -> FloatArray:
+    """s (M,) with each interval divided into `parts`."""
+    share = np.arange(parts) / parts
+    return np.append((s[:-1, None] + share * np.diff(s)[:, None]).ravel(), s[-1])

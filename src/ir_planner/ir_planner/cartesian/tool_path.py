@@ -1,0 +1,182 @@
+"""A path of the tool over its arc length: parts that follow each other, corners between them rounded.
+
+Within its radius around a corner the next part begins while the last one ends: the place is the sum of what
+both have covered. How much of each is covered rises by a polynomial whose fourth derivative is continuous, so
+curvature is too. Parts that meet almost tangentially, or where only the curvature or the turning of the tool
+jumps, are joined in the same manner within micrometres; at any other corner without a radius the tool stops.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+
+from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_planner.cartesian.orientations import about_tool
+from ir_planner.cartesian.parts import Part
+from ir_planner.cartesian.places import ArcLength
+
+_PER_ZONE = 6  # breaks of a rounded corner, between which the speed of the parameter is smooth
+_ALONG_AXIS = np.radians(3.0)  # a path nearer to the tool's axis than this gives no heading
+
+
+def covered(u: FloatArray, radius: float) -> FloatArray:
+    """How much of the next part is covered at u (M,) m from a corner: 0 before -radius, u beyond radius."""
+    y = np.clip((u + radius) / (2.0 * radius), 0.0, 1.0)
+    inside = 2.0 * radius * y**5 * (7.0 + y * (-14.0 + y * (10.0 - 2.5 * y)))
+    return np.where(u >= radius, u, inside)
+
+
+def covering(u: FloatArray, radius: float) -> FloatArray:
+    """The derivative of `covered` (M,)."""
+    y = np.clip((u + radius) / (2.0 * radius), 0.0, 1.0)
+    return np.asarray(y**4 * (35.0 + y * (-84.0 + y * (70.0 - 20.0 * y))))
+
+
+@dataclass(frozen=True, eq=False)
+class ToolPath:
+    """parts (K): one after the other; radius (K + 1,) m around the corner before each and at the end, 0: the
+    tool stops there. headings: whether the tool turns with the path.
+    """
+
+    parts: tuple[Part, ...]
+    radius: FloatArray
+    headings: bool = False
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Where the parts begin and end (K + 1,), along the parts themselves [m]."""
+        return np.concatenate([[0.0], np.cumsum([part.length for part in self.parts])])
+
+    @cached_property
+    def _arc(self) -> ArcLength | None:
+        if not self.radius.any():
+            return None
+        breaks = [part.places.breaks + begin for part, begin in zip(self.parts, self.corners, strict=False)]
+        zones = [
+            corner + radius * np.linspace(-1.0, 1.0, 2 * _PER_ZONE + 1)
+            for corner, radius in zip(self.corners, self.radius, strict=True)
+            if radius > 0.0
+        ]
+        return ArcLength(np.unique(np.concatenate([*breaks, *zones])), self._speed)
+
+    @property
+    def length(self) -> float:
+        """m."""
+        return float(self.corners[-1]) if self._arc is None else self._arc.length
+
+    @cached_property
+    def ends(self) -> FloatArray:
+        """Arc lengths (K + 1,) of the corners [m]."""
+        return self.corners if self._arc is None else self._arc.of(self.corners)
+
+    @cached_property
+    def breaks(self) -> FloatArray:
+        """Arc lengths (B,) between which places and orientations are smooth [m]."""
+        inner = [part.places.breaks + begin for part, begin in zip(self.parts, self.corners, strict=False)]
+        zones = [self.corners - self.radius, self.corners, self.corners + self.radius]
+        u = np.unique(np.clip(np.concatenate([*inner, *zones]), 0.0, self.corners[-1]))
+        u = u[np.concatenate([[True], np.diff(u) > 1e-9])]
+        return u if self._arc is None else self._arc.of(u)
+
+    @cached_property
+    def begin(self) -> int:
+        """The first part that is no approach."""
+        return next((k for k, part in enumerate(self.parts) if part.kept), 0)
+
+    def poses(self, s: FloatArray) -> FloatArray:
+        """Poses (M, 4, 4) of the tcp at arc lengths s (M,) m."""
+        u = s if self._arc is None else self._arc.inverse(s)
+        result = np.tile(np.eye(4), (len(u), 1, 1))
+        for k, chosen in self._owners(u):
+            result[chosen] = self._of_part(k, u[chosen])
+        if self.headings:
+            result[:, :3, :3] = result[:, :3, :3] @ about_tool(self._heading(self._clipped(u)))
+        return result
+
+    def tangents(self, u: FloatArray) -> FloatArray:
+        """dp/du (M, 3) at u (M,) along the parts."""
+        result = np.zeros((len(u), 3))
+        for k, chosen in self._owners(u):
+            for part, progress, rate in self._moving(k, u[chosen]):
+                result[chosen] += part.places.tangent(progress) * rate[:, None]
+        return result
+
+    def _speed(self, u: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(self.tangents(u), axis=1))
+
+    def _owners(self, u: FloatArray) -> list[tuple[int, IntArray]]:
+        """The parts and which of u (M,) lie on each."""
+        owner = np.clip(np.searchsorted(self.corners, u, side="right") - 1, 0, len(self.parts) - 1)
+        return [(int(k), np.flatnonzero(owner == k)) for k in np.unique(owner)]
+
+    def _moving(self, k: int, u: FloatArray) -> list[tuple[Part, FloatArray, FloatArray]]:
+        """Parts under way where part k is: how far each is (M,) m, and its rate (M,) by u."""
+        part, first, last = self.parts[k], u - self.corners[k], u - self.corners[k + 1]
+        begin, end = float(self.radius[k]), float(self.radius[k + 1])
+        progress, rate = np.clip(first, 0.0, part.length), np.ones_like(u)
+        found = []
+        if begin > 0.0:
+            near = first < begin
+            progress = np.where(near, covered(first, begin), progress)
+            rate = np.where(near, covering(first, begin), rate)
+            before = self.parts[k - 1]
+            left = before.length - covered(-first, begin)
+            found.append((before, np.minimum(left, before.length), covering(-first, begin)))
+        if end > 0.0:
+            near = last > -end
+            progress = np.where(near, part.length - covered(-last, end), progress)
+            rate = np.where(near, covering(-last, end), rate)
+            found.append((self.parts[k + 1], covered(last, end), covering(last, end)))
+        return [(part, progress, rate), *found]
+
+    def _of_part(self, k: int, u: FloatArray) -> FloatArray:
+        (part, progress, _), *others = self._moving(k, u)
+        poses = np.tile(np.eye(4), (len(u), 1, 1))
+        poses[:, :3, 3], poses[:, :3, :3] = part.places.at(progress), part.turning.at(progress)
+        for other, along, _ in others:
+            earlier = k > 0 and other is self.parts[k - 1]
+            corner = np.array([other.length if earlier else 0.0])
+            poses[:, :3, 3] += other.places.at(along) - other.places.at(corner)
+            turned, there = other.turning.at(along), other.turning.at(corner)[0]
+            if earlier:
+                poses[:, :3, :3] = turned @ there.T @ poses[:, :3, :3]
+            else:
+                poses[:, :3, :3] = poses[:, :3, :3] @ there.T @ turned
+        return poses
+
+    def _clipped(self, u: FloatArray) -> FloatArray:
+        """u (M,) within the segments: approach and retract keep the heading."""
+        kept = [k for k, part in enumerate(self.parts) if part.kept]
+        return np.clip(u, self.corners[kept[0]], self.corners[kept[-1] + 1])
+
+    @cached_property
+    def _heading(self) -> BSpline:
+        """Angle of the path about the tool's axis over u, 0 at the start. Raises HeadingError."""
+        ends = self._clipped(np.array([-np.inf, np.inf]))
+        inner = self.corners + np.linspace(-1.0, 1.0, 33)[:, None] * self.radius
+        even = np.linspace(*ends, 40 * len(self.parts) + 200)
+        u = np.unique(np.clip(np.concatenate([even, inner.ravel()]), *ends))
+        u = u[np.concatenate([[True], np.diff(u) > 1e-9])]
+        tangents = self.tangents(np.minimum(u, ends[1] - 1e-9))
+        given = np.tile(np.eye(4), (len(u), 1, 1))
+        for k, chosen in self._owners(np.minimum(u, ends[1] - 1e-9)):
+            given[chosen] = self._of_part(k, u[chosen])
+        local = np.einsum("mji,mj->mi", given[:, :3, :3], tangents)
+        local /= np.linalg.norm(local, axis=1)[:, None]
+        across = np.hypot(local[:, 1], local[:, 2])
+        if across.min() < np.sin(_ALONG_AXIS):
+            place = float(u[int(np.argmin(across))])
+            raise HeadingError(place if self._arc is None else float(self._arc.of(np.array([place]))[0]))
+        angle = np.unwrap(np.arctan2(local[:, 2], local[:, 1]))
+        return make_interp_spline(u, angle - angle[0], k=3)
+
+
+class HeadingError(Exception):
+    """The path runs along the tool's axis at `place` m, where it gives no heading."""
+
+    def __init__(self, place: float) -> None:
+        super().__init__(f"the path runs along the tool's axis at {place:.3f} m")
+        self.place = place
+
