@@ -14,7 +14,7 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 ROOMS = {
     "ir_planner": (
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
-        "regional", "trajectories", "service", "settings", "program", "store", "heard",
+        "cartesian", "regional", "trajectories", "service", "settings", "program", "store", "heard",
         "current_cell", "certificates", "asked_states", "trips", "planner", "krl", "before_after",
         "node",
     ),

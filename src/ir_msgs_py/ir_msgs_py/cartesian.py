@@ -25,9 +25,7 @@ def _within(value: float, low: float, high: float, name: str, unit: str = "") ->
     number = finite(value, name, unit)
     if not low <= number <= high:
         suffix = f" {unit}" if unit else ""
-        raise InvalidValueError(
-            f"{name} is {number:g}{suffix}: it must be in [{low:g}, {high:g}]{suffix}"
-        )
+        raise InvalidValueError(f"{name} is {number:g}{suffix}: it must be in [{low:g}, {high:g}]{suffix}")
     return number
 
 

@@ -10,6 +10,7 @@ Everything a user needs is exported here; the rooms below are the planner's own.
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner.before_after import Stretch, Today, before_after, before_after_common, today_of_krl
+from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError
@@ -25,6 +26,7 @@ from ir_planner.trajectories import OptimizationPlan, Reference
 
 __all__ = [
     "CancelledError",
+    "CartesianPlan",
     "EvaluatedProgram",
     "Evaluation",
     "Goal",

@@ -4,9 +4,11 @@ parameters that its joules follow from, with the interval that their uncertainty
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 from ir_msgs_py.report import PlannedMovement, PlanningStage, TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import interval, movement_spread
 from ir_planner.program import ProgramPlan, Spreads, with_intervals
 from ir_planner.regional import MovementPlan
@@ -14,6 +16,7 @@ from ir_planner.scene import PlanningScene
 from ir_planner.service import ServicePlan
 from ir_planner.trajectories import OptimizationPlan
 
+AnyMovement = TypeVar("AnyMovement", MovementPlan, CartesianPlan)
 Stamp = Callable[[TrajectoryReport, JointTrajectory | None], TrajectoryReport]
 
 
@@ -40,7 +43,7 @@ def in_scene(scene: PlanningScene) -> Stamp:
     return stamp
 
 
-def movement_in(plan: MovementPlan, stamp: Stamp) -> MovementPlan:
+def movement_in(plan: AnyMovement, stamp: Stamp) -> AnyMovement:
     """The plan with its report stamped."""
     return replace(plan, report=stamp(plan.report, plan.trajectory))
 

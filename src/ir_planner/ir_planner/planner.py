@@ -5,23 +5,30 @@ Every request takes one immutable snapshot of the cell; changing the cell meanwh
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from ir_description import Cell, PowerData
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.asked_states import StatesCheck, asked_state, asked_states
-from ir_planner.certificates import in_scene, movement_in, optimization_in, program_in, service_in
+from ir_planner.cartesian import CartesianPlan, checked_path_options, plan_path
+from ir_planner.certificates import (
+    AnyMovement,
+    in_scene,
+    movement_in,
+    optimization_in,
+    program_in,
+    service_in,
+)
 from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory
 from ir_planner.configurations import (
     IK_METHODS,
     STARTS_MAX,
     IkAnswer,
     configurations_at,
-    free_configurations,
-    no_configuration,
 )
 from ir_planner.current_cell import CurrentCell, ReadCell, read_cell_here
 from ir_planner.heard import Heard
@@ -32,12 +39,10 @@ from ir_planner.program import (
     Progress,
     Spreads,
     Standby,
-    best_posture,
-    lengths_of,
     nobody,
     plan_program,
 )
-from ir_planner.regional import MovementPlan, plan_regional
+from ir_planner.regional import MovementPlan, plan_to_goal
 from ir_planner.request import (
     Clock,
     Context,
@@ -64,7 +69,7 @@ from ir_planner.service import (
 from ir_planner.settings import PlannerSettings
 from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
-from ir_planner.trips import trips_to
+from ir_planner.trips import standby_at
 
 Cancelled = Callable[[], bool]
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
@@ -166,11 +171,9 @@ class Planner:
     ) -> Standby:
         """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
         scene = self.scene(load)
-        lengths = pause if isinstance(pause, Lengths) else lengths_of(pause)
-        here = scene.cell.machine_home if q is None else q
         options = PlanOptions(load=scene.load_text)
-        trips = trips_to(postures, here, scene.cell, lambda q, goal: self.plan_regional(q, goal, options))
-        return best_posture(lengths, here, trips, scene, self.heard.transitions)
+        plan = partial(self.plan_regional, options=options)
+        return standby_at(pause, q, postures, scene, self.heard.transitions, plan)
 
     def plan_regional(
         self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Cancelled = _NEVER
@@ -179,20 +182,8 @@ class Planner:
         options, note = self._checked(options)
         scene = self.scene(options.load)
         start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
-        journal = Journal(self._work(options, cancelled), options.seed)
-        candidates = None if goal.configuration is None else goal.configuration[None]
-        if candidates is None:
-            assert goal.pose is not None  # a Goal has one of both
-            threshold = scene.thresholds(options.safety_distance)
-            found = free_configurations(goal.pose, scene, threshold, start)
-            if len(found.q) == 0:
-                status = no_configuration(goal.pose, scene, found, goal.text or "goal")
-                info = journal.info(start, scene.cell.robot.joint_names)
-                return MovementPlan(status, info, TrajectoryReport())
-            candidates = found.q
-        context = Context(scene, options, journal)
-        plan = plan_regional(start, candidates, context, self.settings.searches)
-        return self._kept(plan, scene, note)
+        context = Context.of(scene, options, self._work(options, cancelled))
+        return self._kept(plan_to_goal(start, goal, context, self.settings.searches), scene, note)
 
     def plan_service(
         self,
@@ -232,6 +223,15 @@ class Planner:
         scene = self.scene(options.load)
         plan = plan_through(reference, scene, options, self._work(options, cancelled))
         return self._kept(plan, scene, note)
+
+    def plan_cartesian(
+        self, path: CartesianPath, options: PlanOptions, start: FloatArray | None = None, *, t1: bool = False
+    ) -> CartesianPlan:
+        """The tool along a path from `start` (n,), None: from the best. t1: at most 250 mm/s."""
+        options, note = checked_path_options(options)
+        scene = self.scene(options.load)
+        context = Context.of(scene, options, self._work(options, _NEVER))
+        return self._kept(plan_path(path, start, t1, context), scene, note)
 
     def optimize_trajectory(
         self,
@@ -284,7 +284,7 @@ class Planner:
                 self.trajectories.add(movement.trajectory)
         self.programs.add(StoredProgram(plan.program_id, plan.movements, plan.report))
 
-    def _kept(self, plan: MovementPlan, scene: PlanningScene, note: str) -> MovementPlan:
+    def _kept(self, plan: AnyMovement, scene: PlanningScene, note: str) -> AnyMovement:
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
         return movement_in(replace(plan, info=noted(plan.info, note)), in_scene(scene))

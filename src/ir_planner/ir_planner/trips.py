@@ -9,13 +9,29 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError, UnknownNameError
-from ir_planner.program import Trip
+from ir_planner.program import Lengths, Standby, Trip, best_posture, lengths_of
 from ir_planner.regional import MovementPlan
 from ir_planner.request import POSTURES, Goal, parse_goal
+from ir_planner.scene import PlanningScene
 
 POSTURES_MAX = 20  # two movements are planned for each
 Plan = Callable[[FloatArray, Goal], MovementPlan]
+
+
+def standby_at(
+    pause: float | Lengths,
+    q: FloatArray | None,
+    postures: Sequence[str],
+    scene: PlanningScene,
+    transitions: TransitionTimes,
+    plan: Plan,
+) -> Standby:
+    """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
+    lengths = pause if isinstance(pause, Lengths) else lengths_of(pause)
+    here = scene.cell.machine_home if q is None else q
+    return best_posture(lengths, here, trips_to(postures, here, scene.cell, plan), scene, transitions)
 
 
 def trips_to(postures: Sequence[str], here: FloatArray, cell: Cell, plan: Plan) -> tuple[Trip, ...]:

@@ -1,8 +1,8 @@
-"""Paths of the tool: lines, circles and splines at a given speed, over all configurations and a free angle."""
+"""Paths of the tool at a given speed: lines, circles, splines; all configurations, and a free angle."""
 
 from ir_planner.cartesian.answer import CartesianPlan
 from ir_planner.cartesian.places import Arc, ArcLength, Line, Through, arc_through
-from ir_planner.cartesian.plan import checked_request, plan_path
+from ir_planner.cartesian.plan import checked_path_options, plan_path
 
 __all__ = [
     "Arc",
@@ -11,6 +11,6 @@ __all__ = [
     "Line",
     "Through",
     "arc_through",
-    "checked_request",
+    "checked_path_options",
     "plan_path",
 ]

@@ -14,9 +14,9 @@ from ir_msgs_py.trajectory import JointTrajectory
 class CartesianPlan:
     """trajectory None unless the status is SUCCESS.
 
-    tool_error [m]: a bound of the tcp's distance from the path; rotation_error [rad]; speed_deviation: share of
-    the tool's speed that it is off, without approach, retract and changes of speed; lengths (K,) m along the
-    path at which its parts end; configurations: how many were looked at.
+    tool_error [m]: a bound of the tcp's distance from the path; rotation_error [rad]; speed_deviation: share
+    of the tool's speed that it is off, without approach, retract and changes of speed; lengths (K,) m along
+    the path at which its parts end; configurations: how many were looked at.
     """
 
     status: Status

@@ -23,8 +23,8 @@ _SAMPLES = 33
 
 @dataclass(frozen=True)
 class Joint:
-    """radius [m], 0: the tool stops; angle [rad] of the corner; leaves, turns: what smoothing leaves the parts
-    by [m, rad], 0 where the radius was asked for.
+    """radius [m], 0: the tool stops; angle [rad] of the corner; leaves, turns: by what smoothing leaves the
+    parts [m, rad], 0 where the radius was asked for.
     """
 
     radius: float

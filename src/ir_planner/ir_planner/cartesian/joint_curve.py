@@ -98,10 +98,11 @@ def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScen
 
 
 def singularity(q: FloatArray, scene: PlanningScene) -> str:
-    """", where ..." for a configuration (n,) near a singularity, "" else."""
+    """What to add to a sentence about a configuration (n,) near a singularity, else nothing."""
     jacobian = scene.chain.jacobian(q[None])[0]
     if abs(q[4]) < _WRIST:
-        return f", near the singularity of the wrist ({scene.cell.robot.joint_names[4]} is {np.degrees(q[4]):.1f} deg)"
+        name = scene.cell.robot.joint_names[4]
+        return f", near the singularity of the wrist ({name} is {np.degrees(q[4]):.1f} deg)"
     least = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
     return ", near a singularity of the arm" if least < _SINGULAR else ""
 

@@ -1,10 +1,11 @@
 """Configurations along a path as a graph: at samples of the path, for angles about the tool's axis, all of
 them; edges where no axis jumps. The cheapest chains through all samples are candidates.
 
-Complete up to its resolution: what passes no sample without a jump isn't found. Joules of an edge are those of
-its even motion at the tool's speed; accelerations are left out, they come with the timing.
+Complete up to its resolution: what passes no sample without a jump isn't found. Joules of an edge are those
+of its even motion at the tool's speed; accelerations are left out, they come with the timing.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +56,7 @@ class Layers:
 def samples(path: ToolPath, spacing: float) -> FloatArray:
     """Arc lengths (N,) of samples of a path, closer where the tool turns and in rounded corners."""
     breaks = path.breaks
-    rough = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
+    rough = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in itertools.pairwise(breaks)]))
     rotations = path.poses(rough)[:, :3, :3]
     turned = np.einsum("mji,mjk->mik", rotations[:-1], rotations[1:])
     turns = np.arccos(np.clip(0.5 * (np.trace(turned, axis1=1, axis2=2) - 1.0), -1.0, 1.0))
@@ -97,9 +98,7 @@ def layers_of(path: ToolPath, free_angle: float, space: FreeSpace, start: FloatA
     return result
 
 
-def _begun(
-    layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray
-) -> Layers:
+def _begun(layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray) -> Layers:
     """The layers with one configuration in the first: the start."""
     wanted = path.poses(layers.s[:1])[0]
     there = space.scene.chain.tcp_poses(start[None])[0]
@@ -109,8 +108,9 @@ def _begun(
     tilt = float(np.arccos(np.clip(turned[0, 0], -1.0, 1.0)))
     if away > _START_M or tilt > _START_RAD or abs(angle) > free_angle + _START_RAD:
         raise PathRefusedError(
-            f"the tcp of start is {away * 1e3:.3g} mm and {np.degrees(max(tilt, abs(angle))):.3g} deg from where "
-            f"the path begins: it must be within {_START_M * 1e3:g} mm and {np.degrees(_START_RAD):.2g} deg",
+            f"the tcp of start is {away * 1e3:.3g} mm and {np.degrees(max(tilt, abs(angle))):.3g} deg from "
+            f"where the path begins: it must be within {_START_M * 1e3:g} mm and "
+            f"{np.degrees(_START_RAD):.2g} deg",
             StatusCode.START_STATE_INVALID,
         )
     later = layers.layer > 0

@@ -1,5 +1,6 @@
 """The parts of a tool's path: what a request's segments, approach and retract draw, each by itself."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +19,8 @@ _OPPOSITE = np.radians(179.0)  # beyond, the shortest turn isn't known
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A curve of the tool with its orientations, the speed that is asked for [m/s], and whether that has to be
-    kept: on an approach and a retract it needn't.
+    """A curve of the tool with its orientations, the speed that is asked for [m/s], and whether that has to
+    be kept: on an approach and a retract it needn't.
     """
 
     name: str
@@ -89,9 +90,7 @@ def _along_axis(pose: FloatArray, by: float, path: CartesianPath, name: str) -> 
     """The line between a pose (4, 4) and the place `by` m along the tool's axis."""
     ends = [pose[:3, 3] + by * pose[:3, 0], pose[:3, 3]]
     if abs(by) < SHORTEST:
-        raise _refused(
-            f"{name} is {abs(by):g} m: it must be 0 m or in [{SHORTEST:g}, {LENGTH_MAX:g}] m"
-        )
+        raise _refused(f"{name} is {abs(by):g} m: it must be 0 m or in [{SHORTEST:g}, {LENGTH_MAX:g}] m")
     first, last = ends if name == "approach" else ends[::-1]
     line = Line(np.array(first), np.array(last))
     return Part(name, line, Evenly(np.array(pose[:3, :3]), np.zeros(3), line.length), path.tool_speed, False)
@@ -113,7 +112,7 @@ def _check_steps(places: FloatArray, name: str) -> None:
 
 
 def _check_turns(poses: list[FloatArray], name: str) -> None:
-    for before, after in zip(poses[:-1], poses[1:], strict=True):
+    for before, after in itertools.pairwise(poses):
         turn = turn_between(before[:3, :3], after[:3, :3])
         if turn > _OPPOSITE:
             raise _refused(

@@ -1,11 +1,13 @@
 """A path of the tool as a certified movement: the chain of configurations of least J that keeps the speed."""
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
+from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cartesian.answer import CartesianPlan
@@ -22,10 +24,11 @@ from ir_planner.cartesian.tool_error import Kept, kept_of
 from ir_planner.cartesian.tool_path import HeadingError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
-from ir_planner.request import Context
+from ir_planner.request import Context, checked_options, chosen
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import Movement, check_duration, within_torque
 
+PLANNER_ID = "cartesian"
 T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
 TOOL_ERROR_MAX = 1e-4  # m
 CANDIDATES = 3  # chains that are timed, the cheapest by the estimate first
@@ -44,14 +47,12 @@ class _Timed:
     angle: Angle | None
 
 
-def plan_path(
-    path: CartesianPath, start: FloatArray | None, t1: bool, context: Context
-) -> CartesianPlan:
+def plan_path(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> CartesianPlan:
     """Plan a path from the configuration `start` (n,), None: the one of least J. t1: at most 250 mm/s.
 
     Raises RequestError for a request that makes no sense, CancelledError when asked to stop.
     """
-    context.journal.planner_id, context.journal.timing = "cartesian", "synchronous"
+    context.journal.planner_id, context.journal.timing = PLANNER_ID, "synchronous"
     try:
         return _planned(path, start, t1, context)
     except PathRefusedError as error:
@@ -60,9 +61,7 @@ def plan_path(
         return _answer(Status(StatusCode.INVALID_MOTION_PLAN, f"orientation is {TANGENT}: {error}"), context)
 
 
-def _planned(
-    path: CartesianPath, start: FloatArray | None, t1: bool, context: Context
-) -> CartesianPlan:
+def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> CartesianPlan:
     if t1:
         path = _at_most(path, T1_SPEED)
     with context.journal.stage("path") as notes:
@@ -80,9 +79,7 @@ def _planned(
         kept = kept_of(found.sent, whole, found.angle, context.scene)
     leaves = max((joint.leaves for joint in joints), default=0.0)
     turns = max((joint.turns for joint in joints), default=0.0)
-    kept = replace(
-        kept, tool_error=kept.tool_error + leaves, rotation_error=kept.rotation_error + turns
-    )
+    kept = replace(kept, tool_error=kept.tool_error + leaves, rotation_error=kept.rotation_error + turns)
     if kept.tool_error > TOOL_ERROR_MAX:
         raise PathRefusedError(
             f"the tool can't be shown to keep within {TOOL_ERROR_MAX * 1e3:g} mm of the path: "
@@ -135,9 +132,7 @@ def _check_corners(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ..
             )
 
 
-def _best(
-    path: CartesianPath, whole: ToolPath, layers: Layers, t1: bool, context: Context
-) -> _Timed:
+def _best(path: CartesianPath, whole: ToolPath, layers: Layers, t1: bool, context: Context) -> _Timed:
     """The certified movement of least cost by the request's objective over the cheapest chains.
 
     Raises PathRefusedError with the reason of the cheapest one where none is certified.
@@ -199,9 +194,7 @@ def _without(layers: Layers, one: _Timed) -> Layers:
     return replace(layers, free=layers.free & ~near)
 
 
-def _timed(
-    path: CartesianPath, whole: ToolPath, chain: Chain, t1: bool, context: Context
-) -> _Timed:
+def _timed(path: CartesianPath, whole: ToolPath, chain: Chain, t1: bool, context: Context) -> _Timed:
     """A chain with its time. Raises PathRefusedError."""
     scene = context.scene
     angle, chain = angle_along(whole, chain, path.free_angle, context)
@@ -229,7 +222,7 @@ def _timed(
 def _strokes(whole: ToolPath) -> list[tuple[int, int]]:
     """From which corner to which the tool moves without a stop."""
     stops = [k for k, radius in enumerate(whole.radius) if radius == 0.0]
-    return list(zip(stops[:-1], stops[1:], strict=True))
+    return list(itertools.pairwise(stops))
 
 
 def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span, ...]:
@@ -258,9 +251,11 @@ def _flange_share(path: CartesianPath, curves: list[JointCurve], context: Contex
     return share
 
 
-def checked_request(context: Context) -> None:
-    """Raise RequestError for options that a path at a given speed can't meet."""
-    options = context.options
+def checked_path_options(options: PlanOptions) -> tuple[PlanOptions, str]:
+    """The options within the planner's bounds, and a note ("" mostly). Raises RequestError for those that a
+    path at a given speed can't meet.
+    """
+    chosen(options.planner_id, ("", PLANNER_ID), "planner_id")
     if options.duration > 0.0:
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
@@ -271,3 +266,4 @@ def checked_request(context: Context) -> None:
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"timing is {options.timing}: along a path all axes move together, it must be synchronous",
         )
+    return checked_options(options)

@@ -1,4 +1,4 @@
-"""A timed path as the trajectory that is sent: points so dense that the tool keeps to the path between them."""
+"""A timed path as the trajectory that is sent: so many points that the tool keeps to the path between."""
 
 from dataclasses import dataclass
 

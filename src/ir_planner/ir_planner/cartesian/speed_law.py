@@ -93,7 +93,7 @@ def law_of(spans: tuple[Span, ...], ramps: FloatArray) -> SpeedLaw:
 
 
 def ramp_places(spans: tuple[Span, ...], k: int, duration: FloatArray) -> tuple[FloatArray, float, float]:
-    """Where the ramp before span k (or after the last) begins (D,) m for durations (D,) s; both speeds [m/s]."""
+    """Where the ramp before span k (or after the last) begins (D,) m for durations (D,) s; both speeds."""
     speeds = [0.0, *(span.speed for span in spans), 0.0]
     ends = [0.0, *itertools.accumulate(span.length for span in spans)]
     first, last = speeds[k], speeds[k + 1]

@@ -43,7 +43,9 @@ class Driven:
 
 @dataclass(frozen=True, eq=False)
 class TimedStroke:
-    """A curve of the axes with its law; slowness: by how much longer each instant of the law takes, None: 1."""
+    """A curve of the axes with its law; slowness: by how much longer each instant of the law takes, None:
+    1.
+    """
 
     curve: JointCurve
     law: SpeedLaw
@@ -121,7 +123,7 @@ def _slower(
     """The spans with a lower speed where one is too short for it, if it may be lower."""
     k = error.index
     span = spans[k]
-    if span.kept and tolerance < 1.0 or span.speed < _SLOWEST:
+    if (span.kept and tolerance < 1.0) or span.speed < _SLOWEST:
         raise PathRefusedError(
             f"a part of the path is {span.length:.4g} m long: reaching {span.speed:g} m/s and braking take "
             f"{span.length + error.missing:.4g} m; a lower tool_speed, or speed_tolerance 1, may help",
@@ -177,9 +179,7 @@ def _ramps_fit(
     return np.asarray(ramp.reshape(s.shape).max(axis=1) <= allowed)
 
 
-def _slowed(
-    made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene
-) -> TimedStroke:
+def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene) -> TimedStroke:
     """The stroke with more time where a limit is exceeded, as far as the tolerance allows."""
     law = made.law
     most = np.inf if tolerance >= 1.0 else 1.0 / (1.0 - tolerance)
@@ -225,7 +225,7 @@ def _refused(
     slowest = f"; there it could do about {speed / factor[k]:.3g} m/s" if speed > 0.0 else ""
     return PathRefusedError(
         f"{scene.cell.robot.joint_names[j]} needs {shares[what][j]:.2f} times its {what} limit at "
-        f"{motion.s[k]:.3f} m, where the tool moves at {speed:.3g} m/s{singularity(motion.q[k], scene)}{slowest}; "
-        f"speed_tolerance is {tolerance:g}",
+        f"{motion.s[k]:.3f} m, where the tool moves at {speed:.3g} m/s"
+        f"{singularity(motion.q[k], scene)}{slowest}; speed_tolerance is {tolerance:g}",
         StatusCode.INVALID_MOTION_PLAN,
     )

@@ -28,24 +28,18 @@ class Kept:
 
 def kept_of(sent: SentPath, path: ToolPath, angle: Angle | None, scene: PlanningScene) -> Kept:
     """What the trajectory that is sent keeps of the path."""
-    found = [
-        _of_stroke(sent, k, path, angle, scene) for k in range(len(sent.strokes))
-    ]
+    found = [_of_stroke(sent, k, path, angle, scene) for k in range(len(sent.strokes))]
     return Kept(*(max(getattr(one, name) for one in found) for name in Kept.__dataclass_fields__))
 
 
-def _of_stroke(
-    sent: SentPath, k: int, path: ToolPath, angle: Angle | None, scene: PlanningScene
-) -> Kept:
+def _of_stroke(sent: SentPath, k: int, path: ToolPath, angle: Angle | None, scene: PlanningScene) -> Kept:
     stroke, tau = sent.strokes[k], sent.instants[k]
     seconds = stroke.duration
     bend = _largest_acceleration(sent, scene)
     step = float(np.clip(np.sqrt(8.0 * _BETWEEN / max(bend, 1e-9)), _STEP_MIN, _STEP_MAX))
     count = np.maximum(np.ceil(np.diff(tau) * seconds / (stroke.law.total * step)), 1).astype(int)
-    fine = np.append(
-        np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(tau[:-1], tau[1:], count, strict=True)]),
-        tau[-1],
-    )
+    pieces = zip(tau[:-1], tau[1:], count, strict=True)
+    fine = np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), tau[-1])
     error = turn = speed_off = 0.0
     for begin in range(0, len(fine), _PIECE):
         part = fine[begin : begin + _PIECE]
@@ -81,7 +75,8 @@ def _largest_acceleration(sent: SentPath, scene: PlanningScene) -> float:
     largest = extremes(*sent.trajectory.coefficients())
     reach = _reach(scene)
     speed = float(largest.velocity.max(axis=0).sum())
-    return 2.0 * float(largest.acceleration.max(axis=0) @ reach + speed * (largest.velocity.max(axis=0) @ reach))
+    turning = speed * float(largest.velocity.max(axis=0) @ reach)
+    return 2.0 * (float(largest.acceleration.max(axis=0) @ reach) + turning)
 
 
 def _reach(scene: PlanningScene) -> FloatArray:

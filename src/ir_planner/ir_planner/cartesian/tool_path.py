@@ -156,7 +156,7 @@ class ToolPath:
         """Angle of the path about the tool's axis over u, 0 at the start. Raises HeadingError."""
         ends = self._clipped(np.array([-np.inf, np.inf]))
         inner = self.corners + np.linspace(-1.0, 1.0, 33)[:, None] * self.radius
-        even = np.linspace(*ends, 40 * len(self.parts) + 200)
+        even = np.linspace(ends[0], ends[1], 40 * len(self.parts) + 200)
         u = np.unique(np.clip(np.concatenate([even, inner.ravel()]), *ends))
         u = u[np.concatenate([[True], np.diff(u) > 1e-9])]
         tangents = self.tangents(np.minimum(u, ends[1] - 1e-9))
@@ -179,4 +179,3 @@ class HeadingError(Exception):
     def __init__(self, place: float) -> None:
         super().__init__(f"the path runs along the tool's axis at {place:.3f} m")
         self.place = place
-

@@ -25,6 +25,7 @@ from ir_msgs_py.ros.conversions import (
 from ir_msgs_py.savings import ProgramPoint
 from ir_msgs_py.status import Status
 from ir_planner.asked_states import StatesCheck
+from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.krl import KrlExport
@@ -80,7 +81,7 @@ def fill_ik(response: Any, answer: IkAnswer) -> None:
     response.info = planning_info_to_msg(answer.info)
 
 
-def fill_movement(response: Any, plan: MovementPlan, include_points: bool) -> None:
+def fill_movement(response: Any, plan: MovementPlan | CartesianPlan, include_points: bool) -> None:
     """plan_regional_movement and plan_trajectory; points only where they were asked for."""
     response.report = report_to_msg(plan.report)
     response.info = planning_info_to_msg(plan.info)
@@ -88,6 +89,15 @@ def fill_movement(response: Any, plan: MovementPlan, include_points: bool) -> No
         response.trajectory_id = plan.trajectory.trajectory_id
         if include_points:
             response.trajectory = trajectory_to_msg(plan.trajectory)
+
+
+def fill_cartesian(response: Any, plan: CartesianPlan, include_points: bool) -> None:
+    """plan_cartesian_movement."""
+    fill_movement(response, plan, include_points)
+    response.tool_error, response.rotation_error = plan.tool_error, plan.rotation_error
+    response.speed_deviation = plan.speed_deviation
+    response.lengths = float_array(plan.lengths)
+    response.configurations = plan.configurations
 
 
 def fill_optimization(response: Any, plan: OptimizationPlan, include_points: bool) -> None:

@@ -34,6 +34,7 @@ from ir_msgs.srv import (
     GetProgram,
     GetTrajectory,
     OptimizeTrajectory,
+    PlanCartesianMovement,
     PlanProgram,
     PlanRegionalMovement,
     PlanServiceMovement,
@@ -130,6 +131,7 @@ class PlannerNode(Node):
             (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service, long),
             (PlanRegionalMovement, names.PLAN_REGIONAL_MOVEMENT, ask.plan_regional, long),
             (PlanTrajectory, names.PLAN_TRAJECTORY, ask.plan_trajectory, long),
+            (PlanCartesianMovement, names.PLAN_CARTESIAN_MOVEMENT, ask.plan_cartesian, long),
             (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
         ):

@@ -21,6 +21,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import CancelledError, PlannerError, RequestError
 from ir_planner.krl import export_krl, one_movement
 from ir_planner.node.answers import (
+    fill_cartesian,
     fill_evaluation,
     fill_export,
     fill_ik,
@@ -34,6 +35,7 @@ from ir_planner.node.answers import (
     fill_stored_program,
     stations_to_msg,
 )
+from ir_planner.node.cartesian_inputs import path_of
 from ir_planner.node.inputs import (
     LastState,
     goal_of,
@@ -132,9 +134,8 @@ class Requests:
     def check_state(self, request: Any, response: Any) -> Status:
         """Is this state free."""
         q = self._state(request.state, StatusCode.INVALID_ROBOT_STATE)
-        check = self.planner.check_state(
-            q, request.safety_distance, request.max_pairs, request.load, request.station
-        )
+        margin, station = request.safety_distance, request.station
+        check = self.planner.check_state(q, margin, request.max_pairs, request.load, station)
         fill_state_check(response, check)
         return check.status
 
@@ -173,13 +174,9 @@ class Requests:
         options = options_of(request.options, self.draw_seed)
         cell = self.planner.cell
         configuration = state_of(request.configuration, cell, StatusCode.INVALID_ROBOT_STATE)
+        here, most = self._known_or_home(), request.max_candidates
         plan = self.planner.plan_service(
-            request.station,
-            request.direction,
-            configuration,
-            self._known_or_home(),
-            request.max_candidates,
-            options,
+            request.station, request.direction, configuration, here, most, options
         )
         fill_service(response, plan, options.include_points)
         if plan.candidates:
@@ -194,17 +191,26 @@ class Requests:
             self.planner.plan_trajectory(reference, options), response, options.include_points
         )
 
+    def plan_cartesian(self, request: Any, response: Any) -> Status:
+        """The tool along a path."""
+        options, cell = options_of(request.options, self.draw_seed), self.planner.cell
+        start = state_of(request.start, cell, StatusCode.START_STATE_INVALID, "start")
+        plan = self.planner.plan_cartesian(path_of(request, cell), options, start, t1=request.t1)
+        fill_cartesian(response, plan, options.include_points)
+        return self._shown(plan)
+
     def optimize_trajectory(self, request: Any, response: Any) -> Status:
         """The same end points for less."""
         options = options_of(request.options, self.draw_seed)
         plan = self.planner.optimize_trajectory(trajectory_of(request, self.planner), options)
         fill_optimization(response, plan, options.include_points)
-        if plan.trajectory is not None:
-            self.planned(plan.trajectory)
-        return plan.status
+        return self._shown(plan)
 
     def _movement(self, plan: Any, response: Any, include_points: bool) -> Status:
         fill_movement(response, plan, include_points)
+        return self._shown(plan)
+
+    def _shown(self, plan: Any) -> Status:
         if plan.trajectory is not None:
             self.planned(plan.trajectory)
         status: Status = plan.status
