@@ -62,7 +62,7 @@ class RecorderNode(Node):
         self._passed_over: set[str] = set()
         self._failure = ""
         self._cell = CellRequest(self, self._attach)
-        self._parameters = ParameterRequests(
+        self._parameter_requests = ParameterRequests(
             self, lambda name, text: self._write(lambda session: session.attach(name, text, self._now()))
         )
         self._diagnostics = RecorderDiagnostics(self)
@@ -125,7 +125,7 @@ class RecorderNode(Node):
         if files is not None:
             self._attach(files)
         self._cell.begin()
-        self._parameters.begin()
+        self._parameter_requests.begin()
         self._discover()
         if self._failure:
             raise WriteError(self._failure)
@@ -229,7 +229,7 @@ class RecorderNode(Node):
         """Asks the planner for its cell and the nodes for their parameters, until they have answered."""
         if self._recording is None:
             return
-        self._parameters.each()
+        self._parameter_requests.each()
         if not self.cell_attached:
             self._cell.each()
 
