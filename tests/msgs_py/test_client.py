@@ -15,6 +15,7 @@ from ir_msgs.msg import PowerState, Station, Status
 from ir_msgs.srv import GetTrajectory, SetCell
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.ros import goals
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.waiting import Waiting
@@ -32,7 +33,7 @@ class FakeCell(Node):
         self.canceled = threading.Event()
         self.create_service(SetCell, "ir_planner/set_cell", self.set_cell)
         self.create_service(GetTrajectory, "ir_planner/get_trajectory", self.get_trajectory)
-        ActionServer(
+        self.runner = ActionServer(
             self, RunProgram, "ir_program_runner/run_program", self.run_program, cancel_callback=self.cancel
         )
         ActionServer(self, ExecuteTrajectory, "ir_sim_driver/execute_trajectory", self.execute)
@@ -141,6 +142,12 @@ def test_a_goal_that_takes_too_long_is_canceled(client, cell):
     with pytest.raises(CallTimedOutError, match=r"had no result within 0.1 s: the goal was canceled"):
         client.run_program("endless", timeout=0.1)
     assert cell.canceled.is_set()
+
+
+def test_a_goal_whose_node_dies_is_given_up(client, cell, ros_executor, monkeypatch):
+    monkeypatch.setattr(goals, "GONE", 0.1)
+    with pytest.raises(ServiceUnavailableError, match=r"that ran ir_program_runner/run_program has gone"):
+        client.run_program("endless", progress=lambda at: ros_executor.run(cell.runner.destroy))
 
 
 def test_a_failing_progress_callback_reaches_the_script_and_cancels_the_goal(client, cell, wait_for):

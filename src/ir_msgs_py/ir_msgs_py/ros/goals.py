@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +15,10 @@ from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.quality import ACTION_SERVICES
 from ir_msgs_py.ros.types import owner_of
 from ir_msgs_py.status import StatusCode
+
+GONE = 10.0
+"""s without anybody who offers an action before its goal is given up. The middleware forgets a process that
+died, or was stopped, after 5 s."""
 
 
 class GoalSender:
@@ -49,14 +54,17 @@ class GoalSender:
             raise RequestRefusedError(f"{action} rejected the goal", int(StatusCode.FAILURE))
         result: Future = self._executor.run(handle.get_result_async)
         try:
-            if self._executor.wait(result, result_timeout):
+            if self._ended(action, client, result, result_timeout):
                 self._executor.run(_nothing)  # feedback that came with the result is called back after it
                 return result.result().result
+        except ServiceUnavailableError:  # nobody is there to cancel it
+            raise
         except BaseException:  # Ctrl-C in a script must not leave the robot moving
             self._cancel(handle, result, cancel_grace)
             raise
-        self._cancel(handle, result, cancel_grace)
-        raise CallTimedOutError(f"{action} had no result within {result_timeout:g} s: the goal was canceled")
+        ended = self._cancel(handle, result, cancel_grace)
+        since = "the goal was canceled" if ended else f"canceled, it has not ended within {cancel_grace:g} s"
+        raise CallTimedOutError(f"{action} had no result within {result_timeout:g} s: {since}")
 
     def destroy(self) -> None:
         """Let go of the action clients; call it on the spinning thread."""
@@ -64,9 +72,24 @@ class GoalSender:
             client.destroy()
         self._clients.clear()
 
-    def _cancel(self, handle: Any, result: Future, grace: float) -> None:
+    def _ended(self, action: str, client: ActionClient, result: Future, timeout: float) -> bool:
+        """Whether the goal's result has come within `timeout` [s]; raises where its node has gone."""
+        now = time.monotonic()
+        deadline, seen = now + timeout, now
+        while not self._executor.wait(result, min(0.1 * GONE, deadline - now)):
+            now = time.monotonic()
+            if client.server_is_ready():
+                seen = now
+            elif now - seen >= GONE:
+                raise ServiceUnavailableError(f"the node that ran {action} has gone: no result will come")
+            if now >= deadline:
+                return False
+        return True
+
+    def _cancel(self, handle: Any, result: Future, grace: float) -> bool:
+        """Whether the goal has ended within `grace` [s]."""
         self._executor.run(handle.cancel_goal_async)
-        self._executor.wait(result, grace)
+        return self._executor.wait(result, grace)
 
     def _client(self, action: str, action_type: Any) -> ActionClient:
         key = (action, action_type)
