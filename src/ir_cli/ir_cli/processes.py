@@ -87,6 +87,10 @@ class NodeProcesses:
                     start_new_session=True,
                 )
 
+    def ids(self) -> dict[str, int]:
+        """Process ids by module."""
+        return {name: process.pid for name, process in self._running.items()}
+
     def check(self) -> None:
         """Raise ProcessError when a node has ended on its own, with the end of what it printed."""
         for name, process in self._running.items():

@@ -64,7 +64,7 @@ class ProgramRequest:
         if load not in ("", NO_LOAD):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"load is {load!a}: in a program the steps say what is attached, leave it empty",
+                f"load is {load[:80]!a}: in a program the steps say what is attached, leave it empty",
             )
         if duration > 0.0:
             raise RequestError(
