@@ -14,6 +14,7 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     install_requires=["setuptools", "numpy", "scipy"],
+    extras_require={"ompl": ["ompl"]},
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",

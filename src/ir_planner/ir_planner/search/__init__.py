@@ -1,7 +1,7 @@
 """Searches for free paths between configurations: one port, one file each, one registry."""
 
 from ir_planner.search.guesses import guesses
-from ir_planner.search.port import Ends, Found, Search, quick
+from ir_planner.search.port import Ends, Found, Search, quick, repeatable
 from ir_planner.search.registry import SEARCHES, registered
 from ir_planner.search.shortcuts import fewest_corners, pulled, straight_along
 from ir_planner.search.tree import connect, joint_scale
@@ -24,5 +24,6 @@ __all__ = [
     "pulled",
     "quick",
     "registered",
+    "repeatable",
     "straight_along",
 ]

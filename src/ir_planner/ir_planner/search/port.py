@@ -37,7 +37,8 @@ class Search(Protocol):
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
         """Paths whose every step `space` certifies (which charges the step to its work, the same as `work`).
 
-        The same ends, space and seed give the same paths. Ends early when `work.exhausted`; what a search
+        The same ends, space and seed give the same paths; a search that can't promise that has a class
+        attribute `repeatable = False`. Ends early when `work.exhausted`; what a search
         does beside certifying steps it charges itself. Raises CancelledError when asked to stop.
         """
 
@@ -53,3 +54,8 @@ class HasQuickVariant(Protocol):
 def quick(search: Search) -> Search:
     """The search with little work, where it has such a variant; else itself."""
     return search.quick() if isinstance(search, HasQuickVariant) else search
+
+
+def repeatable(search: Search) -> bool:
+    """Whether the same question gets the same paths from the search."""
+    return bool(getattr(search, "repeatable", True))

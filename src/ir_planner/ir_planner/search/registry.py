@@ -8,7 +8,9 @@ from ir_planner.search.direct import Direct
 from ir_planner.search.genetic import Genetic
 from ir_planner.search.port import Search
 from ir_planner.search.retract import Retract
+from ir_planner.search.sbl import Sbl
 from ir_planner.search.tree import Tree
+from ir_planner.search.with_ompl import Aorrtc, Bkpiece, Kpiece, Lbkpiece, Prm, Rrt, RrtConnect
 
 SEARCHES: dict[str, Search] = {
     "direct": Direct(),
@@ -16,6 +18,14 @@ SEARCHES: dict[str, Search] = {
     "detours": Detours(),
     "retract": Retract(),
     "genetic": Genetic(),
+    "sbl": Sbl(),
+    "kpiece": Kpiece(),
+    "bkpiece": Bkpiece(),
+    "lbkpiece": Lbkpiece(),
+    "prm": Prm(),
+    "rrt": Rrt(),
+    "rrt_connect": RrtConnect(),
+    "aorrtc": Aorrtc(),
 }
 
 

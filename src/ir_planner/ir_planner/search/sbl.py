@@ -1,0 +1,205 @@
+"""Two trees whose edges are tested when they join both (SBL).
+
+Sanchez and Latombe, "A single-query bi-directional probabilistic roadmap planner with lazy collision
+checking", 2001: milestones grow where few are (a grid over two joints, which change), sampled near one of the
+tree in ever smaller cubes; a new one is joined to the nearest of the other tree; the path is then tested edge
+by edge, the least tested one first. A configuration has n coordinates in the unit cube, one per joint range;
+distances are the largest difference of a coordinate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.settings import check_settings, setting
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.search.lazy_trees import LazyTrees
+from ir_planner.search.port import Ends, Found
+from ir_planner.search.variety import NEAREST_GOALS
+
+_STATES_PER_EDGE = 40  # configurations that cost as much as one certified edge, as in the genetic search
+_SIZES = np.arange(1, 65).reshape(16, 4)  # by which the cube is divided, sample by sample, in batches
+_CERTIFIED = 64  # level of an edge that is proved: beyond all that pieces are counted by
+
+
+@dataclass(frozen=True)
+class Sbl:
+    """Two trees of milestones whose edges are tested only when they join both (SBL)."""
+
+    near: float = setting(
+        0.15,
+        "Size of the cube in which milestones are sampled, and joined; share of the joint range.",
+        minimum=0.001,
+        maximum=1.0,
+    )
+    cells: int = setting(10, "Cells of the grid along each of its two joints.", minimum=1, maximum=100)
+    redraw: int = setting(50, "Milestones until other joints span the grid.", minimum=1, maximum=100_000)
+    resolution: float = setting(
+        0.05, "Pieces that an edge is sampled in before it is proved.", unit="rad", minimum=0.001, maximum=1.0
+    )
+    milestones: int = setting(100_000, "Milestones before it is given up.", minimum=2, maximum=10_000_000)
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        """One path, or none."""
+        return _Sbl(self, ends, space, np.random.default_rng(seed)).found()
+
+
+@dataclass
+class _Bridge:
+    """Nodes of both trees, and how well the edge between them was tested."""
+
+    ends: tuple[int, int]
+    tested: int = 0
+
+
+@dataclass
+class _Sbl:
+    """One search."""
+
+    settings: Sbl
+    ends: Ends
+    space: FreeSpace
+    rng: np.random.Generator
+    _states: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        self._low, self._range = self.space.low, self.space.high - self.space.low
+        goals = self.ends.goals[:NEAREST_GOALS]
+        goals = goals[self.space.states_free(goals)]
+        self._roots = np.concatenate([self.ends.start[None], goals])
+        self._trees = LazyTrees(self._unit(self.ends.start), self._unit(goals))
+        self._grid = _Grid(self.settings.cells, self.rng)
+
+    def found(self) -> Found:
+        trees, work = self._trees, self.space.work
+        if trees.count > 1:
+            path = self._joined(0)  # start and goal may be near each other
+            while path is None and trees.count < self.settings.milestones and not work.exhausted:
+                node = self._expanded()
+                path = self._joined(node) if node >= 0 else None
+            if path is not None:
+                return Found([path])
+        return Found([], f"{trees.count} milestones were not joined")
+
+    def _unit(self, q: FloatArray) -> FloatArray:
+        return np.asarray((q - self._low) / self._range)
+
+    def _q(self, nodes: list[int]) -> FloatArray:
+        """Configurations (M, n) rad of a path's nodes; it begins and ends with roots as they were given."""
+        q = self._low + self._trees.u[nodes] * self._range
+        q[[0, -1]] = self._roots[[nodes[0], nodes[-1]]]
+        return np.asarray(q)
+
+    def _free(self, q: FloatArray) -> BoolArray:
+        """Which of q (N, n) are free; charged to the work."""
+        before = self._states // _STATES_PER_EDGE
+        self._states += len(q)
+        self.space.work.spend(self._states // _STATES_PER_EDGE - before)
+        return self.space.states_free(q)
+
+    def _expanded(self) -> int:
+        """A new milestone near one where few are, in either tree; -1 where no sample was free."""
+        trees = self._trees
+        self.space.work.spend(1)  # what a milestone costs beside its samples
+        if trees.count % self.settings.redraw == 0:
+            self._grid.redraw(trees.u.shape[1])
+        tree = int(self.rng.integers(2))
+        parent = self._grid.picked(trees, tree)
+        here = trees.u[parent]
+        for parts in _SIZES:
+            size = self.settings.near / parts[:, None]
+            u = self.rng.uniform(np.maximum(here - size, 0.0), np.minimum(here + size, 1.0))
+            free = np.flatnonzero(self._free(self._low + u * self._range))
+            if len(free):
+                return trees.add(u[free[0]], parent, tree)
+            if self.space.work.exhausted:
+                break
+        return -1
+
+    def _joined(self, node: int) -> FloatArray | None:
+        """The path over a bridge from a node to the other tree, where both are near and all of it is free."""
+        other, far = self._trees.nearest(node)
+        if far >= self.settings.near:
+            return None
+        ends = (node, other) if self._trees.tree_of(node) == 0 else (other, node)
+        return self._tested(_Bridge(ends))
+
+    def _tested(self, bridge: _Bridge) -> FloatArray | None:
+        """The path from the start over the bridge to a goal; None where an edge is blocked, which is taken
+        out.
+        """
+        trees, (left, right) = self._trees, bridge.ends
+        back, on = trees.to_root(left), trees.to_root(right)
+        nodes = [*back[::-1], *on]
+        # the node that an edge belongs to, the one farther from its root; -1 for the bridge
+        owners = [*back[-2::-1], -1, *on[:-1]]
+        q = self._q(nodes)
+        length = np.abs(np.diff(q, axis=0)).max(axis=1)
+        level = np.array([bridge.tested if owner < 0 else trees.tested[owner] for owner in owners])
+        while not self.space.work.exhausted:
+            piece = np.where(level < _CERTIFIED, length / 2.0 ** np.minimum(level, 60), 0.0)
+            k = int(piece.argmax())
+            if piece[k] <= self.settings.resolution:
+                break
+            shares = np.arange(1, 2 ** (level[k] + 1), 2) / 2 ** (level[k] + 1)
+            if not self._free(q[k] + shares[:, None] * (q[k + 1] - q[k])).all():
+                self._cut(owners[k], bridge)
+                return None
+            level[k] += 1
+            self._note(owners[k], bridge, int(level[k]))
+        return q if self._proved(q, level, owners, bridge) else None
+
+    def _proved(self, q: FloatArray, level: FloatArray, owners: list[int], bridge: _Bridge) -> bool:
+        """Whether every edge of the path q (M, n) is certified; the first that isn't is taken out."""
+        open_edges = np.flatnonzero(level < _CERTIFIED)
+        free = self.space.edges_free(q[open_edges], q[open_edges + 1])
+        for k in open_edges[free]:
+            self._note(owners[k], bridge, _CERTIFIED)
+        if free.all():
+            return True
+        if not self.space.work.exhausted:
+            self._cut(owners[open_edges[~free][0]], bridge)
+        return False
+
+    def _note(self, owner: int, bridge: _Bridge, level: int) -> None:
+        if owner < 0:
+            bridge.tested = level
+        else:
+            self._trees.tested[owner] = level
+
+    def _cut(self, owner: int, bridge: _Bridge) -> None:
+        """Take out a blocked edge: what hangs behind it goes to the other tree, over the bridge."""
+        if owner >= 0:
+            left, right = bridge.ends
+            inside, outside = (left, right) if self._trees.tree_of(owner) == 0 else (right, left)
+            self._trees.move(owner, inside, outside, bridge.tested)
+
+
+class _Grid:
+    """Cells over two joints: a milestone is picked from a cell that is picked among those that have any."""
+
+    def __init__(self, cells: int, rng: np.random.Generator) -> None:
+        self._cells, self._rng = cells, rng
+        self._joints = np.array([0, 1])
+
+    def redraw(self, n: int) -> None:
+        """Other two of n joints."""
+        self._joints = self._rng.choice(n, size=2, replace=False)
+
+    def picked(self, trees: LazyTrees, tree: int) -> int:
+        """A node of the tree."""
+        members = trees.members(tree)
+        place = np.minimum(
+            (trees.u[np.ix_(members, self._joints)] * self._cells).astype(int), self._cells - 1
+        )
+        cell = place[:, 0] * self._cells + place[:, 1]
+        cells = np.unique(cell)
+        inside = members[cell == cells[self._rng.integers(len(cells))]]
+        return int(inside[self._rng.integers(len(inside))])

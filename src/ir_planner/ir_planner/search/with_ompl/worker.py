@@ -1,0 +1,156 @@
+"""The processes in which OMPL runs: one that has loaded it, and for each request one forked from that.
+
+OMPL draws from one generator per process and stops where it looks for its end, so each request gets a
+process of its own: the seed decides its answer, and whatever it does it can be killed. Motions are certified
+edges of the same kernel that the project's searches use; what a planner may spend is counted in them.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.search.with_ompl.problem import Outcome, Parameters, Problem
+
+try:
+    from ompl import base, geometric, util
+
+    _REASON = ""
+except ImportError as error:  # reported to whoever asks
+    _REASON = str(error)
+
+STATES_PER_EDGE = 40  # configurations that cost as much as one certified edge, as in the genetic search
+_LOOK = 64  # checks between two looks whether somebody still waits for the answer
+_GRACE = 600.0  # s beyond the ceiling: who asks ends the process at the ceiling, this is for when nobody does
+_JOINTS_OF_CELLS = 3  # the first joints carry the arm
+
+
+def main(descriptor: int) -> None:
+    """Fork a process for every connection that arrives over a socket, until its other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who asks
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for the forked: no zombies
+    if not _REASON:
+        util.setLogLevel(util.LogLevel.LOG_NONE)
+    with socket.socket(fileno=descriptor) as requests:
+        while True:
+            message, descriptors, _, _ = socket.recv_fds(requests, 1, 1)
+            if not message:
+                os._exit(0)  # without the destructors of libraries, which complain
+            if os.fork() == 0:
+                requests.close()
+                _answer(Connection(descriptors[0]))
+                os._exit(0)
+            os.close(descriptors[0])
+
+
+def _answer(connection: Connection) -> None:
+    connection.send(os.getpid())
+    problem: Problem = connection.recv()
+    signal.setitimer(signal.ITIMER_REAL, problem.seconds + _GRACE)
+    try:
+        outcome = Outcome(None, 0, _REASON) if _REASON else solved(problem, connection)
+    except Exception as error:  # goes to who asked, whatever it is: this process has no other voice
+        outcome = Outcome(None, 0, f"{type(error).__name__}: {error}")
+    connection.send(outcome)
+
+
+class _Counted:
+    """Configurations and motions, checked and counted; ends the search when its checks are spent.
+
+    The planner asks `end` in C++, without Python's lock: PRM waits for a thread of its own that asks it too.
+    """
+
+    def __init__(self, problem: Problem, connection: Connection) -> None:
+        self._space = FreeSpace(problem.scene, problem.threshold, Work(2**62, 1.0, lambda: 0.0))
+        self._most, self._connection = problem.edges * STATES_PER_EDGE, connection
+        self._n, self._spent, self._looks = len(problem.start), 0, 0
+        self.end = base.plannerNonTerminatingCondition()
+
+    @property
+    def edges(self) -> int:
+        """What was spent."""
+        return -(-self._spent // STATES_PER_EDGE)
+
+    def state(self, state: base.State) -> bool:
+        """Whether a configuration is free."""
+        q = np.array([state[0 : self._n]])
+        return self._affordable(1) and bool(self._space.states_free(q)[0])
+
+    def motion(self, first: base.State, last: base.State) -> bool:
+        """Whether a straight joint movement is certified free."""
+        q0, q1 = np.array([first[0 : self._n]]), np.array([last[0 : self._n]])
+        return self._affordable(STATES_PER_EDGE) and bool(self._space.edges_free(q0, q1)[0])
+
+    def _affordable(self, states: int) -> bool:
+        """Charge a check; False, and the search ends, where nothing is left."""
+        if self._spent >= self._most:
+            self.end.terminate()
+            return False
+        self._spent += states
+        self._looks += 1
+        if self._looks % _LOOK == 0 and select.select([self._connection], [], [], 0.0)[0]:
+            os._exit(1)  # nothing is sent after the problem: who asked has gone
+        return True
+
+
+def solved(problem: Problem, connection: Connection) -> Outcome:
+    """One planner, one problem."""
+    util.RNG.setSeed(problem.seed % (2**32 - 1) + 1)
+    counted = _Counted(problem, connection)
+    n, robot = len(problem.start), problem.scene.cell.robot
+    bounds = base.RealVectorBounds(n)
+    for joint in range(n):
+        bounds.setLow(joint, float(robot.position_min[joint]))
+        bounds.setHigh(joint, float(robot.position_max[joint]))
+    space = base.RealVectorStateSpace(n)
+    space.setBounds(bounds)
+    setup = geometric.SimpleSetup(space)
+    information = setup.getSpaceInformation()
+    setup.setStateValidityChecker(counted.state)
+    validator = _validator(information, counted)
+    information.setMotionValidator(validator)
+    start = space.allocState()
+    start[0:n] = problem.start.tolist()
+    setup.setStartState(start)
+    goals = base.GoalStates(information)
+    for configuration in problem.goals:
+        goal = space.allocState()
+        goal[0:n] = configuration.tolist()
+        goals.addState(goal)
+    setup.setGoal(goals)
+    setup.setPlanner(_planner(information, space, problem.parameters))
+    setup.solve(counted.end)
+    if not setup.haveExactSolutionPath():
+        return Outcome(None, counted.edges)
+    states = setup.getSolutionPath().getStates()
+    return Outcome(np.array([state[0:n] for state in states]), counted.edges)
+
+
+def _validator(information: base.SpaceInformation, counted: _Counted) -> base.MotionValidator:
+    """Certified edges as OMPL's check of motions."""
+
+    class Certified(base.MotionValidator):  # type: ignore[misc]
+        def checkMotion(self, first: base.State, last: base.State) -> bool:  # noqa: N802 - OMPL's name
+            return counted.motion(first, last)
+
+    return Certified(information)
+
+
+def _planner(
+    information: base.SpaceInformation, space: base.StateSpace, parameters: Parameters
+) -> base.Planner:
+    planner = getattr(geometric, parameters.planner)(information)
+    for name, value in parameters.values.items():
+        getattr(planner, f"set{name}")(value)
+    if parameters.cell > 0.0:
+        joints = list(range(min(_JOINTS_OF_CELLS, space.getDimension())))
+        sizes = [parameters.cell] * len(joints)
+        planner.setProjectionEvaluator(base.RealVectorOrthogonalProjectionEvaluator(space, sizes, joints))
+    return planner

@@ -1,0 +1,92 @@
+"""OMPL's planners as searches: late ones are killed, blocked paths repaired, a missing OMPL named."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from ir_kernels.collision import FREE
+from ir_planner import CancelledError, RequestError
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.scene import PlanningScene
+from ir_planner.search import SEARCHES, Ends, with_ompl
+from ir_planner.search.with_ompl import adapter, host
+from ir_planner.search.with_ompl.adapter import repaired
+from ir_planner.search.with_ompl.problem import Outcome, Problem
+
+SceneOf = Callable[[str], PlanningScene]
+S_M = 0.02
+
+
+def a_blocked_task(scene_of: SceneOf, work: Work) -> tuple[Ends, FreeSpace]:
+    scene = scene_of("table_columns")
+    task = scene.cell.task("tL->tR")
+    return Ends(np.array(task.start), np.array([task.goal])), FreeSpace.of(scene, S_M, work)
+
+
+def test_without_ompl_a_sentence_says_how_to_install_it(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(host, "find_spec", lambda name: None)
+    ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
+    with pytest.raises(RequestError, match='"kpiece" needs OMPL: pip install'):
+        SEARCHES["kpiece"].find(ends, space, 1, space.work)
+
+
+def test_at_the_ceiling_it_is_killed(scene_of: SceneOf) -> None:
+    """The clock reaches the deadline while OMPL searches; RRT would need minutes for its checks."""
+    ticks: Iterator[float] = itertools.count(0.0, 0.1)
+    ends, space = a_blocked_task(scene_of, Work(10_000_000, 1.0, ticks.__next__))
+    ends = Ends(ends.start, ends.goals + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 50.0]))  # beyond every range
+    found = SEARCHES["rrt"].find(ends, space, 1, space.work)
+    assert found.paths == []
+    assert space.work.truncated
+
+
+def test_a_request_that_is_cancelled_meanwhile_raises(scene_of: SceneOf) -> None:
+    looks = itertools.count()
+    work = Work(10_000_000, 1.0, lambda: 0.0, lambda: next(looks) > 3)
+    ends, space = a_blocked_task(scene_of, work)
+    with pytest.raises(CancelledError):
+        SEARCHES["rrt"].find(Ends(ends.start, ends.goals + 50.0), space, 1, work)
+
+
+def test_a_process_that_dies_is_an_answer_without_a_path(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_planner(problem: Problem, work: Work) -> Outcome:
+        return asked(Problem(**{**vars(problem), "parameters": "no parameters"}), work)
+
+    asked = adapter.asked
+    monkeypatch.setattr(adapter, "asked", no_planner)
+    ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
+    found = with_ompl.Rrt().find(ends, space, 1, space.work)
+    assert found.paths == []
+    assert "AttributeError" in found.note
+
+
+def test_a_path_that_is_blocked_between_its_points_is_repaired_or_refused(scene_of: SceneOf) -> None:
+    ends, space = a_blocked_task(scene_of, Work(100_000, 1.0, lambda: 0.0))
+    straight = np.stack([ends.start, ends.goals[0]])
+    assert space.certificates(straight[:1], straight[1:]).verdict[0] != FREE
+    path = repaired(straight, space, 1)
+    assert path is not None
+    assert len(path) > 2
+    assert np.array_equal(path[[0, -1]], straight)
+    assert (space.certificates(path[:-1].copy(), path[1:].copy()).verdict == FREE).all()
+    beyond = a_blocked_task(scene_of, Work(2, 1.0, lambda: 0.0))[1]
+    assert repaired(straight, beyond, 1) is None
+
+
+def test_what_ompl_answers_is_never_returned_unchecked(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends, space = a_blocked_task(scene_of, Work(100_000, 1.0, lambda: 0.0))
+    straight = np.stack([ends.start, ends.goals[0]])
+    monkeypatch.setattr(adapter, "asked", lambda problem, work: Outcome(straight, 1))
+    (path,) = with_ompl.Rrt().find(ends, space, 1, space.work).paths
+    assert (space.certificates(path[:-1].copy(), path[1:].copy()).verdict == FREE).all()
