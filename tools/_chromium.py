@@ -91,8 +91,8 @@ class Browser:
                 return result
             self.events.append(message)
 
-    def open(self, page: Path, wide: int, high: int, **options: Any) -> Page:
-        """A page in a window of its own; options as of Page."""
+    def open(self, page: Path | str, wide: int, high: int, **options: Any) -> Page:
+        """A page of a file or an address, in a window of its own; options as of Page."""
         return Page(self, page, wide, high, **options)
 
 
@@ -104,9 +104,17 @@ class Page:
     """A page that is loaded, and operated as a person does."""
 
     def __init__(
-        self, browser: Browser, page: Path, wide: int, high: int, *, dark: bool = False, touch: bool = False
+        self,
+        browser: Browser,
+        page: Path | str,
+        wide: int,
+        high: int,
+        *,
+        dark: bool = False,
+        touch: bool = False,
     ) -> None:
-        self._browser, self._address = browser, page.resolve().as_uri()
+        self._browser = browser
+        self._address = page if isinstance(page, str) else page.resolve().as_uri()
         target = browser.call("Target.createTarget", url="about:blank")["targetId"]
         self._session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         self._target = target
@@ -116,7 +124,8 @@ class Page:
         scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self.call("Emulation.setEmulatedMedia", features=scheme)
         self.call("Page.navigate", url=self._address)
-        self.wait(f"location.href === {json.dumps(self._address)} && document.readyState === 'complete'")
+        asked = json.dumps(self._address.partition("#")[0])
+        self.wait(f"location.href.split('#')[0] === {asked} && document.readyState === 'complete'")
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """The answer to one command of this page."""

@@ -92,6 +92,14 @@ RECORDER = Rights(
         *(f"{node}/{verb}_parameters" for node in NODES[:-1] for verb in ("list", "get")),
     ),
 )
+LIVE = Rights(
+    subscribe=(
+        *(names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PLC_INPUTS_IN_FORCE),
+        *(names.PLC_OUTPUTS, names.CARRIED_LOAD, names.MACHINE_STATES, names.CONTACTS),
+        *(names.CELL, names.PLANNED_TRAJECTORY, names.PROGRAM_STATE),
+    ),
+    request=(names.SET_PLC_INPUT, names.GET_TRAJECTORY),
+)
 CELL = dict(zip(NODES, (PLANNER, DRIVER, RUNNER, RECORDER), strict=True))
 PEOPLE = Rights(
     publish=COMMANDS,
@@ -107,7 +115,7 @@ PEOPLE = Rights(
 def rights() -> dict[str, Rights]:
     """Rights of every node, the common ones and its own parameters included."""
     found = {}
-    for node, own in {**CELL, OPERATOR: PEOPLE}.items():
+    for node, own in {**CELL, names.LIVE: LIVE, OPERATOR: PEOPLE}.items():
         found[node] = Rights(
             _sorted(own.publish, COMMON.publish, (f"{node}/{names.CALLS}",) if node in NODES else ()),
             _sorted(own.subscribe, COMMON.subscribe),

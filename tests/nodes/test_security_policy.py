@@ -18,6 +18,7 @@ from rclpy.parameter import Parameter
 from ir_planner.node.node import PlannerNode
 from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.listen.topics import TopicSelection
+from ir_recorder.live.node import LiveNode
 from ir_recorder.node import RecorderNode
 from ir_sim_driver.node import SimDriver
 
@@ -91,6 +92,7 @@ def nodes(ros_context: Any, ros_executor: Any) -> dict[str, Any]:
         "ir_sim_driver": made(SimDriver, cell="open", backend="ideal", wake_port=0),
         "ir_program_runner": made(ProgramRunnerNode),
         "ir_recorder": made(RecorderNode),
+        "ir_live": made(LiveNode),
     }
 
 

@@ -31,6 +31,7 @@ KNOWS = {
     "fit": {"analysis", "errors", "measure", "read", "report", "traces"},
     "analysis": READING | {"measure", "traces"},
     "report": READING | {"analysis"},
+    "live": {"analysis", "errors", "read", "report"},
     "report_main": READING | {"analysis", "arguments", "report", "traces"},
     "node": {
         *("arguments", "diagnose", "errors", "format", "gather", "listen", "parameters", "serve"),

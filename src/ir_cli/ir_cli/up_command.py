@@ -56,7 +56,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run_up(arguments: argparse.Namespace) -> int:
     """Start the nodes and watch them; an end of one of them ends all."""
-    namespace = _absolute(arguments.namespace)
+    namespace = absolute_namespace(arguments.namespace)
     parameters = given_parameters(arguments.parameters)
     cell = load_cell(arguments.cell)
     if arguments.domain is not None:
@@ -129,7 +129,7 @@ def _refuse_beside(namespace: str) -> None:
         )
 
 
-def _absolute(namespace: str) -> str:
+def absolute_namespace(namespace: str) -> str:
     """The namespace with one leading slash, "" for none. CommandError for one that ROS does not allow."""
     bare = namespace.strip("/")
     if not bare:

@@ -18,6 +18,7 @@ SIM_DRIVER: Final = "ir_sim_driver"
 PROGRAM_RUNNER: Final = "ir_program_runner"
 RECORDER: Final = "ir_recorder"
 PLAY: Final = "ir_play"
+LIVE: Final = "ir_live"
 CALLS: Final = "calls"  # topic of every node that answers: its requests and answers, for recordings
 
 # of nobody in particular

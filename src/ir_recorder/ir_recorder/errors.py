@@ -12,6 +12,7 @@
     ├── ReadError        not a recording at all, or nothing in it that could be read
     ├── TraceError       measured data that make no sense, with the line and the column
     ├── CostsError       a file of prices that makes no sense, with the key
+    ├── LiveError        the live view can't be served
     └── FitError         data that a fit can't use
 """
 
@@ -58,3 +59,7 @@ class CostsError(RecorderError):
 
 class FitError(RecorderError):
     """Data that no parameter can be fitted to."""
+
+
+class LiveError(RecorderError):
+    """The live view can't be served; the sentence says why."""

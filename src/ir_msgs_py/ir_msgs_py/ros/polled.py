@@ -53,3 +53,24 @@ class LatestMessage:
             return None
         message, info = taken
         return Received(message, max(0.0, (time.time_ns() - info["received_timestamp"]) * 1e-9))
+
+
+class PolledTopic:
+    """The newest messages of a topic with the quality of service that is asked for."""
+
+    def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
+        self._most = max(1, qos.depth)
+        self._subscription = node.create_subscription(
+            message_type, topic, lambda message: None, qos, callback_group=PolledGroup()
+        )
+
+    def take(self) -> list[Any]:
+        """Return what has come since the last call, oldest first; at most the depth asked for."""
+        taken: list[Any] = []
+        with self._subscription.handle:
+            while len(taken) < self._most:
+                found = self._subscription.handle.take_message(self._subscription.msg_type, False)
+                if found is None:
+                    break
+                taken.append(found[0])
+        return taken

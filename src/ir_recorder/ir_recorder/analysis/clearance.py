@@ -15,6 +15,7 @@ from ir_description import Cell, PartPlaces
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR
+from ir_msgs_py.report import PlannedMovement
 from ir_recorder.analysis.loads import held_part, normal
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import JointSeries
@@ -50,13 +51,13 @@ def step_clearances(
     for step in steps:
         result.append(None if step.movement.is_pause else _along(cell, joints, step, places))
         if step.outcome == "ended":
-            places = places_after(cell, places, step)
+            places = places_after(cell, places, step.movement)
     return tuple(result)
 
 
-def places_after(cell: Cell, places: PartPlaces, step: ExecutedStep) -> PartPlaces:
+def places_after(cell: Cell, places: PartPlaces, movement: PlannedMovement) -> PartPlaces:
     """Where the parts are after a step that ended."""
-    movement, lying = step.movement, dict(places.lying)
+    lying = dict(places.lying)
     parts = {part.name for part in cell.parts}
     if movement.attach in parts:
         return PartPlaces(movement.attach, {**lying, movement.attach: ""})
@@ -86,7 +87,7 @@ def _along(cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlac
     if not len(rows) or joints.position.shape[1] != cell.robot.n:
         return None
     model = collision_model(cell, step.movement.load, places)
-    own = _allowed(cell, step, model)
+    own = allowed_pairs(cell, step.movement, model)
     offset = np.where(np.isnan(own), 0.0, -np.inf)
     stride = _stride(joints.time[rows])
     coarse = rows[::stride]
@@ -100,9 +101,9 @@ def _along(cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlac
         near.distance,
         near.point_a,
         near.point_b,
-        tuple(_pair(model, index) for index in near.pair),
+        tuple(pair_name(model, index) for index in near.pair),
         float(finer.distance[least]),
-        _pair(model, finer.pair[least]),
+        pair_name(model, finer.pair[least]),
         float(joints.time[fine[least]]),
         _contact_margin(model, joints.position[coarse], own),
     )
@@ -113,10 +114,10 @@ def _stride(time: FloatArray) -> int:
     return max(1, round(COARSE / max(float(np.median(np.diff(time))), 1e-4))) if len(time) > 1 else 1
 
 
-def _allowed(cell: Cell, step: ExecutedStep, model: CollisionModel) -> FloatArray:
+def allowed_pairs(cell: Cell, movement: PlannedMovement, model: CollisionModel) -> FloatArray:
     """Own safety distance (Z,) of pairs that the step's stations allow to touch, NaN for all others."""
     own = np.full(len(model.pairs), np.nan)
-    ends = (step.movement.from_station, step.movement.to_station)
+    ends = (movement.from_station, movement.to_station)
     for station in cell.stations:
         if station.name in ends:
             for contact in station.allowed_contacts:
@@ -134,5 +135,6 @@ def _contact_margin(model: CollisionModel, q: FloatArray, own: FloatArray) -> fl
     return float((near.distance - own[near.pair]).min())
 
 
-def _pair(model: CollisionModel, index: int) -> str:
+def pair_name(model: CollisionModel, index: int) -> str:
+    """The two bodies of a pair, "" for none."""
     return "" if index == _NONE else f"{model.pairs[index].body_a} – {model.pairs[index].body_b}"

@@ -43,16 +43,20 @@ class ExecutedStep:
     @property
     def label(self) -> str:
         """In a few words: "infeed → lathe", "into lathe", "pause at lathe (BUS_POWER_OFF)"."""
-        movement = self.movement
-        if movement.is_pause:
-            place = movement.to_station or movement.from_station
-            where = f" at {place}" if place else ""
-            mode = f" ({movement.power_mode})" if movement.power_mode else ""
-            return f"pause{where}{mode}"
-        if movement.from_station == movement.to_station != "":
-            direction = {MovementKind.SERVICE_ENTRY: "into", MovementKind.SERVICE_EXIT: "out of"}
-            return f"{direction.get(MovementKind(movement.kind), 'at')} {movement.to_station}"
-        return f"{movement.from_station or 'start'} → {movement.to_station or 'goal'}"
+        return step_label(self.movement)
+
+
+def step_label(movement: PlannedMovement) -> str:
+    """A step in a few words."""
+    if movement.is_pause:
+        place = movement.to_station or movement.from_station
+        where = f" at {place}" if place else ""
+        mode = f" ({movement.power_mode})" if movement.power_mode else ""
+        return f"pause{where}{mode}"
+    if movement.from_station == movement.to_station != "":
+        direction = {MovementKind.SERVICE_ENTRY: "into", MovementKind.SERVICE_EXIT: "out of"}
+        return f"{direction.get(MovementKind(movement.kind), 'at')} {movement.to_station}"
+    return f"{movement.from_station or 'start'} → {movement.to_station or 'goal'}"
 
 
 def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:

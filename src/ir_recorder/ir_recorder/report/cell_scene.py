@@ -107,5 +107,5 @@ def _mesh(mesh: Mesh) -> dict[str, Json]:
 
 
 def matrix(pose: FloatArray) -> list[float]:
-    """Column-major, as WebGL wants it."""
+    """A pose (4, 4) column by column, as WebGL wants it."""
     return [round(float(x), 6) for x in np.asarray(pose).T.ravel()]

@@ -56,8 +56,10 @@ def _part_places(analysis: Analysis, cell: Cell) -> list[dict[str, Json]]:
     """For each part its meshes, and from when on it lies where (no pose: it is held or nowhere)."""
     changes: list[tuple[float, PartPlaces]] = [(-1e9, cell.parts_at_start())]
     for result in analysis.steps:
-        places = places_after(cell, changes[-1][1], result.step) if result.step.outcome == "ended" else None
-        if places is not None and places is not changes[-1][1]:
+        if result.step.outcome != "ended":
+            continue
+        places = places_after(cell, changes[-1][1], result.step.movement)
+        if places is not changes[-1][1]:
             changes.append((result.step.end, places))
     parts: list[dict[str, Json]] = []
     for part in cell.parts:

@@ -198,6 +198,7 @@ class PowerChart extends TimeChart {
     super(canvas, timeline, tip);
     this.power = data.power && { time: floats(data.power.time), low: floats(data.power.low), high: floats(data.power.high) };
     this.most = this.power ? this.power.high.reduce((a, b) => Math.max(a, b), 100) : 100;
+    this.gap = Infinity; /* s: readings that are further apart are not joined */
     this.take(data.lanes);
   }
   /* The lanes to draw; the chart grows with them. */
@@ -271,7 +272,7 @@ class PowerChart extends TimeChart {
     for (let i = first; i <= until; i++) {
       const x = Math.round(this.x(time[i]) * 2) / 2, end = columns[columns.length - 1];
       if (end && end.x === x) { end.low = Math.min(end.low, low[i]); end.high = Math.max(end.high, high[i]); }
-      else columns.push({ x, low: low[i], high: high[i] });
+      else columns.push({ x, low: low[i], high: high[i], apart: i > first && time[i] - time[i - 1] > this.gap });
     }
     g.beginPath();
     g.moveTo(columns[0].x, y(0));
@@ -285,7 +286,7 @@ class PowerChart extends TimeChart {
     g.lineWidth = 1.3;
     g.beginPath();
     columns.forEach((c, k) => {
-      if (k === 0) g.moveTo(c.x, y(c.high)); else g.lineTo(c.x, y(c.high));
+      if (k === 0 || c.apart) g.moveTo(c.x, y(c.high)); else g.lineTo(c.x, y(c.high));
       if (c.high > c.low) g.lineTo(c.x, y(c.low));
     });
     g.stroke();

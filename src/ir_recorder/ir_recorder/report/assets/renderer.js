@@ -179,6 +179,7 @@ class GlRenderer {
     gl.disableVertexAttribArray(3);
   }
   release(path) { this.gl.deleteBuffer(path.buffer); }
+  forget(mesh) { for (const buffer of [...mesh.buffers, mesh.index]) this.gl.deleteBuffer(buffer); }
   end() {}
 }
 
@@ -233,6 +234,7 @@ class PlainRenderer {
     }
   }
   release() {}
+  forget() {}
   end() {
     const g = this.g;
     for (const list of [this.under, this.faces.sort((a, b) => b.depth - a.depth)]) {

@@ -1,0 +1,235 @@
+"""The server of the live view: one page, the cell's scene, a stream of events, and requests of its buttons.
+
+    GET /        the page
+    GET /scene   the cell as JSON (404 while it isn't known)
+    GET /events  server-sent events: `start` with what is kept, then `records`
+    POST /press  {"name": "ab", "value": true}: a bit of the PLC, with the token
+
+It listens on 127.0.0.1 alone. Every connection has a thread that only reads what is kept, so a browser that
+is slow or dead costs its own connection and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, NamedTuple
+
+from ir_msgs_py.checks import one_line
+from ir_recorder.errors import LiveError
+from ir_recorder.live.guard import ADDRESS, Guard
+from ir_recorder.live.page import NONCE, live_page
+from ir_recorder.live.stream import Stream
+
+MOST_CONNECTIONS = 32
+"""Browsers and their requests at a time. Each that watches costs a thread that wakes 20 times a second."""
+PATIENCE = 5.0  # s: for a request to be sent, and for a browser to take what it is sent
+SILENCE = 1.0  # s: then a comment is sent, and a browser that has gone is noticed
+MOST_BODY = 1_000  # bytes of a request
+_REFUSED_AT_ONCE = (
+    b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
+    b"too many browsers look at this cell; close one\n"
+)
+
+
+class Answer(NamedTuple):
+    """What came of a button: whether it was done, and a sentence."""
+
+    done: bool
+    sentence: str
+
+
+Press = Callable[[str, bool], Answer]
+"""Asks for a level of a PLC bit and waits for the answer; called from a connection's thread."""
+
+
+class LiveServer:
+    """Serves a stream to browsers from a thread of its own until it is closed.
+
+    press: does what a button asks for; scene: the cell as JSON, b"" while it isn't known. LiveError where the
+    port is taken. port 0: a free one.
+    """
+
+    def __init__(self, stream: Stream, press: Press, scene: Callable[[], bytes], port: int = 0) -> None:
+        try:
+            self._server = _Server((ADDRESS, port), _Handler)
+        except (OSError, OverflowError) as error:
+            raise LiveError(f"port {port} of {ADDRESS} can't be listened on: {error}") from error
+        self.port = int(self._server.server_address[1])
+        self._server.guard = self.guard = Guard(self.port)
+        self._server.stream, self._server.press, self._server.scene = stream, press, scene
+        self._stream = stream
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(0.1,), name="live", daemon=True
+        )
+        self._thread.start()
+
+    @property
+    def address(self) -> str:
+        """What a browser opens; whoever has it may press the buttons."""
+        return f"http://{ADDRESS}:{self.port}/#{self.guard.token}"
+
+    @property
+    def connections(self) -> int:
+        """How many there are now."""
+        return self._server.connections
+
+    def close(self) -> None:
+        """Ends all connections."""
+        self._stream.close()
+        self._server.shutdown()
+        self._thread.join()
+        self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    block_on_close = False
+    request_queue_size = 128
+    guard: Guard
+    stream: Stream
+    press: Press
+    scene: Callable[[], bytes]
+
+    def __init__(self, *arguments: Any) -> None:
+        self._places = threading.Lock()
+        self.connections = 0
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """A thread for the connection where one is free, else a short refusal."""
+        with self._places:
+            free = self.connections < MOST_CONNECTIONS
+            self.connections += free
+        if free:
+            try:
+                super().process_request(request, client_address)
+            except BaseException:  # no thread could be started
+                self._leave()
+                raise
+            return
+        request.setblocking(False)
+        with suppress(OSError):  # it has gone, or doesn't read
+            request.send(_REFUSED_AT_ONCE)
+        self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """As the base class does it, and frees the place."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._leave()
+
+    def _leave(self) -> None:
+        with self._places:
+            self.connections -= 1
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A connection that broke is nobody's error."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    timeout = PATIENCE
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "ir_live", ""
+    error_message_format, error_content_type = "%(message)s\n", "text/plain; charset=utf-8"
+
+    def do_GET(self) -> None:
+        if refusal := self.server.guard.refusal(self.headers):  # type: ignore[arg-type]
+            self._say(HTTPStatus.FORBIDDEN, refusal)
+        elif self.path == "/":
+            self._send(HTTPStatus.OK, "text/html; charset=utf-8", live_page().encode())
+        elif self.path == "/scene":
+            scene = self.server.scene()
+            found = HTTPStatus.OK if scene else HTTPStatus.NOT_FOUND
+            self._send(found, "application/json", scene or b"null")
+        elif self.path == "/events":
+            self._events()
+        else:
+            self._say(HTTPStatus.NOT_FOUND, "there is /, /scene and /events")
+
+    def do_POST(self) -> None:
+        guard, headers = self.server.guard, self.headers
+        refusal = guard.refusal(headers) or guard.command_refusal(headers)  # type: ignore[arg-type]
+        length = headers.get("Content-Length", "")
+        if refusal:
+            self._say(HTTPStatus.FORBIDDEN, refusal)
+        elif self.path != "/press":
+            self._say(HTTPStatus.NOT_FOUND, "there is /press")
+        elif not (length.isascii() and length.isdigit() and int(length) <= MOST_BODY):
+            self._say(HTTPStatus.BAD_REQUEST, f"a request has a Content-Length of at most {MOST_BODY} bytes")
+        elif (command := _command(self.rfile.read(int(length)))) is None:
+            self._say(HTTPStatus.BAD_REQUEST, 'a request is {"name": TEXT, "value": true or false}')
+        else:
+            answer = self.server.press(*command)
+            self._send(HTTPStatus.OK, "application/json", json.dumps(answer._asdict()).encode())
+
+    def _events(self) -> None:
+        self.send_response(HTTPStatus.OK)
+        self._headers("text/event-stream")
+        self.send_header("Connection", "close")
+        self.end_headers()
+        self.close_connection = True
+        stream = self.server.stream
+        content, number = stream.begin()
+        self._event(b"start", content)
+        while not stream.closed:
+            kept = stream.after(number, SILENCE)
+            if kept is None:
+                content, number = stream.begin()
+                self._event(b"start", content)
+                continue
+            records, number = kept
+            if records:
+                self._event(b"records", b"[" + b",".join(records) + b"]")
+            else:
+                self.wfile.write(b": nothing new\n\n")
+
+    def _event(self, name: bytes, data: bytes) -> None:
+        self.wfile.write(b"event: " + name + b"\ndata: " + data + b"\n\n")
+
+    def _say(self, status: HTTPStatus, sentence: str) -> None:
+        self._send(status, "text/plain; charset=utf-8", f"{one_line(sentence)}\n".encode())
+
+    def _send(self, status: HTTPStatus, kind: str, content: bytes) -> None:
+        self.send_response(status)
+        self._headers(kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Connection", "close")
+        self.end_headers()
+        self.close_connection = True
+        self.wfile.write(content)
+
+    def _headers(self, kind: str) -> None:
+        own = f"script-src 'nonce-{NONCE}'; style-src 'nonce-{NONCE}'; connect-src 'self'; img-src data:; "
+        closed = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        for name, value in (
+            ("Content-Type", kind),
+            ("Content-Security-Policy", own + closed),
+            ("Cache-Control", "no-store"),
+            ("Referrer-Policy", "no-referrer"),
+            ("X-Content-Type-Options", "nosniff"),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+            ("Cross-Origin-Opener-Policy", "same-origin"),
+        ):
+            self.send_header(name, value)
+
+    def log_message(self, format: str, *arguments: Any) -> None:
+        """Nothing is logged: addresses hold no news, and their text is a stranger's."""
+
+
+def _command(body: bytes) -> tuple[str, bool] | None:
+    """Name and level of a bit; None for anything else."""
+    try:
+        content = json.loads(body)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(content, dict) or set(content) != {"name", "value"}:
+        return None
+    name, value = content["name"], content["value"]
+    return (name, value) if isinstance(name, str) and isinstance(value, bool) else None

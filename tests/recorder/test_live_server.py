@@ -1,0 +1,206 @@
+"""Who is answered by the live view's server, what it says, and that nobody holds it up."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from http.client import HTTPConnection, HTTPResponse
+from typing import Any
+
+import pytest
+
+from ir_recorder.errors import LiveError
+from ir_recorder.live.commands import BITS, MOST_WAITING, Command, Commands
+from ir_recorder.live.server import MOST_BODY, MOST_CONNECTIONS, Answer, LiveServer
+from ir_recorder.live.stream import Stream
+
+PRESSED = json.dumps({"name": "ab", "value": True})
+
+
+class Cell:
+    """A server with a stream, and what its buttons asked for."""
+
+    def __init__(self) -> None:
+        self.stream, self.scene = Stream(), b""
+        self.pressed: list[tuple[str, bool]] = []
+        self.server = LiveServer(self.stream, self.press, lambda: self.scene)
+
+    def press(self, name: str, value: bool) -> Answer:
+        self.pressed.append((name, value))
+        return Answer(True, "set")
+
+    def ask(self, method: str, path: str, body: str | None = None, **headers: str) -> HTTPResponse:
+        """An answer; headers by name with _ for -, None for those that a browser sends by itself."""
+        connection = HTTPConnection("127.0.0.1", self.server.port, timeout=30.0)
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        connection.request(method, path, body, named)
+        return connection.getresponse()
+
+    def post(self, body: str = PRESSED, **headers: str) -> HTTPResponse:
+        own = {"X_Live_Token": self.server.guard.token, "Content_Type": "application/json"}
+        return self.ask("POST", "/press", body, **{**own, **headers})
+
+
+@pytest.fixture
+def cell() -> Iterator[Cell]:
+    cell = Cell()
+    yield cell
+    cell.server.close()
+
+
+def test_the_page_holds_nothing_of_the_cell_and_may_load_nothing(cell: Cell) -> None:
+    answer = cell.ask("GET", "/")
+    page, policy = answer.read().decode(), answer.headers["Content-Security-Policy"]
+    assert answer.status == 200
+    assert cell.server.guard.token not in page
+    assert "{{" not in page
+    assert "default-src 'none'" in policy
+    nonce = policy.partition("script-src 'nonce-")[2].partition("'")[0]
+    assert page.count("<script") == page.count(f'<script nonce="{nonce}">') == 1
+    assert cell.server.address.startswith("http://127.0.0.1:")
+    assert cell.ask("GET", "/scene").status == 404
+    cell.scene = b"{}"
+    assert cell.ask("GET", "/scene").read() == b"{}"
+    assert cell.ask("GET", "/../etc/passwd").status == 404
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example"},
+        {"Host": "evil.example:{port}"},
+        {"Host": "127.0.0.1"},
+        {"Host": ""},
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Origin": "http://127.0.0.1:1"},
+        {"Sec_Fetch_Site": "cross-site"},
+        {"Sec_Fetch_Site": "same-site"},
+    ],
+)
+def test_other_pages_and_other_names_get_nothing(cell: Cell, headers: dict[str, str]) -> None:
+    sent = {name: value.format(port=cell.server.port) for name, value in headers.items()}
+    for path in ("/", "/scene", "/events"):
+        answer = cell.ask("GET", path, **sent)
+        assert answer.status == 403
+        assert len(answer.read()) < 200
+    assert cell.post(**sent).status == 403
+    assert cell.pressed == []
+
+
+def test_own_pages_are_answered_under_both_names(cell: Cell) -> None:
+    for name in ("127.0.0.1", "localhost"):
+        host = f"{name}:{cell.server.port}"
+        assert cell.ask("GET", "/", Host=host).status == 200
+        assert cell.post(Host=host, Origin=f"http://{host}", Sec_Fetch_Site="same-origin").status == 200
+    assert cell.pressed == [("ab", True)] * 2
+
+
+def test_a_button_needs_the_token_and_a_request_that_makes_sense(cell: Cell) -> None:
+    assert json.loads(cell.post().read()) == {"done": True, "sentence": "set"}
+    for token in ("", "wrong", cell.server.guard.token[:-1], "\xff" * 32):
+        assert cell.post(X_Live_Token=token).status == 403
+    for kind in ("text/plain", "application/x-www-form-urlencoded", ""):
+        assert cell.post(Content_Type=kind).status == 403
+    for body in ("", "[]", "{", '{"name": 1, "value": true}', '{"name": "ab", "value": 1}', "[" * 900):
+        assert cell.post(body).status == 400
+    assert cell.post("x" * (MOST_BODY + 1)).status == 400
+    assert cell.post(Content_Length="-1").status == 400
+    assert cell.ask("POST", "/", "{}", X_Live_Token=cell.server.guard.token).status == 403
+    assert cell.ask("DELETE", "/").status == 501
+    assert cell.pressed == [("ab", True)]
+
+
+def test_what_is_no_bit_is_refused_and_too_many_at_once_too() -> None:
+    commands = Commands()
+    assert not commands.press("reboot", True).done
+    assert all(name in commands.press("<b>", True).sentence for name in BITS)
+    waiting = [threading.Thread(target=commands.press, args=("ab", True)) for _ in range(MOST_WAITING)]
+    for thread in waiting:
+        thread.start()
+    taken: list[Command] = []
+    while len(taken) < MOST_WAITING:
+        taken += commands.take()
+    for command in taken:
+        command.answer(True, "set")
+        assert command.wait() == Answer(True, "set")
+    for thread in waiting:
+        thread.join()
+
+
+def events(answer: HTTPResponse) -> Iterator[tuple[str, Any]]:
+    """Name and content of each event."""
+    name = ""
+    while line := answer.readline():
+        key, _, value = line.decode().rstrip("\n").partition(": ")
+        if key == "event":
+            name = value
+        if key == "data":
+            yield name, json.loads(value)
+
+
+def test_events_begin_with_what_is_kept_and_go_on_for_several_browsers(cell: Cell) -> None:
+    cell.stream.add({"mode": "MOVING"})
+    readers = [events(cell.ask("GET", "/events")) for _ in range(3)]
+    for reader in readers:
+        name, content = next(reader)
+        assert name == "start"
+        assert content["records"][0]["mode"] == "MOVING"
+    cell.stream.add({"mode": "</script>\n\nevent: x"})
+    for reader in readers:
+        name, records = next(reader)
+        assert name == "records"
+        assert records[0]["mode"] == "</script>\n\nevent: x"
+
+
+def test_browsers_that_never_read_hold_up_nobody_and_too_many_are_refused(cell: Cell) -> None:
+    dead = []
+    for _ in range(MOST_CONNECTIONS - 1):
+        connection = socket.create_connection(("127.0.0.1", cell.server.port))
+        connection.sendall(f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{cell.server.port}\r\n\r\n".encode())
+        dead.append(connection)
+    reader = events(cell.ask("GET", "/events"))
+    next(reader)
+    crowd = [socket.create_connection(("127.0.0.1", cell.server.port)) for _ in range(200)]
+    for connection in crowd:
+        connection.settimeout(30.0)
+        with suppress(ConnectionResetError):  # refused just as well
+            assert connection.recv(100).startswith(b"HTTP/1.1 503")
+        connection.close()
+    for k in range(50):
+        cell.stream.add({"load": f"{k}" * 20_000})
+    seen: list[Any] = []
+    while len(seen) < 50:
+        seen += next(reader)[1]
+    for connection in dead:
+        connection.close()
+    cell.stream.add({"load": "after"})
+    assert next(reader)[1][-1]["load"] == "after"
+
+
+def test_a_port_that_is_taken_is_named_and_others_are_free(cell: Cell) -> None:
+    with pytest.raises(LiveError, match=str(cell.server.port)):
+        LiveServer(Stream(), cell.press, lambda: b"", cell.server.port)
+    with pytest.raises(LiveError, match="70000"):
+        LiveServer(Stream(), cell.press, lambda: b"", 70_000)
+
+
+def test_words_that_are_no_http_end_their_connection_only(cell: Cell) -> None:
+    for words in (
+        b"\x16\x03\x01\x02\x00\r\n\r\n",
+        b"GET <script> \r\n\r\n",
+        b"\r\n" * 10,
+        b"G" * 70_000 + b"\r\n",
+    ):
+        with socket.create_connection(("127.0.0.1", cell.server.port), timeout=30.0) as connection:
+            connection.sendall(words)
+            connection.shutdown(socket.SHUT_WR)
+            try:
+                answer = connection.recv(10_000)
+            except ConnectionResetError:
+                answer = b""
+            assert b"text/html" not in answer
+    assert cell.ask("GET", "/").status == 200
