@@ -43,6 +43,8 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
     lines = (
         ["move", "demo", "home", "park", "--trajectory", str(trace)],
         ["evaluate", "demo", str(trace)],
+        ["optimize", "demo", str(trace), "--planning-time", "1"],
+        ["compare", "open", "--stations", "p1", "--start", "home", "-o", str(tmp_path / "compared.html")],
         ["ik", "demo", "lathe_work"],
         ["check", "demo", "home"],
         ["standby", "demo", "--pause", "300"],

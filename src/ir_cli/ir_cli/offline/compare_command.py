@@ -22,9 +22,12 @@ from .asking import (
     sentences,
 )
 from .krl_command import add_followed, followed
+from .measured_options import add_measured
 from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
+from .today_trace import today_of_trace
 
 KRL = (".src", ".dat", ".sub")
+TRACES = (".csv", ".txt", ".parquet", ".mcap")
 COLUMNS: Columns = {
     "program": ("program", text),
     "seconds": ("s", number(2)),
@@ -48,7 +51,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "compare", help="today's program (KRL, a trace, or PTP at 100 %%) against the planner's"
     )
     add_cell(compare)
-    words = "a KRL program (.src, then .dat and subprograms); none: PTP at 100 %% through the stations"
+    words = "a KRL program (.src, then .dat), or a trace (.csv, .parquet, .mcap); none: PTP at 100 %%"
     compare.add_argument("today", nargs="*", type=Path, metavar="TODAY", help=words)
     compare.add_argument("--stations", nargs="+", default=[], metavar="NAME", help="of PTP at 100 %%")
     compare.add_argument("--start", default="park", help="of PTP at 100 %%: posture or joint values (park)")
@@ -60,6 +63,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     compare.add_argument("-o", "--output", default="out/compare.html", metavar="FILE.html", help=page)
     compare.add_argument("--table", default="", metavar="FILE", help="figures as .csv or .parquet as well")
     add_followed(compare)
+    add_measured(compare)
     add_options(compare)
     add_parameters(compare)
     add_formats(compare)
@@ -99,9 +103,13 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
         return before_after_common(planner, stations, start, arguments.cycle_time, options, line.show)
     if arguments.stations:
         raise InputError("--stations are of PTP at 100 %: a program of yours has its own")
+    if len(arguments.today) == 1 and endings <= set(TRACES):
+        today = today_of_trace(arguments, planner, arguments.today[0])
+        return before_after(planner, today, arguments.cycle_time, options, line.show)
     if not endings <= set(KRL):
         named = next(str(path) for path in arguments.today if path.suffix.lower() not in KRL)
-        raise InputError(f"{named}: today's program is read from {', '.join(KRL)}")
+        known = f"{', '.join(KRL)}, or one trace: {', '.join(TRACES)}"
+        raise InputError(f"{named}: today's program is read from {known}")
     program = followed(arguments.today, planner.cell, arguments)
     today = today_of_krl(evaluate_krl(planner, program, arguments.safety_distance, arguments.load))
     return before_after(planner, today, arguments.cycle_time, options, line.show)

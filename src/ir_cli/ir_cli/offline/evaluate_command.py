@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 from .asking import FAILED, add_cell, add_margin, add_parameters, planner_of, sentences
+from .measured_options import add_measured, measured_figures, motion_of
 from .move_command import figures_of, sentence_of
 from .output import add_formats, print_json
-from .trace_file import read_trace
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,6 +21,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     evaluate.add_argument(
         "trace", type=Path, metavar="TRACE", help="CSV with time and joints, Parquet, or a recording"
     )
+    add_measured(evaluate)
     evaluate.add_argument("--station", default="", help="whose allowed contacts hold in its zone")
     add_margin(evaluate)
     add_parameters(evaluate)
@@ -32,16 +33,18 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluate and print; exit code 1 where a limit or the clearance is violated."""
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        trajectory = read_trace(arguments.trace, planner.cell.robot.joint_names)
         margin, load, station = arguments.safety_distance, arguments.load, arguments.station
+        known, trajectory = motion_of(arguments, planner)
         found = planner.evaluate(trajectory, margin, load, station)
     verification = found.verification
     if arguments.json:
         violations = [v for v in (verification.violation, *verification.others) if v is not None]
         listed = [{"what": v.what, "seconds": v.time, "sentence": v.sentence} for v in violations]
-        print_json({**figures_of(found.report), "violations": listed})
+        print_json({**figures_of(found.report), **measured_figures(known), "violations": listed})
     else:
         sys.stdout.write(sentence_of(found.report) + "\n")
+        if known is not None:
+            sys.stdout.write(known.sentence + "\n")
         if verification.violation is not None:
             sys.stdout.write(f"violated: {verification.status.message}\n")
     return 0 if verification.certified else FAILED

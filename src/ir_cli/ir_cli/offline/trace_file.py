@@ -1,9 +1,9 @@
 """Trajectories as CSV: time in s, then joints in rad by name; speeds and accelerations may follow.
 
 Columns: `time`, one per joint (`joint_a1`, or `joint_a1_deg` in degrees), then `joint_a1_velocity` [rad/s]
-and `joint_a1_acceleration` [rad/s^2]. Where only positions are given, as in a measured trace, both
-follow from a cubic spline through them that is at rest at its ends. Read by `ir_recorder.traces`, which also
-takes Parquet and recordings, and other units in the headings.
+and `joint_a1_acceleration` [rad/s^2]. Where only positions are given, as in a measured trace, they are
+smoothed (`measured`). Read by `ir_recorder.traces`, which also takes Parquet and recordings, other units in
+the headings, and other headings by a mapping file.
 """
 
 from __future__ import annotations
@@ -18,13 +18,15 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces import Trace, read_traces
-from ir_recorder.traces.trace import ACCELERATION, VELOCITY
+from ir_recorder.traces import Trace, read_mapping, read_traces
+from ir_recorder.traces.trace import ACCELERATION, GAP_FACTOR, VELOCITY
 
 from ..errors import InputError
+from .measured import BANDWIDTHS, smoothed
 
 ENDINGS = ("", VELOCITY, ACCELERATION)
 DAY = 86400.0  # s
+_SAME_PLACE = 0.001  # rad
 
 
 def write_trace(path: Path, trajectory: JointTrajectory) -> None:
@@ -54,11 +56,28 @@ def write_readings(path: Path, trace: Trace) -> None:
 
 
 def read_trace(path: Path, joint_names: Sequence[str]) -> JointTrajectory:
-    """The trajectory of a trace (CSV, Parquet, a recording). InputError with the line and the column that is
-    wrong.
+    """The trajectory of a trace (CSV, Parquet, a recording) as it is given; from positions alone by a spline.
+
+    InputError with the line and the column that is wrong.
+    """
+    found = read_motion(path, joint_names)
+    if isinstance(found, JointTrajectory):
+        return found
+    times, positions = found
+    return smoothed(tuple(joint_names), times, positions, BANDWIDTHS[-1])
+
+
+def read_motion(
+    path: Path, joint_names: Sequence[str], mapping: Path | None = None
+) -> JointTrajectory | tuple[FloatArray, FloatArray]:
+    """The trajectory of a trace that gives speeds, else its positions alone: time (N,) [s], q (N, n).
+
+    What a recording or a mapped file gives is measured: its positions count. InputError with the line and
+    the column that is wrong, and for a gap in which the robot moved.
     """
     try:
-        trace = read_traces(path, joint_names=joint_names)[0]
+        meaning = read_mapping(mapping) if mapping is not None else None
+        trace = read_traces(path, meaning, joint_names)[0]
         positions = trace.joints(joint_names)
         velocities = trace.joints(joint_names, VELOCITY)
         accelerations = trace.joints(joint_names, ACCELERATION) if velocities is not None else None
@@ -70,16 +89,29 @@ def read_trace(path: Path, joint_names: Sequence[str]) -> JointTrajectory:
     times = trace.time
     if not 0.0 <= times[0] <= DAY:  # of a clock that knows the date
         times = times - times[0]
-    if velocities is None:
-        velocities, accelerations = _smooth(times, positions)
+    if velocities is None or mapping is not None or path.suffix.lower() == ".mcap":
+        return _without_holes(trace.source, times, positions)
     try:
         return JointTrajectory.from_seconds(joint_names, times, positions, velocities, accelerations)
     except MsgsError as error:
         raise InputError(f"{trace.source}: {error}") from error
 
 
-def _smooth(times: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    from scipy.interpolate import CubicSpline
+def _without_holes(source: str, times: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Time (N,) from 0 on, and positions (N, n) of the rows that have all.
 
-    spline = CubicSpline(times, positions, bc_type="clamped")
-    return spline(times, 1), spline(times, 2)
+    InputError for a gap in which the robot moved.
+    """
+    whole = np.isfinite(positions).all(axis=1)
+    times, positions = times[whole], positions[whole]
+    if len(times) < 2:
+        raise InputError(f"{source}: {len(times)} rows have the positions of all joints")
+    steps, moved = np.diff(times), np.abs(np.diff(positions, axis=0)).max(axis=1)
+    lost = np.flatnonzero((steps > GAP_FACTOR * np.median(steps)) & (moved > _SAME_PLACE))
+    if len(lost):
+        k = int(lost[0])
+        raise InputError(
+            f"{source}: between {times[k]:.3f} s and {times[k + 1]:.3f} s there are no rows, and the robot "
+            f"moved by {moved[k]:.3f} rad: nobody knows how"
+        )
+    return times - times[0], positions

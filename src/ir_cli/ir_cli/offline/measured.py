@@ -1,0 +1,131 @@
+"""Measured positions as a motion: smoothed with a stated bandwidth, and what its energy is then worth.
+
+A spline of degree five with knots at twice the bandwidth is fitted by least squares, so that speed and
+acceleration are its derivatives, whatever the rows' spacing. The bandwidth is the one of several whose
+energy is known best. How well is found by experiment: the smoothed motion is sampled as the trace was, with
+as much noise again, and smoothed once more. What the noise adds is the difference that it makes there; what
+smoothing loses is at most a few times what it loses the second time. `benchmarks/shop_floor.py` holds the
+bounds against motions whose energy is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_lsq_spline
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.trajectory import JointTrajectory
+
+from ..errors import InputError
+
+BANDWIDTHS = (8.0, 11.0, 16.0, 22.0)  # Hz
+_DEGREE = 5
+_ROWS_PER_KNOT = 2.0  # at least: fewer leave the ends of the spline to the noise
+_REPEATS = 4
+_LOST = 4.0  # times what smoothing loses the second time
+_LEAST = 0.0075  # share of an energy that positions leave open in any case
+_COARSE, _COARSE_SHARE = 0.02, 0.025  # s: rows that lie farther apart leave this share open
+_STILL = 0.005  # rad/s
+_AT_REST = 0.02  # rad/s: a trace that ends with less ends at rest
+_DIFFERENCES = np.sqrt(20.0)  # the third difference of noise is so many times larger
+_ROWS_MAX = 200_000
+Joules = Callable[[JointTrajectory], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A motion from positions alone: its bandwidth [Hz], the rate [Hz] and the noise [rad] (one standard
+    deviation, worst joint) of the positions, the joules that the noise adds, and the bound [J] within which
+    the energy holds.
+    """
+
+    trajectory: JointTrajectory
+    bandwidth: float
+    rate: float
+    noise: float
+    noise_joules: float
+    bound: float
+
+    @property
+    def sentence(self) -> str:
+        """What is to be known about an energy of this motion."""
+        return (
+            f"from positions alone ({self.rate:.0f} Hz, {1e3 * self.noise:.3f} mrad of noise), smoothed at "
+            f"{self.bandwidth:g} Hz: the energy holds within {self.bound:.0f} J, of which noise adds about "
+            f"{self.noise_joules:.0f} J"
+        )
+
+
+def smoothed(
+    names: tuple[str, ...], time: FloatArray, positions: FloatArray, bandwidth: float
+) -> JointTrajectory:
+    """The motion of positions (N, n) at time (N,) [s], smoothed at `bandwidth` [Hz]."""
+    step = max(0.5 / bandwidth, _ROWS_PER_KNOT * float(np.median(np.diff(time))))
+    count = max(min(round((time[-1] - time[0]) / step), len(time) - _DEGREE - 2), 1)
+    knots = np.linspace(time[0], time[-1], count + 1)
+    knots = _supported(knots, time)
+    ends = np.full(_DEGREE, time[0]), np.full(_DEGREE, time[-1])
+    spline = make_lsq_spline(time, positions, np.concatenate([ends[0], knots, ends[1]]), k=_DEGREE)
+    q, qd, qdd = (np.asarray(spline(knots, nu=k)) for k in range(3))
+    for end in (0, -1):
+        if np.abs(qd[end]).max() < _AT_REST:
+            qd[end] = qdd[end] = 0.0
+    return JointTrajectory.from_seconds(names, knots, q, qd, qdd)
+
+
+def _supported(knots: FloatArray, time: FloatArray) -> FloatArray:
+    """Without the knots (M,) that no row of time (N,) lies before: in gaps, where the robot stood still."""
+    rows = np.searchsorted(time, knots)
+    kept = np.concatenate([[True], np.diff(rows) > 0])
+    kept[-1] = True
+    return knots[kept]
+
+
+def measured(
+    names: tuple[str, ...],
+    time: FloatArray,
+    positions: FloatArray,
+    joules: Joules,
+    bandwidth: float = 0.0,
+) -> Measured:
+    """The motion of positions (N, n) at time (N,) [s] with the bandwidth [Hz] (0: the best of several) that
+    leaves least open of its energy. InputError for too few or too many rows.
+    """
+    if not 8 <= len(time) <= _ROWS_MAX:
+        raise InputError(f"{len(time)} rows of positions alone: 8 to {_ROWS_MAX} can be smoothed")
+    tried = [bandwidth] if bandwidth > 0.0 else BANDWIDTHS
+    found = [_worth(names, time, positions, joules, one) for one in tried]
+    return min(found, key=lambda one: one.bound)
+
+
+def _worth(
+    names: tuple[str, ...], time: FloatArray, positions: FloatArray, joules: Joules, bandwidth: float
+) -> Measured:
+    """The smoothed motion, and the experiment that says what its energy is worth."""
+    motion = smoothed(names, time, positions, bandwidth)
+    seen = motion.sample(np.clip(time, motion.times[0], motion.duration)).q
+    noise = _noise(time, positions, seen)
+    draw = np.random.default_rng(0)
+    once = joules(motion)
+    again = joules(smoothed(names, time, seen, bandwidth))
+    noisy = [
+        joules(smoothed(names, time, seen + draw.normal(size=seen.shape) * noise, bandwidth))
+        for _ in range(_REPEATS)
+    ]
+    added = max(float(np.mean(noisy)) - again, 0.0)
+    period = float(np.median(np.diff(time)))
+    share = _LEAST + (_COARSE_SHARE if period > _COARSE else 0.0)
+    bound = added + 2.0 * float(np.std(noisy)) + _LOST * abs(again - once) + share * abs(once)
+    return Measured(motion, bandwidth, 1.0 / period, float(noise.max()), added, bound)
+
+
+def _noise(time: FloatArray, positions: FloatArray, seen: FloatArray) -> FloatArray:
+    """Standard deviation (n,) [rad]: of what smoothing removes, or at rest, whichever is larger."""
+    removed = (positions - seen).std(axis=0)
+    still = np.abs(np.gradient(seen, time, axis=0)).max(axis=1) < _STILL
+    rough = np.diff(positions, n=3, axis=0)[still[3:] & still[:-3]]
+    at_rest = rough.std(axis=0) / _DIFFERENCES if len(rough) > 3 else np.zeros_like(removed)
+    return np.maximum(removed, at_rest)

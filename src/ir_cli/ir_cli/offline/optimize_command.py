@@ -1,0 +1,61 @@
+"""`ir optimize`: the motion of a trace, made cheaper between its ends."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .asking import add_cell, add_options, add_parameters, failed, options_of, planner_of, sentences
+from .measured_options import add_measured, measured_figures, motion_of
+from .move_command import figures_of, sentence_of
+from .output import add_formats, print_json
+from .today_trace import stretches_of
+from .trace_file import write_trace
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add optimize."""
+    optimize = commands.add_parser(
+        "optimize", help="make the motion of a trace cheaper between its ends; needs no ROS"
+    )
+    add_cell(optimize)
+    optimize.add_argument(
+        "trace", type=Path, metavar="TRACE", help="CSV with time and joints, Parquet, or a recording"
+    )
+    optimize.add_argument(
+        "--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)"
+    )
+    optimize.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
+    add_measured(optimize)
+    add_options(optimize)
+    add_parameters(optimize)
+    add_formats(optimize, comma=False)
+    optimize.set_defaults(run=run_optimize)
+
+
+def run_optimize(arguments: argparse.Namespace) -> int:
+    """Optimise and print; exit code 1 where nothing is found."""
+    with sentences():
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        known, motion = motion_of(arguments, planner)
+        moving = [one.trajectory for one in stretches_of(motion)[0] if one.trajectory is not None]
+        if known is not None and len(moving) == 1:
+            motion = moving[0]  # standstills around a measured movement are no part of it
+        found = planner.optimize_trajectory(motion, options_of(arguments, arguments.duration))
+    if known is not None and len(moving) > 1:
+        sys.stderr.write(
+            f"ir: {len(moving)} movements with stops between them are made one: ir compare keeps the stops\n"
+        )
+    if found.trajectory is None:
+        return failed(found.status.message)
+    if arguments.trajectory:
+        write_trace(arguments.trajectory, found.trajectory)
+    if arguments.json:
+        before = {**figures_of(found.before), **measured_figures(known)}
+        print_json({"before": before, "after": figures_of(found.after)})
+        return 0
+    said = [f"before: {sentence_of(found.before)}"]
+    said += [known.sentence] if known is not None else []
+    sys.stdout.write("\n".join([*said, f"after: {sentence_of(found.after)}"]) + "\n")
+    return 0

@@ -1,0 +1,97 @@
+"""A measured trace as today's program: movements between standstills, pauses where the robot stood."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner import Planner, Stretch, Today
+from ir_recorder.errors import RecorderError
+from ir_recorder.traces import read_mapping, read_traces
+
+from ..errors import InputError
+from .measured_options import motion_of
+
+PAUSE = 0.5  # s: a shorter standstill belongs to the movement before it
+_STOP = 0.1  # s: the shortest standstill
+_MOVING = 0.01  # rad/s
+_NOISE = 0.002  # rad: a joint that moves by less stands still
+_STEP = 0.004  # s
+_NEAR = 0.02  # s: points nearer to the ends of a movement are left out
+
+
+def today_of_trace(arguments: argparse.Namespace, planner: Planner, path: Path) -> Today:
+    """Today's program of a trace; InputError where the robot doesn't move in it."""
+    known, motion = motion_of(arguments, planner, path)
+    stretches, lost = stretches_of(motion)
+    if not stretches:
+        raise InputError(f"{path}: the robot does not move in it")
+    notes = [] if known is None else [known.sentence]
+    if lost >= PAUSE:
+        notes.append(f"{lost:.1f} s of standstill before the first and after the last movement are left out")
+    notes += _meter(arguments, planner, path)
+    start = np.asarray(stretches[0].trajectory.positions[0]) if stretches[0].trajectory is not None else None
+    assert start is not None  # a cycle begins with a movement
+    return Today(path.name, "trace", start, tuple(stretches), tuple(notes))
+
+
+def stretches_of(motion: JointTrajectory) -> tuple[list[Stretch], float]:
+    """Movements and pauses from the first movement to the last, and the seconds [s] outside of them."""
+    runs = _runs(motion)
+    found: list[Stretch] = []
+    for k, (begin, end) in enumerate(runs):
+        behind = runs[k + 1][0] if k + 1 < len(runs) else end
+        stands = behind - end >= PAUSE
+        part = cut(motion, begin, end if stands else behind)
+        found.append(Stretch(part, np.asarray(part.positions[-1]), part.duration, label=f"{begin:.2f} s"))
+        if stands:
+            found.append(Stretch(None, found[-1].q, behind - end, label=f"{end:.2f} s"))
+    covered = runs[-1][1] - runs[0][0] if runs else 0.0
+    return found, float(motion.duration - motion.times[0] - covered)
+
+
+def _runs(motion: JointTrajectory) -> list[tuple[float, float]]:
+    """Times [s] between which the robot moves; what only noise moves stands still."""
+    count = max(int(np.ceil((motion.duration - motion.times[0]) / _STEP)), 2)
+    at = np.linspace(motion.times[0], motion.duration, count)
+    seen = motion.sample(at)
+    moving = (np.abs(seen.qd) > _MOVING).any(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int))).reshape(-1, 2)
+    runs: list[tuple[float, float]] = []
+    for first, behind in edges.tolist():
+        if np.ptp(seen.q[first:behind], axis=0).max() < _NOISE:
+            continue
+        begin, end = float(at[max(first - 1, 0)]), float(at[min(behind, count - 1)])
+        if runs and begin - runs[-1][1] < _STOP:
+            begin = runs.pop()[0]
+        runs.append((begin, end))
+    return runs
+
+
+def cut(motion: JointTrajectory, begin: float, end: float) -> JointTrajectory:
+    """The motion between two times [s], from time 0 on, at rest at both ends."""
+    inside = motion.times[(motion.times > begin + _NEAR) & (motion.times < end - _NEAR)]
+    times = np.concatenate([[begin], inside, [end]])
+    found = motion.sample(times)
+    qd, qdd = found.qd.copy(), found.qdd.copy()
+    qd[[0, -1]] = qdd[[0, -1]] = 0.0
+    return JointTrajectory.from_seconds(motion.joint_names, times - begin, found.q, qd, qdd)
+
+
+def _meter(arguments: argparse.Namespace, planner: Planner, path: Path) -> list[str]:
+    """What a meter in the same file counted."""
+    try:
+        meaning = read_mapping(arguments.mapping) if arguments.mapping is not None else None
+        traces = read_traces(path, meaning, planner.cell.robot.joint_names)
+        counted = [(trace, trace.joules()) for trace in traces]
+    except RecorderError as error:
+        raise InputError(str(error)) from error
+    return [
+        f"the meter counted {joules[-1]:.0f} J in the {trace.time[-1] - trace.time[0]:.1f} s of the file: "
+        "today's figures here are predicted, as the planner's are"
+        for trace, joules in counted
+        if joules is not None
+    ]
