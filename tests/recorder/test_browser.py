@@ -15,9 +15,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
+from ir_description import cell_to_yaml, load_cell
 from ir_recorder import Analysis, analyse, findings, read_recording
+from ir_recorder.live import LiveServer, Stream
+from ir_recorder.live.cell_view import CellView, Heard
+from ir_recorder.live.server import Answer
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 
@@ -221,4 +226,102 @@ def test_a_page_of_an_empty_recording_has_no_error(browser: Any, demo_file: Path
     page = browser.open(path, *TABLET)
     assert page.run("document.getElementById('no-motion').hidden") is False
     clean(page)
+    page.close()
+
+
+@pytest.fixture
+def live() -> Iterator[tuple[LiveServer, Stream, list[tuple[str, bool]]]]:
+    """A live view of a cell that is told here what it heard; the presses of its buttons."""
+    stream, pressed, view = Stream(), list[tuple[str, bool]](), CellView()
+    robot = load_cell("demo").robot
+
+    def press(name: str, value: bool) -> Answer:
+        pressed.append((name, value))
+        return Answer(False, EVIL)
+
+    server = LiveServer(stream, press, lambda: view.scene)
+    text = cell_to_yaml(load_cell("demo"))
+    for k in range(40):
+        q = np.radians([k, -90.0, 90.0, 0.0, 0.0, 0.0])
+        looked = view.look(Heard(text, joints=robot.joint_names, q=q, load="gripper"))
+        levels = {"ab": False, "move_enable": True, "operating_mode": "EXT"}
+        step = {"label": EVIL, "kind": EVIL, "event": "started", "at": [1, 27], "note": EVIL}
+        machine = {"name": EVIL, "state": EVIL, "next": EVIL}
+        values = {"w": [700.0 + k, 800.0 + k], "energy": 10.0 * k, "mode": "MOVING", "target": EVIL}
+        texts = {"plant": EVIL, "load": "gripper", "contact": {"number": 1, "words": EVIL}, "step": step}
+        lists = {"machines": [machine], "in": levels, "out": {"bbs": True}, "q": [float(x) for x in q]}
+        heard = {"driver": True, "planner": True, "runner": False}
+        stream.add({**looked, **values, **texts, **lists, "heard": heard, "bound": 0.02}, always=("w",))
+    yield server, stream, pressed
+    server.close()
+
+
+LIVE_CONTROLS = (
+    "document.getElementById('link').textContent === 'live'",
+    "document.getElementById('subtitle').textContent.includes('not heard: runner')",
+    "document.querySelectorAll('#tiles .tile').length === 5",
+    "[...document.querySelectorAll('button, input')]"
+    ".every((b) => b.textContent.trim() || b.closest('label'))",
+    "[...document.querySelectorAll('canvas')].every((c) => c.getAttribute('aria-label'))",
+    "(() => { document.querySelectorAll('[data-view], .views input').forEach((b) => b.click());"
+    " return true; })()",
+    "(() => { const root = document.documentElement; document.getElementById('theme').click();"
+    " return Boolean(root.dataset.theme); })()",
+    "document.querySelector('[data-bit=ab]').getAttribute('aria-pressed') === 'false'",
+)
+
+
+def test_the_live_view_shows_what_comes_and_asks_for_bits(
+    browser: Any, live: tuple[LiveServer, Stream, list[tuple[str, bool]]]
+) -> None:
+    if browser is None:
+        return
+    server, stream, pressed = live
+    page = browser.open(server.address, *DESK)
+    page.wait("document.getElementById('no-motion').hidden")
+    for script in LIVE_CONTROLS:
+        page.wait(script)
+    page.run("document.querySelector('[data-bit=ab]').click()")
+    page.run("document.getElementById('hold').click()")
+    page.wait("document.getElementById('answer').textContent.includes('refused, <')")
+    assert pressed == [("ab", True), ("move_enable", False)]
+    before = page.run("document.getElementById('view').toDataURL()")
+    stream.add({"q": [1.5, -1.0, 1.0, 0.0, 1.0, 0.0], "w": [4000.0, 5000.0], "near": None})
+    page.wait("document.querySelector('#tiles b').textContent === '5000 W'")
+    page.frame()
+    assert page.run("document.getElementById('view').toDataURL()") != before
+    x, y, wide, _ = page.middle("#power")
+    page.drag((x - wide / 5, y + 60), (x + wide / 5, y + 60))
+    page.wait("document.getElementById('now').getAttribute('aria-pressed') === 'false'")
+    page.run("document.getElementById('now').click()")
+    page.wait("document.getElementById('now').getAttribute('aria-pressed') === 'true'")
+    stream.add({"heard": {"driver": False}, "w": None, "q": None})
+    page.wait("document.getElementById('link').textContent === 'no driver heard'")
+    page.wait("document.getElementById('hold').disabled")
+    assert page.run("document.querySelectorAll('img').length") == 0
+    assert page.run("location.hash") == ""  # the token stands in no picture of the window
+    own = f"http://127.0.0.1:{server.port}/"
+    assert page.faults == []
+    assert {address.removeprefix(own) for address in page.requests} <= {"", "events", "scene", "press"}
+    server.close()
+    page.wait("document.getElementById('link').textContent === 'connection lost'")
+    page.close()
+
+
+def test_the_live_view_on_a_phone_only_watches_without_the_token(
+    browser: Any, live: tuple[LiveServer, Stream, list[tuple[str, bool]]]
+) -> None:
+    if browser is None:
+        return
+    server, _, pressed = live
+    page = browser.open(server.address.partition("#")[0], *PHONE, dark=True, touch=True)
+    page.wait("document.getElementById('no-motion').hidden && document.querySelector('[data-bit=ab]')")
+    assert page.run("document.documentElement.scrollWidth") == PHONE[0]
+    assert page.run("document.getElementById('view-only').hidden") is False
+    assert (
+        page.run("[...document.querySelectorAll('#plc button')].filter((b) => !b.disabled).length") == 1
+    )  # CSV
+    page.run("document.getElementById('hold').click()")
+    assert pressed == []
+    assert page.faults == []
     page.close()
