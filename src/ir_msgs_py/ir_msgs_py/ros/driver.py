@@ -37,6 +37,9 @@ from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 
+_UNSEEN = 1.5
+"""s without a look at the meter: nodes look once a second at least, so that this process was stopped."""
+
 
 class Driver:
     """Clients of one driver; times in s.
@@ -65,7 +68,7 @@ class Driver:
         self._response_timeout = response_timeout
         self._silence_timeout = silence_timeout
         self._cancel_timeout = cancel_timeout
-        self._heard = -float("inf")
+        self._heard = self._looked = -float("inf")
         self._plc = node.create_client(SetPlcInputSrv, f"{name}/set_plc_input", qos_profile=SERVICE)
         self._load = node.create_client(SetLoadSrv, f"{name}/set_load", qos_profile=SERVICE)
         self._modes = node.create_client(QueryModes, f"{name}/query_modes", qos_profile=SERVICE)
@@ -87,9 +90,13 @@ class Driver:
 
     @property
     def silent(self) -> bool:
-        """Whether the meter has not been heard for too long."""
+        """Whether the meter has not been heard for too long, while this process could hear."""
         self._read_meter()
-        return time.monotonic() - self._heard > self._silence_timeout
+        now = time.monotonic()
+        if self._mode is not None and now - self._looked > max(self._silence_timeout, _UNSEEN):
+            self._heard = now
+        self._looked = now
+        return now - self._heard > self._silence_timeout
 
     @property
     def off_the_network(self) -> bool:
