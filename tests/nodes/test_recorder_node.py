@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import resource
 import signal
 import subprocess
 import sys
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -425,3 +427,20 @@ def test_ir_record_ends_with_1_when_the_disk_is_full(
     assert process.returncode == 1
     assert b"File too large" in errors
     assert b"Traceback" not in errors
+
+
+def test_recordings_leave_no_objects_behind(
+    recorder: RecorderNode, ros_node: Any, ros_executor: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    topics = [f"/ir_planner/talk_{k}" for k in range(5)]
+    publishers = ros_executor.run(lambda: [ros_node.create_publisher(String, topic, 1) for topic in topics])
+
+    def record() -> int:
+        ros_executor.run(lambda: recorder.start(str(tmp_path / "s.mcap"), overwrite=True, topics=topics))
+        wait_for(lambda: all(each.get_subscription_count() for each in publishers))
+        ros_executor.run(recorder.finish)
+        gc.collect()
+        return sum(type(each) is weakref.ReferenceType for each in gc.get_objects())
+
+    first = [record() for _ in range(3)][-1]
+    assert [record() for _ in range(4)][-1] - first < 2 * len(topics)

@@ -11,7 +11,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, ParameterEvent
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -22,6 +21,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from ir_msgs_py import names
 from ir_msgs_py.errors import UnknownTypeError
 from ir_msgs_py.namespaces import owns_diagnostic, owns_logger, owns_node
+from ir_msgs_py.ros.polled import PolledGroup
 from ir_msgs_py.ros.types import interface_type
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.qos import QosOffer, request_for
@@ -58,25 +58,6 @@ def is_own(arrival: Arrival, namespace: str) -> bool:
         return owns(namespace, deserialize_message(arrival.data, message_type))
     except Exception:  # bytes of a stranger, that the middleware can't read
         return False
-
-
-class PolledGroup(CallbackGroup):
-    """Entities that the executor never waits for.
-
-    Waking it for every message of a 500 Hz topic takes a third of a core, and a busy machine then falls
-    behind; taking what has arrived 50 times a second takes little. The middleware notes the times of arrival.
-    """
-
-    def can_execute(self, entity: object) -> bool:
-        """Never."""
-        return False
-
-    def beginning_execution(self, entity: object) -> bool:
-        """Never."""
-        return False
-
-    def ending_execution(self, entity: object) -> None:
-        """Nothing began."""
 
 
 class Listener:
@@ -144,6 +125,7 @@ class Listener:
         for subscription in self._subscriptions.values():
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
+        self._group = PolledGroup()  # a group keeps a reference to whatever it ever had
 
     def _count(self, topic: str, number: int | None) -> None:
         """A publisher numbers its messages: numbers that are left out are messages that didn't arrive."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import CancelResponse
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
@@ -168,7 +169,8 @@ class SimDriver(Node):
 
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""
-        timer = self.create_timer(seconds, callback)
+        # rclpy's group of the node would keep a reference to every timer that it ever had
+        timer = self.create_timer(seconds, callback, callback_group=MutuallyExclusiveCallbackGroup())
         return lambda: self.destroy_timer(timer)
 
     def now_msg(self) -> Any:
