@@ -40,13 +40,13 @@ class SecondOpinion:
         self._drives = Drives(scene)
 
     def clearance_left(
-        self, trajectory: JointTrajectory, margin: float, station: str = ""
+        self, trajectory: JointTrajectory, margin: float, station: str = "", step: float = STEP
     ) -> tuple[float, int]:
         """Least distance minus what its pair must keep [m] by Coal, and how many configurations.
 
         station: inside its zone its allowed contacts keep their own distances.
         """
-        asked, plain = sampled_densely(trajectory), self._scene.thresholds(margin)
+        asked, plain = sampled_densely(trajectory, step), self._scene.thresholds(margin)
         kept = np.broadcast_to(plain, (len(asked), len(plain)))
         if station:
             inside = tcp_inside(asked, self._scene, station, margin)

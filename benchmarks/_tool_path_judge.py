@@ -127,7 +127,7 @@ def _axis(tcp: FloatArray, along: FloatArray, path: CartesianPath) -> float:
 def _speed(tcp: FloatArray, path: CartesianPath) -> float:
     """By what share the tool is off its speed between the first and the last time it reaches it."""
     speed = np.linalg.norm(np.diff(tcp[:, :3, 3], axis=0), axis=1) * _RATE
-    reached = np.flatnonzero(speed >= path.tool_speed * (1.0 - path.speed_tolerance))
+    reached = np.flatnonzero(speed >= path.tool_speed * (1.0 - 0.1 * path.speed_tolerance))
     if len(reached) == 0:
         return 1.0
     kept = speed[reached[0] : reached[-1] + 1]

@@ -19,6 +19,7 @@ _SPLINE_TURN = 1e-5  # rad
 _DEGREE = 5
 _FEWEST = 12  # intervals of a stroke
 _FINER = (1, 2, 4, 8, 16)
+_LAST = 4.0  # times as much at the finest: near a singularity the axes bend without end
 _WRIST = np.radians(5.0)  # an axis 5 nearer to 0 than this is near the singularity of the wrist
 
 Angle = Callable[[FloatArray], FloatArray]
@@ -62,7 +63,7 @@ def curve_of(
         middle = 0.5 * (s[1:] + s[:-1])
         error = _errors(curve.spline(middle), tool_poses(path, angle, middle), scene)
         worst, place = float(error.max()), float(middle[int(np.argmax(error))])
-        if worst <= 1.0:
+        if worst <= (1.0 if finer < _FINER[-1] else _LAST):
             return curve
     raise PathRefusedError(
         f"the axes can't follow the path at {place:.3f} m{singularity(curve.spline(place), scene)}: between "

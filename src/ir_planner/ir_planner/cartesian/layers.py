@@ -27,6 +27,8 @@ _SPACING_FREE = 0.02  # m, where the angle is free
 _NODES_MAX = 400_000
 _FEWEST = 8
 _SAME = 1e-6  # relative cost of chains that differ by whole turns only
+_APART = 0.3  # rad: ends of chains with a free angle that are nearer are smoothed to one
+_OVERSPEED_WATTS = 2000.0  # what an axis at its speed limit costs in the search; far more beyond
 _LAYER = 10.0  # between layers in the tree of neighbours, further than any jump
 
 
@@ -166,6 +168,7 @@ def chains(layers: Layers, speed: float, scene: PlanningScene, most: int) -> lis
     q, layer = layers.q[nodes], layers.layer[nodes]
     before, after = _neighbours(q, layer)
     joules = _edge_joules(q, layer, before, after, layers.s, speed, scene)
+    apart = _SAME if len(np.unique(layers.angle)) == 1 else _APART
     cost, parent = _cheapest(layer, before, after, joules, len(layers.s))
     last = np.flatnonzero((layer == len(layers.s) - 1) & np.isfinite(cost))
     if len(last) == 0:
@@ -175,7 +178,7 @@ def chains(layers: Layers, speed: float, scene: PlanningScene, most: int) -> lis
             "a singularity, a collision, or an axis limit that asks for another configuration"
         )
     found: list[Chain] = []
-    for node in _different(last, cost, q, scene)[:most]:
+    for node in _different(last, cost, q, scene, apart)[:most]:
         trace = [int(node)]
         while parent[trace[-1]] >= 0:
             trace.append(int(parent[trace[-1]]))
@@ -203,12 +206,13 @@ def _edge_joules(
     speed: float,
     scene: PlanningScene,
 ) -> FloatArray:
-    """What the drives take along each edge (E,) [J]."""
+    """What the drives take along each edge (E,) [J], and what keeps the search from too fast ones."""
     seconds = (np.diff(s) / speed)[layer[before]]
     first, second = q[before], q[after]
     qd = (second - first) / seconds[:, None]
     power = scene.dynamics.drive_power(0.5 * (first + second), qd, np.zeros_like(qd)).sum(axis=1)
-    return np.asarray(np.maximum(power, 0.0) * seconds)
+    share = (np.abs(qd) / scene.limits.velocity).max(axis=1)
+    return np.asarray((np.maximum(power, 0.0) + _OVERSPEED_WATTS * share**8) * seconds)
 
 
 def _cheapest(
@@ -230,9 +234,11 @@ def _cheapest(
     return cost, parent
 
 
-def _different(last: IntArray, cost: FloatArray, q: FloatArray, scene: PlanningScene) -> IntArray:
-    """Ends (K,) of chains, cheapest first; of those that differ by whole turns, the one most within the axis
-    limits.
+def _different(
+    last: IntArray, cost: FloatArray, q: FloatArray, scene: PlanningScene, apart: float
+) -> IntArray:
+    """Ends (K,) of chains, cheapest first, at least about `apart` rad apart; of those that differ by whole
+    turns, the one most within the axis limits.
     """
     robot = scene.cell.robot
     middle = 0.5 * (robot.position_min + robot.position_max)
@@ -241,6 +247,6 @@ def _different(last: IntArray, cost: FloatArray, q: FloatArray, scene: PlanningS
     order = last[np.lexsort((away, digits))]
     kept: list[int] = []
     for node in order:
-        if all(np.abs(np.sin(0.5 * (q[node] - q[other]))).max() > _SAME for other in kept):
+        if all(np.abs(np.sin(0.5 * (q[node] - q[other]))).max() > apart for other in kept):
             kept.append(int(node))
     return np.array(kept, dtype=np.int64)

@@ -1,7 +1,6 @@
 """A path of the tool as a certified movement: the chain of configurations of least J that keeps the speed."""
 
-import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,40 +10,20 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cartesian.answer import CartesianPlan
+from ir_planner.cartesian.best import T1_SPEED, Asked, best_along
 from ir_planner.cartesian.corners import Joint, joined
-from ir_planner.cartesian.free_angle import angle_along
-from ir_planner.cartesian.joint_curve import Angle, JointCurve, curve_of
-from ir_planner.cartesian.layers import Chain, Layers, chains, layers_of
+from ir_planner.cartesian.layers import layers_of
 from ir_planner.cartesian.parts import parts_of
-from ir_planner.cartesian.points import SentPath, sent
 from ir_planner.cartesian.refusal import PathRefusedError
-from ir_planner.cartesian.speed_law import Span
-from ir_planner.cartesian.timed import timed_stroke
 from ir_planner.cartesian.tool_error import Kept, kept_of
 from ir_planner.cartesian.tool_path import HeadingError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
 from ir_planner.request import Context, checked_options, chosen
-from ir_planner.scene import MotionLimits
-from ir_planner.timing import Movement, check_duration, within_torque
+from ir_planner.timing import check_duration
 
 PLANNER_ID = "cartesian"
-T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
 TOOL_ERROR_MAX = 1e-4  # m
-CANDIDATES = 3  # chains that are timed, the cheapest by the estimate first
-_BLOCKED = 6  # chains that may collide between samples before the search ends
-_AROUND = 0.02  # m along the path, and
-_NEAR = 0.3  # rad around a configuration that collides: blocked
-_SHRUNK = 0.999
-
-
-@dataclass(frozen=True, eq=False)
-class _Timed:
-    """A chain as a movement, and what it keeps of the path."""
-
-    movement: Movement
-    sent: SentPath
-    angle: Angle | None
 
 
 def plan_path(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> CartesianPlan:
@@ -74,7 +53,7 @@ def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: C
     with context.journal.stage("configurations") as notes:
         layers = layers_of(whole, path.free_angle, space, start)
         notes.append(f"{len(layers.q)} at {len(layers.s)} samples, {int(layers.free.sum())} free")
-    found = _best(path, whole, layers, t1, context)
+    found = best_along(Asked(path, whole, start is not None, t1, context), layers)
     with context.journal.stage("tool error"):
         kept = kept_of(found.sent, whole, found.angle, context.scene)
     leaves = max((joint.leaves for joint in joints), default=0.0)
@@ -130,125 +109,6 @@ def _check_corners(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ..
                 f"speed_tolerance 1 to stop there (it is {path.speed_tolerance:g})",
                 StatusCode.INVALID_MOTION_PLAN,
             )
-
-
-def _best(path: CartesianPath, whole: ToolPath, layers: Layers, t1: bool, context: Context) -> _Timed:
-    """The certified movement of least cost by the request's objective over the cheapest chains.
-
-    Raises PathRefusedError with the reason of the cheapest one where none is certified.
-    """
-    reason: PathRefusedError | None = None
-    for _ in range(_BLOCKED):
-        context.work.check()
-        with context.journal.stage("search") as notes:
-            try:
-                found = chains(layers, path.tool_speed, context.scene, CANDIDATES)
-            except PathRefusedError as error:
-                raise reason or error from error
-            notes.append(f"{len(found)} chains")
-        with context.journal.stage("timing") as notes:
-            timed: list[_Timed] = []
-            for chain in found:
-                try:
-                    timed.append(_timed(path, whole, chain, t1, context))
-                except PathRefusedError as error:
-                    context.journal.reject(str(error))
-                    reason = reason or error
-            notes.append(f"{len(timed)} of {len(found)} within the limits")
-        if not timed:
-            assert reason is not None  # each chain that isn't timed gave one
-            raise reason
-        with context.journal.stage("proof") as notes:
-            for one in sorted(timed, key=lambda one: one.movement.coarse_cost):
-                violation = one.movement.violation
-                if violation is None:
-                    return one
-                notes.append(violation.sentence)
-                reason = _uncertified(one, whole)
-                layers = _without(layers, one)
-    assert reason is not None  # of the last round
-    raise reason
-
-
-def _uncertified(one: _Timed, whole: ToolPath) -> PathRefusedError:
-    violation = one.movement.violation
-    assert violation is not None  # that is why it is asked
-    place = _place_at(one.sent, violation.time)
-    return PathRefusedError(f"at {place:.3f} m: {violation.sentence}", StatusCode.INVALID_MOTION_PLAN)
-
-
-def _place_at(path: SentPath, time: float) -> float:
-    """Arc length [m] that is passed at a time [s]."""
-    k = int(np.clip(np.searchsorted(path.begins, time, side="right") - 1, 0, len(path.begins) - 1))
-    motion = path.strokes[k].at(path.instants[k])
-    return float(np.interp(time - path.begins[k], motion.t, motion.s))
-
-
-def _without(layers: Layers, one: _Timed) -> Layers:
-    """The layers without the configurations near where a movement isn't certified."""
-    violation = one.movement.violation
-    assert violation is not None  # that is why it is asked
-    place = _place_at(one.sent, violation.time)
-    q = one.movement.trajectory.sample([violation.time]).q[0]
-    near = (np.abs(layers.s[layers.layer] - place) <= _AROUND) & (np.abs(layers.q - q).max(axis=1) <= _NEAR)
-    return replace(layers, free=layers.free & ~near)
-
-
-def _timed(path: CartesianPath, whole: ToolPath, chain: Chain, t1: bool, context: Context) -> _Timed:
-    """A chain with its time. Raises PathRefusedError."""
-    scene = context.scene
-    angle, chain = angle_along(whole, chain, path.free_angle, context)
-    ends = _strokes(whole)
-    curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
-    slower = _flange_share(path, curves, context) if t1 else 1.0
-    tolerance = path.speed_tolerance
-    made: list[_Timed] = []
-
-    def timed(limits: MotionLimits) -> Movement:
-        strokes = tuple(
-            timed_stroke(curve, _spans(whole, a, b, slower), tolerance, limits, scene)
-            for curve, (a, b) in zip(curves, ends, strict=True)
-        )
-        check_duration(sum(stroke.duration for stroke in strokes), context.options)
-        points = sent(strokes, scene)
-        movement = Movement(chain.q, points.trajectory, context)
-        made.append(_Timed(movement, points, angle))
-        return movement
-
-    within_torque(timed, context)
-    return made[-1]
-
-
-def _strokes(whole: ToolPath) -> list[tuple[int, int]]:
-    """From which corner to which the tool moves without a stop."""
-    stops = [k for k, radius in enumerate(whole.radius) if radius == 0.0]
-    return list(itertools.pairwise(stops))
-
-
-def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span, ...]:
-    lengths = np.diff(whole.ends)
-    return tuple(
-        Span(float(lengths[k]), whole.parts[k].speed * slower, whole.parts[k].kept)
-        for k in range(first, last)
-    )
-
-
-def _flange_share(path: CartesianPath, curves: list[JointCurve], context: Context) -> float:
-    """What share of the speed keeps the centre of the flange at T1's speed too."""
-    fastest = 0.0
-    for curve in curves:
-        s = np.linspace(curve.begin, curve.end, 400)
-        q, first, _, _ = curve.at(s)
-        poses = context.scene.chain.link_poses(q)
-        step = 1e-6  # m: difference quotient along the path
-        ahead = context.scene.chain.link_poses(q + step * first)
-        rate = np.linalg.norm(ahead[:, -1, :3, 3] - poses[:, -1, :3, 3], axis=1).max() / step
-        fastest = max(fastest, float(rate))
-    top = max([path.tool_speed, *(one.tool_speed for one in path.segments)])
-    share = min(1.0, _SHRUNK * T1_SPEED / max(fastest * top, 1e-12))
-    if share < 1.0:
-        context.journal.note("t1", f"{share * path.tool_speed:.4g} m/s, so that the flange keeps 250 mm/s")
-    return share
 
 
 def checked_path_options(options: PlanOptions) -> tuple[PlanOptions, str]:

@@ -1,0 +1,121 @@
+"""Random paths of the tool in a cell, and an oracle that looks for somebody who can drive a path."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from _drives import Drives
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
+from ir_planner.cartesian.corners import joined
+from ir_planner.cartesian.parts import parts_of
+from ir_planner.scene import PlanningScene
+
+MARGIN = 0.02  # m
+_LENGTHS, _SPEEDS = (0.15, 0.9), (0.05, 0.4)  # m, m/s
+_TURN = np.radians(30.0)
+_DRAWS = 40  # of the oracle
+_STEP, _JUMP = 5e-3, 0.2  # m between its samples, rad between two of them
+_ASKED = 200  # configurations at which torque is asked for
+
+
+def random_path(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
+    """A path whose ends can be reached without collision: line, circle, spline or corner, the angle about the
+    tool's axis free or not.
+    """
+    while True:
+        path = _drawn(rng, scene)
+        ends = [path.start, *(segment.poses[-1] for segment in path.segments)]
+        if all(_reached(end, scene) for end in ends):
+            return path
+
+
+def _reached(pose: FloatArray, scene: PlanningScene) -> bool:
+    q = scene.inverse_kinematics.solve(pose[None]).q
+    return bool(len(q) and scene.collision.is_free(q, scene.thresholds(MARGIN)).any())
+
+
+def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
+    robot = scene.cell.robot
+    start = scene.chain.tcp_poses(rng.uniform(robot.position_min, robot.position_max)[None])[0]
+    ahead, aside, _ = Rotation.random(random_state=rng).as_matrix()
+    length = rng.uniform(*_LENGTHS)
+    turn = rng.uniform(0.0, _TURN) * rng.integers(0, 2) * Rotation.random(random_state=rng).as_matrix()[0]
+
+    def pose(share: float, off: float) -> FloatArray:
+        result = np.array(start)
+        result[:3, 3] += length * (share * ahead + off * aside)
+        result[:3, :3] = start[:3, :3] @ Rotation.from_rotvec(share * turn).as_matrix()
+        return result
+
+    kind, off = rng.integers(0, 4), rng.uniform(0.05, 0.4)
+    segments: tuple[CartesianSegment, ...]
+    if kind == 0:
+        segments = (CartesianSegment("line", (pose(1.0, 0.0),)),)
+    elif kind == 1:
+        segments = (CartesianSegment("circle", (pose(0.5, off), pose(1.0, 0.0))),)
+    elif kind == 2:
+        inner = [pose(share, rng.uniform(-0.15, 0.15)) for share in (0.3, 0.6)]
+        segments = (CartesianSegment("spline", (*inner, pose(1.0, 0.0))),)
+    else:
+        segments = tuple(CartesianSegment("line", (one,)) for one in (pose(0.5, off), pose(1.0, 0.0)))
+    return CartesianPath(
+        start,
+        segments,
+        tool_speed=float(np.exp(rng.uniform(*np.log(_SPEEDS)))),
+        blending_radius=0.1 * length if kind == 3 else 0.0,
+        free_angle=float(rng.choice([0.0, 0.0, 0.5, np.pi])),
+    )
+
+
+def oracle(path: CartesianPath, scene: PlanningScene, rng: np.random.Generator) -> bool:
+    """Whether some configuration, followed from the start with an angle that changes evenly, keeps axis
+    limits, distances, speeds, accelerations and torque at the speed asked for.
+    """
+    whole, _ = joined(path, parts_of(path))
+    s = np.linspace(0.0, whole.length, max(int(whole.length / _STEP), 20))
+    poses = whole.poses(s)
+    for _ in range(_DRAWS if path.free_angle > 0.0 else 1):
+        ends = rng.uniform(-path.free_angle, path.free_angle, 2) if path.free_angle > 0.0 else (0.0, 0.0)
+        turned = np.array(poses)
+        angles = np.linspace(*ends, len(s))
+        turned[:, :3, :3] = poses[:, :3, :3] @ Rotation.from_euler("x", angles[:, None]).as_matrix()
+        found = scene.inverse_kinematics.solve(turned)
+        sets = [found.of_pose(k) for k in range(len(s))]
+        for q in sets[0]:
+            chain = _followed(q, sets)
+            if chain is not None and _drivable(chain, s, path.tool_speed, scene):
+                return True
+    return False
+
+
+def _followed(q: FloatArray, sets: list[FloatArray]) -> FloatArray | None:
+    chain = [q]
+    for near in sets[1:]:
+        if len(near) == 0:
+            return None
+        away = np.abs(near - chain[-1]).max(axis=1)
+        if away.min() > _JUMP:
+            return None
+        chain.append(near[int(np.argmin(away))])
+    return np.array(chain)
+
+
+def _drivable(q: FloatArray, s: FloatArray, speed: float, scene: PlanningScene) -> bool:
+    robot = scene.cell.robot
+    if not scene.collision.is_free(q, scene.thresholds(MARGIN)).all():
+        return False
+    spline = make_interp_spline(s, q, k=5)
+    at = np.linspace(s[0], s[-1], _ASKED)
+    qd, qdd, qddd = (spline(at, nu=k) * speed**k for k in (1, 2, 3))
+    bounds = ((qd, robot.velocity_max), (qdd, robot.acceleration_max), (qddd, robot.jerk_max))
+    if any((np.abs(values) > bound).any() for values, bound in bounds):
+        return False
+    drives = Drives(scene)
+    share = np.abs(drives.torque(spline(at), qd, qdd)) / drives.envelope(qd)
+    moving = itertools.pairwise(q)
+    return bool(share.max() < 0.97 and all(np.abs(b - a).max() <= _JUMP for a, b in moving))

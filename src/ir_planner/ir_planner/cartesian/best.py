@@ -1,0 +1,185 @@
+"""The best movement along a path: the cheapest chains of configurations with their times, certified.
+
+A chain that isn't certified loses its configurations near the place where it isn't, and the search goes on.
+"""
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ir_msgs_py.cartesian import CartesianPath
+from ir_msgs_py.status import StatusCode
+from ir_planner.cartesian.free_angle import angle_along
+from ir_planner.cartesian.joint_curve import Angle, JointCurve, curve_of
+from ir_planner.cartesian.layers import Chain, Layers, chains
+from ir_planner.cartesian.points import SentPath, sent
+from ir_planner.cartesian.refusal import PathRefusedError
+from ir_planner.cartesian.speed_law import Span
+from ir_planner.cartesian.timed import timed_stroke
+from ir_planner.cartesian.tool_path import ToolPath
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Context
+from ir_planner.scene import MotionLimits
+from ir_planner.timing import Movement, check_duration, within_torque
+
+T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
+COMPARED = 3  # movements, over the cheapest chains by the estimate
+_TRIED = 12  # chains at most: where one can't keep the speed, the next is tried
+_ROUNDS = 6  # of chains that aren't certified
+_AROUND = 0.02  # m along the path, and
+_NEAR = 0.3  # rad around a configuration that isn't certified: not asked again
+_SHRUNK = 0.999
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a request asks for: the path, as it is drawn, whether its first configuration is given, and T1."""
+
+    path: CartesianPath
+    whole: ToolPath
+    fixed: bool
+    t1: bool
+    context: Context
+
+    @property
+    def space(self) -> FreeSpace:
+        """Where configurations may be."""
+        context = self.context
+        return FreeSpace.of(context.scene, context.safety_distance, context.work)
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenPath:
+    """A chain as a movement, and what it keeps of the path."""
+
+    movement: Movement
+    sent: SentPath
+    angle: Angle | None
+
+
+def best_along(asked: Asked, layers: Layers) -> DrivenPath:
+    """The certified movement of least cost by the request's objective over the cheapest chains.
+
+    Raises PathRefusedError with the reason of the cheapest one where none is certified.
+    """
+    reason: PathRefusedError | None = None
+    journal = asked.context.journal
+    for _ in range(_ROUNDS):
+        asked.context.work.check()
+        with journal.stage("search") as notes:
+            try:
+                found = chains(layers, asked.path.tool_speed, asked.context.scene, _TRIED)
+            except PathRefusedError as error:
+                raise reason or error from error
+            notes.append(f"{len(found)} chains")
+        with journal.stage("timing") as notes:
+            driven, error_of_first = _driven(asked, found)
+            notes.append(f"{len(driven)} within the limits")
+        if not driven:
+            assert error_of_first is not None  # each chain that isn't driven gave one
+            raise reason or error_of_first
+        with journal.stage("proof") as notes:
+            for one in sorted(driven, key=lambda one: one.movement.coarse_cost):
+                violation = one.movement.violation
+                if violation is None:
+                    return one
+                notes.append(violation.sentence)
+                reason = reason or _uncertified(one)
+                layers = _without(layers, one)
+    assert reason is not None  # of the first round
+    raise reason
+
+
+def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRefusedError | None]:
+    """The first chains that keep the speed, and why the first of the others doesn't."""
+    driven: list[DrivenPath] = []
+    reason: PathRefusedError | None = None
+    for chain in found:
+        if len(driven) == COMPARED:
+            break
+        try:
+            driven.append(_timed(asked, chain))
+        except PathRefusedError as error:
+            asked.context.journal.reject(str(error))
+            reason = reason or error
+    return driven, reason
+
+
+def _uncertified(one: DrivenPath) -> PathRefusedError:
+    violation = one.movement.violation
+    assert violation is not None  # that is why it is asked
+    place = _place_at(one.sent, violation.time)
+    return PathRefusedError(f"at {place:.3f} m: {violation.sentence}", StatusCode.INVALID_MOTION_PLAN)
+
+
+def _place_at(path: SentPath, time: float) -> float:
+    """Arc length [m] that is passed at a time [s]."""
+    k = int(np.clip(np.searchsorted(path.begins, time, side="right") - 1, 0, len(path.begins) - 1))
+    motion = path.strokes[k].at(path.instants[k])
+    return float(np.interp(time - path.begins[k], motion.t, motion.s))
+
+
+def _without(layers: Layers, one: DrivenPath) -> Layers:
+    """The layers without the configurations near where a movement isn't certified."""
+    violation = one.movement.violation
+    assert violation is not None  # that is why it is asked
+    place = _place_at(one.sent, violation.time)
+    q = one.movement.trajectory.sample([violation.time]).q[0]
+    near = (np.abs(layers.s[layers.layer] - place) <= _AROUND) & (np.abs(layers.q - q).max(axis=1) <= _NEAR)
+    return replace(layers, free=layers.free & ~near)
+
+
+def _timed(asked: Asked, chain: Chain) -> DrivenPath:
+    """A chain with its time. Raises PathRefusedError."""
+    path, whole, scene = asked.path, asked.whole, asked.context.scene
+    angle, chain = angle_along(whole, chain, path.free_angle, asked.space, asked.fixed)
+    ends = _strokes(whole)
+    curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
+    slower = _flange_share(asked, curves) if asked.t1 else 1.0
+    made: list[DrivenPath] = []
+
+    def timed(limits: MotionLimits) -> Movement:
+        strokes = tuple(
+            timed_stroke(curve, _spans(whole, a, b, slower), path.speed_tolerance, limits, scene)
+            for curve, (a, b) in zip(curves, ends, strict=True)
+        )
+        check_duration(sum(stroke.duration for stroke in strokes), asked.context.options)
+        points = sent(strokes, scene)
+        movement = Movement(chain.q, points.trajectory, asked.context)
+        made.append(DrivenPath(movement, points, angle))
+        return movement
+
+    within_torque(timed, asked.context)
+    return made[-1]
+
+
+def _strokes(whole: ToolPath) -> list[tuple[int, int]]:
+    """From which corner to which the tool moves without a stop."""
+    return list(itertools.pairwise(k for k, radius in enumerate(whole.radius) if radius == 0.0))
+
+
+def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span, ...]:
+    lengths = np.diff(whole.ends)
+    return tuple(
+        Span(float(lengths[k]), whole.parts[k].speed * slower, whole.parts[k].kept)
+        for k in range(first, last)
+    )
+
+
+def _flange_share(asked: Asked, curves: list[JointCurve]) -> float:
+    """What share of the speed keeps the centre of the flange at T1's speed too."""
+    path, context, fastest = asked.path, asked.context, 0.0
+    for curve in curves:
+        s = np.linspace(curve.begin, curve.end, _FLANGE_SAMPLES)
+        q, first, _, _ = curve.at(s)
+        here, ahead = (context.scene.chain.link_poses(at)[:, -1, :3, 3] for at in (q, q + _STEP * first))
+        fastest = max(fastest, float(np.linalg.norm(ahead - here, axis=1).max()) / _STEP)
+    top = max([path.tool_speed, *(one.tool_speed for one in path.segments)])
+    share = min(1.0, _SHRUNK * T1_SPEED / max(fastest * top, 1e-12))
+    if share < 1.0:
+        context.journal.note("t1", f"{share * path.tool_speed:.4g} m/s, so that the flange keeps 250 mm/s")
+    return share
+
+
+_FLANGE_SAMPLES, _STEP = 400, 1e-6  # of a stroke; m of a difference quotient along the path
