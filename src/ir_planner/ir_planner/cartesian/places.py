@@ -85,14 +85,18 @@ class Arc:
 
     def at(self, s: FloatArray) -> FloatArray:
         """Places (M, 3) m at s (M,)."""
-        turned = np.asarray(s)[:, None] * (self.angle / self.length)
+        turned = np.asarray(s)[:, None] * self._rate
         return np.asarray(self.centre + np.cos(turned) * self.radius + np.sin(turned) * self.across)
 
     def tangent(self, s: FloatArray) -> FloatArray:
         """Unit tangents (M, 3) at s (M,)."""
-        rate = self.angle / self.length
-        turned = np.asarray(s)[:, None] * rate
-        return np.asarray((np.cos(turned) * self.across - np.sin(turned) * self.radius) * rate)
+        turned = np.asarray(s)[:, None] * self._rate
+        return np.asarray((np.cos(turned) * self.across - np.sin(turned) * self.radius) * self._rate)
+
+    @property
+    def _rate(self) -> float:
+        """rad per m."""
+        return self.angle / self.length if self.length > 0.0 else 0.0
 
 
 def arc_through(

@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from ir_krl import KrlMotionError, Motion
 from ir_msgs_py.arrays import FloatArray
+from ir_planner.cartesian import Arc, Line, arc_through
 from ir_planner.krl.geometry import Arm
 
 _STEP_M = 4e-3  # between samples of a tool path
 _STEP_RAD = np.radians(1.0)
 _SAMPLES_MIN, _SAMPLES_MAX = 17, 20_001
 _JUMP = np.radians(20.0)  # of an axis between samples: the path passes a singularity
-_STRAIGHT = 1e-6  # m: three points nearer to a line than this are no circle
 _DEGREE = 5
 
 
@@ -78,15 +78,18 @@ def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
     last = arm.pose(motion.target, first)
     if motion.keeps_orientation:
         last[:3, :3] = first[:3, :3]
-    path: _Arc | _Line = _Line(first[:3, 3], last[:3, 3])
+    path: Arc | Line = Line(first[:3, 3], last[:3, 3])
     if motion.via is not None:
-        path = _arc(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion)
+        arc = arc_through(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion.angle)
+        if arc is None:
+            raise KrlMotionError("CIRC: start, auxiliary point and end lie on a line", motion.place)
+        path = arc
     ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
     turning = float((ends[0].inv() * ends[1]).magnitude())
     fine = np.ceil(max(path.length / _STEP_M, turning / _STEP_RAD)) + 1
     u = np.linspace(0.0, 1.0, int(np.clip(fine, _SAMPLES_MIN, _SAMPLES_MAX)))
     poses = np.tile(np.eye(4), (len(u), 1, 1))
-    poses[:, :3, 3] = path(u)
+    poses[:, :3, 3] = path.at(u * path.length)
     poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(u).as_matrix()
     q = followed(poses, motion, start, arm)
     return AxisCurve(make_interp_spline(u, q, k=_DEGREE), path.length, turning)
@@ -119,53 +122,3 @@ def followed(poses: FloatArray, motion: Motion, start: FloatArray, arm: Arm) -> 
 
 def _name(motion: Motion) -> str:
     return motion.kind.upper() + (f" {motion.target.name}" if motion.target.name else "")
-
-
-@dataclass(frozen=True, eq=False)
-class _Line:
-    """From start to end, (3,) each [m]."""
-
-    start: FloatArray
-    end: FloatArray
-
-    @property
-    def length(self) -> float:
-        return float(np.linalg.norm(self.end - self.start))
-
-    def __call__(self, u: FloatArray) -> FloatArray:
-        return np.asarray(self.start + u[:, None] * (self.end - self.start))
-
-
-@dataclass(frozen=True, eq=False)
-class _Arc:
-    """Places centre + cos(phi) radius + sin(phi) across, (3,) each [m], for phi from 0 to angle [rad]."""
-
-    centre: FloatArray
-    radius: FloatArray
-    across: FloatArray
-    angle: float
-
-    @property
-    def length(self) -> float:
-        return abs(self.angle) * float(np.linalg.norm(self.radius))
-
-    def __call__(self, u: FloatArray) -> FloatArray:
-        turned = np.asarray(self.angle * u)[:, None]
-        return np.asarray(self.centre + np.cos(turned) * self.radius + np.sin(turned) * self.across)
-
-
-def _arc(start: FloatArray, via: FloatArray, end: FloatArray, motion: Motion) -> _Arc:
-    """The circle through three places (3,) [m], up to the end or to the motion's angle."""
-    a, b = via - start, end - start
-    normal = np.cross(a, b)
-    size = float(normal @ normal)
-    if size < (_STRAIGHT * float(np.linalg.norm(b))) ** 2 or float(a @ a) < _STRAIGHT**2:
-        raise KrlMotionError("CIRC: start, auxiliary point and end lie on a line", motion.place)
-    centre = start + np.cross(float(a @ a) * b - float(b @ b) * a, normal) / (2.0 * size)
-    radius = start - centre
-    across = np.cross(normal / np.sqrt(size), radius)
-    angle = motion.angle
-    if angle is None:
-        reach = end - centre
-        angle = float(np.arctan2(reach @ across, reach @ radius)) % (2.0 * np.pi)
-    return _Arc(centre, radius, across, angle)
