@@ -15,6 +15,7 @@ from ir_description.files import (
     bundled_controller,
     cell_errors,
     is_path,
+    path_from_yaml,
     power_parameters_from_yaml,
     read_cell,
     read_regular_file,
@@ -22,6 +23,7 @@ from ir_description.files import (
     robot_from_yaml,
 )
 from ir_description.robot import DATA_SHEET, PowerData, PowerParameters, RobotModel, prior
+from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.errors import InvalidValueError
 
 _DATA = files("ir_description") / "data"
@@ -126,6 +128,15 @@ def load_cell(name_or_path: str | Path) -> Cell:
     except InvalidValueError as error:
         raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
     return read_cell(_decoded(content, str(path)), str(path), load_robot, path.parent)
+
+
+def load_path(name: str) -> CartesianPath:
+    """Return the path of the tool that a file holds. Raises CellFileError."""
+    try:
+        content = read_regular_file(Path(name), CELL_BYTES_MAX)
+    except InvalidValueError as error:
+        raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
+    return path_from_yaml(_decoded(content, name), name)
 
 
 def cell_file_errors(path: str | Path) -> tuple[CellFileError, ...]:

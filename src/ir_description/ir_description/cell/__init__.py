@@ -37,6 +37,7 @@ from ir_description.cell.program import (
     PartPlaces,
     ProgramStep,
 )
+from ir_description.cell.tool_path import CellPath
 
 __all__ = [
     "APPROACH_MAX",
@@ -50,6 +51,7 @@ __all__ = [
     "ZONE_MAX",
     "AllowedContact",
     "Cell",
+    "CellPath",
     "CellSignal",
     "Equipment",
     "EquipmentState",

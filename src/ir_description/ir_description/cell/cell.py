@@ -22,10 +22,12 @@ from ir_description.cell.checks import (
 from ir_description.cell.equipment import Equipment, Station, station_at
 from ir_description.cell.part import Part
 from ir_description.cell.program import CellSignal, PartPlaces, ProgramStep
+from ir_description.cell.tool_path import CellPath
 from ir_description.errors import UnknownNameError
 from ir_description.robot import Load, RobotModel
 from ir_description.shapes import Body, Capsule, floor_body
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.errors import InvalidValueError
 
 
@@ -67,6 +69,7 @@ class Cell:
     machine_home: FloatArray
     program: tuple[ProgramStep, ...]
     tasks: tuple[Task, ...] = ()
+    paths: tuple[CellPath, ...] = ()
     floor: bool = True
     base_contacts: tuple[tuple[str, str], ...] = ()
     description: str = field(default="")
@@ -103,6 +106,10 @@ class Cell:
     def task(self, name: str) -> Task:
         """Return the task of that name."""
         return _named(self.tasks, "task", name)
+
+    def path(self, name: str) -> CartesianPath:
+        """Return the path of the tool of that name."""
+        return _named(self.paths, "path", name).path
 
     def posture(self, name: str) -> FloatArray:
         """Return the joint values (n,) [rad] of "home" or "park"."""

@@ -43,6 +43,9 @@ class _Cell(Protocol):
     @property
     def program(self) -> tuple[ProgramStep, ...]: ...
     @property
+    def paths(self) -> Sequence[_Named]: ...
+
+    @property
     def tasks(self) -> Sequence[_Named]: ...
     @property
     def base_contacts(self) -> tuple[tuple[str, str], ...]: ...
@@ -134,6 +137,7 @@ def check_names(cell: _Cell) -> None:
         ("part", cell.parts),
         ("signal", cell.signals),
         ("task", cell.tasks),
+        ("path", cell.paths),
     ):
         register = NameRegister(what)
         for thing in things:

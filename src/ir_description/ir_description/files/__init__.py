@@ -6,6 +6,7 @@ from ir_description.files.cell_writer import cell_to_yaml
 from ir_description.files.confidence import confidence_marks
 from ir_description.files.controller_reader import bundled_controller, bundled_controllers
 from ir_description.files.mesh import read_regular_file
+from ir_description.files.path_reader import path_from_yaml
 from ir_description.files.places import is_path
 from ir_description.files.power_file import power_from_yaml
 from ir_description.files.power_parameters_file import power_parameters_from_yaml, power_parameters_to_yaml
@@ -20,6 +21,7 @@ __all__ = [
     "cell_to_yaml",
     "confidence_marks",
     "is_path",
+    "path_from_yaml",
     "power_from_yaml",
     "power_parameters_from_yaml",
     "power_parameters_to_yaml",

@@ -16,7 +16,7 @@ def cell_hash(cell: Cell) -> str:
     a movement that relies on a state says so. The file of a cell, written and read again, has the same hash.
     """
     machines = tuple(_unswitched(machine) for machine in cell.equipment)
-    place = replace(cell, description="", equipment=machines, program=(), signals=(), tasks=())
+    place = replace(cell, description="", equipment=machines, program=(), signals=(), tasks=(), paths=())
     content = f"{cell_to_yaml(place)}\n{cell.robot!r}"
     return hashlib.sha256(content.encode()).hexdigest()[:_LENGTH]
 

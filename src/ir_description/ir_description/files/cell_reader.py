@@ -38,6 +38,7 @@ from ir_description.files.body_reader import BodyReader, read_pose
 from ir_description.files.equipment_reader import read_equipment
 from ir_description.files.items import Item, Table, read_items
 from ir_description.files.load_reader import read_part, read_tool
+from ir_description.files.path_reader import PATHS_MAX, read_paths
 from ir_description.files.places import inside, is_path
 from ir_description.files.program_reader import read_signal, read_step
 from ir_description.files.robot_file import read_robot, robot_of
@@ -66,6 +67,7 @@ _OPTIONAL = (
     "park_deg",
     "program",
     "tasks",
+    "paths",
 )
 
 
@@ -149,6 +151,7 @@ class _CellReader:
                 machine_home=home,
                 program=self._program(stations, parts, signals),
                 tasks=self._tasks(),
+                paths=read_paths(self._list("paths", PATHS_MAX)),
                 floor=table["floor"].boolean() if "floor" in table else True,
                 base_contacts=self._base_contacts(equipment, parts),
             )

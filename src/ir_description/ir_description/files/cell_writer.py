@@ -22,6 +22,7 @@ from ir_description.cell import (
     zone_around,
 )
 from ir_description.files.cell_reader import FORMAT
+from ir_description.files.path_reader import path_lines
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_description.robot import Load
 from ir_description.shapes import Body, Capsule
@@ -73,6 +74,7 @@ def _cell(cell: Cell) -> Iterator[str]:
             for t in cell.tasks
         ),
     )
+    yield from _block("paths", (path_lines(path, _pose, _number) for path in cell.paths))
 
 
 def _load(load: Load) -> Iterator[str]:

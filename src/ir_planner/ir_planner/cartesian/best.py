@@ -30,6 +30,7 @@ _ROUNDS = 6  # of chains that aren't certified
 _AROUND = 0.02  # m along the path, and
 _NEAR = 0.3  # rad around a configuration that isn't certified: not asked again
 _SHRUNK = 0.999
+_LIMITS, _FARTHER = ("velocity", "acceleration", "jerk"), 0.93
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,7 @@ class DrivenPath:
     movement: Movement
     sent: SentPath
     angle: Angle | None
+    chain: Chain
 
 
 def best_along(asked: Asked, layers: Layers) -> DrivenPath:
@@ -81,6 +83,7 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
             raise reason or error_of_first
         with journal.stage("proof") as notes:
             for one in sorted(driven, key=lambda one: one.movement.coarse_cost):
+                one = _within_limits(asked, one)
                 violation = one.movement.violation
                 if violation is None:
                     return one
@@ -104,6 +107,17 @@ def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRef
             asked.context.journal.reject(str(error))
             reason = reason or error
     return driven, reason
+
+
+def _within_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
+    """The same with more distance from the limits where the interpolant between points exceeds one."""
+    violation = one.movement.violation
+    if violation is None or violation.what not in _LIMITS:
+        return one
+    try:
+        return _timed(asked, one.chain, _FARTHER)
+    except PathRefusedError:
+        return one
 
 
 def _uncertified(one: DrivenPath) -> PathRefusedError:
@@ -130,8 +144,8 @@ def _without(layers: Layers, one: DrivenPath) -> Layers:
     return replace(layers, free=layers.free & ~near)
 
 
-def _timed(asked: Asked, chain: Chain) -> DrivenPath:
-    """A chain with its time. Raises PathRefusedError."""
+def _timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
+    """A chain with its time, within a share of the limits. Raises PathRefusedError."""
     path, whole, scene = asked.path, asked.whole, asked.context.scene
     angle, chain = angle_along(whole, chain, path.free_angle, asked.space, asked.fixed)
     ends = _strokes(whole)
@@ -140,14 +154,15 @@ def _timed(asked: Asked, chain: Chain) -> DrivenPath:
     made: list[DrivenPath] = []
 
     def timed(limits: MotionLimits) -> Movement:
+        limits = limits.scaled(share, share)
         strokes = tuple(
             timed_stroke(curve, _spans(whole, a, b, slower), path.speed_tolerance, limits, scene)
             for curve, (a, b) in zip(curves, ends, strict=True)
         )
         check_duration(sum(stroke.duration for stroke in strokes), asked.context.options)
-        points = sent(strokes, scene)
+        points = sent(strokes, limits, scene)
         movement = Movement(chain.q, points.trajectory, asked.context)
-        made.append(DrivenPath(movement, points, angle))
+        made.append(DrivenPath(movement, points, angle, chain))
         return movement
 
     within_torque(timed, asked.context)

@@ -178,7 +178,7 @@ def chains(layers: Layers, speed: float, scene: PlanningScene, most: int) -> lis
             "a singularity, a collision, or an axis limit that asks for another configuration"
         )
     found: list[Chain] = []
-    for node in _different(last, cost, q, scene, apart)[:most]:
+    for node in _different(last, cost, q, scene, (apart, most)):
         trace = [int(node)]
         while parent[trace[-1]] >= 0:
             trace.append(int(parent[trace[-1]]))
@@ -235,18 +235,20 @@ def _cheapest(
 
 
 def _different(
-    last: IntArray, cost: FloatArray, q: FloatArray, scene: PlanningScene, apart: float
+    last: IntArray, cost: FloatArray, q: FloatArray, scene: PlanningScene, bounds: tuple[float, int]
 ) -> IntArray:
-    """Ends (K,) of chains, cheapest first, at least about `apart` rad apart; of those that differ by whole
-    turns, the one most within the axis limits.
+    """Ends (K,) of chains, cheapest first; of those that differ by whole turns, the one most within the axis
+    limits. bounds: about how many rad they are apart, and how many at most.
     """
     robot = scene.cell.robot
     middle = 0.5 * (robot.position_min + robot.position_max)
     away = (np.abs(q[last] - middle) / (robot.position_max - robot.position_min)).max(axis=1)
     digits = np.round(np.log(np.maximum(cost[last], 1e-12)) / _SAME)
     order = last[np.lexsort((away, digits))]
-    kept: list[int] = []
+    (apart, most), kept = bounds, list[int]()
     for node in order:
+        if len(kept) == most:
+            break
         if all(np.abs(np.sin(0.5 * (q[node] - q[other]))).max() > apart for other in kept):
             kept.append(int(node))
     return np.array(kept, dtype=np.int64)

@@ -1,5 +1,6 @@
 """The path of a request as a value: its poses in the frame that it names."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,13 +27,17 @@ _FIELDS = (
 
 
 def path_of(request: Any, cell: Cell) -> CartesianPath:
-    """The path of a request, by name or by its poses. Raises RequestError, PoseError."""
+    """The path of a request, by name or by its poses: settings of a named one are those of the cell file,
+    but for those that the request changes from their defaults. Raises RequestError, PoseError.
+    """
     given = stamped_pose_given(request.start_pose) or bool(request.segments)
     if bool(request.path) == given:
         which = "both are" if given else "neither is"
         raise RequestError(_CODE, f"exactly one of path and start_pose with segments must be given, {which}")
     if request.path:
-        raise RequestError(StatusCode.INVALID_OBJECT_NAME, f"path {request.path[:60]!a} is unknown")
+        path = cell.path(request.path)
+        changed = {name: getattr(request, name) for name in _FIELDS if _changed(request, name)}
+        return replace(path, **changed)
     start = stamped_pose_from_msg(request.start_pose, {BASE_FRAME: cell.base_pose})
     frame = cell.base_pose if request.start_pose.header.frame_id == BASE_FRAME else np.eye(4)
     total = sum(len(segment.poses) for segment in request.segments)
@@ -40,6 +45,10 @@ def path_of(request: Any, cell: Cell) -> CartesianPath:
         raise RequestError(_CODE, f"segments have {total} poses: at most {POSES_MAX} are taken")
     segments = tuple(_segment(one, frame, k) for k, one in enumerate(request.segments))
     return CartesianPath(start, segments, **{name: getattr(request, name) for name in _FIELDS})
+
+
+def _changed(request: Any, name: str) -> bool:
+    return bool(getattr(request, name) != CartesianPath.__dataclass_fields__[name].default)
 
 
 def _segment(msg: Any, frame: FloatArray, k: int) -> CartesianSegment:

@@ -1,0 +1,65 @@
+"""Paths of the tool in a cell file: read, written, refused at their line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ir_description import CellFileError, cell_from_yaml, cell_hash, cell_to_yaml, path_from_yaml
+from ir_msgs_py.cartesian import CartesianPath
+
+HEAD = "format: ir_cell/1\nname: c\nrobot: kr210_r2700_extra\n"
+SEAM = """paths:
+  - name: seam
+    tool_speed: 0.02
+    orientation: tangent
+    start: {xyz: [1.8, -0.3, 1.2], abc_deg: [0, 90, 0]}
+    segments:
+      - {line: {xyz: [1.8, 0, 1.2], abc_deg: [0, 90, 0]}}
+      - {circle: [{xyz: [1.9, 0.1, 1.2]}, {xyz: [2, 0, 1.2], abc_deg: [10, 80, 0]}], tool_speed: 0.015}
+      - {spline: [{xyz: [2.1, 0, 1.2], abc_deg: [0, 90, 0]}, {xyz: [2.1, 0.1, 1.3], abc_deg: [0, 90, 5]}]}
+"""
+
+
+def same(first: CartesianPath, second: CartesianPath) -> bool:
+    poses = [
+        np.array([path.start, *(pose for part in path.segments for pose in part.poses)])
+        for path in (first, second)
+    ]
+    settings = [
+        [path.tool_speed, path.orientation, path.free_angle, *((p.kind, p.tool_speed) for p in path.segments)]
+        for path in (first, second)
+    ]
+    return bool(np.array_equal(*poses)) and settings[0] == settings[1]
+
+
+def test_a_path_comes_back_from_the_file_that_is_written() -> None:
+    cell = cell_from_yaml(HEAD + SEAM)
+    again = cell_from_yaml(cell_to_yaml(cell))
+    assert [path.name for path in again.paths] == ["seam"]
+    assert same(cell.path("seam"), again.path("seam"))
+    assert cell.path("seam").segments[1].tool_speed == 0.015
+    assert cell_hash(cell) == cell_hash(cell_from_yaml(HEAD))  # a path moves nothing
+
+
+def test_a_file_of_its_own_has_the_same_keys() -> None:
+    lines = [line[4:] for line in SEAM.splitlines()[2:]]
+    assert same(path_from_yaml("\n".join(lines), "seam.yaml"), cell_from_yaml(HEAD + SEAM).path("seam"))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "sentence"),
+    [
+        ("tool_speed: 0.02", "tool_speed: 20", "must be in [0.0001, 10] m/s"),
+        ("tangent", "sideways", "must be one of given, constant, tangent"),
+        ("{xyz: [1.9, 0.1, 1.2]}, ", "", "a circle has 1 poses: it must have 2"),
+        ("- {line:", "- {bow:", "unknown key"),
+        ("name: seam", "name: 7", "must be a name"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(wrong: str, right: str, sentence: str) -> None:
+    text = HEAD + SEAM
+    assert wrong in text
+    with pytest.raises(CellFileError, match=r":\d+: ") as refused:
+        cell_from_yaml(text.replace(wrong, right))
+    assert sentence in str(refused.value)
