@@ -24,7 +24,8 @@ KNOWS = {
     **LANGUAGE,
     **dict.fromkeys(ROOMS, BASE),
     "ir_planner": BASE | set(LANGUAGE),
-    "ir_cli": BASE | ROOMS | set(LANGUAGE),
+    "ir_studies": BASE | {"ir_planner", "ir_recorder"},
+    "ir_cli": BASE | ROOMS | set(LANGUAGE) | {"ir_studies"},
 }
 PROJECT = set(KNOWS)
 CORE_READS_NO_CLOCK = {"ir_kernels", "ir_description", "ir_krl", "ir_planner"}

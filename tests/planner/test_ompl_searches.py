@@ -33,7 +33,7 @@ def test_without_ompl_a_sentence_says_how_to_install_it(
 ) -> None:
     monkeypatch.setattr(host, "find_spec", lambda name: None)
     ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
-    with pytest.raises(RequestError, match='"kpiece" needs OMPL: pip install'):
+    with pytest.raises(RequestError, match="'kpiece': OMPL is missing: pip install"):
         SEARCHES["kpiece"].find(ends, space, 1, space.work)
 
 

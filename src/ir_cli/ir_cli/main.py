@@ -33,6 +33,7 @@ COMMAND_MODULES = {
     "optimize": "ir_cli.offline.optimize_command",
     "energy": "ir_cli.offline.energy_command",
     "krl": "ir_cli.offline.krl_command",
+    "arena": "ir_cli.offline.arena_command",
     "compare": "ir_cli.offline.compare_command",
     "cell": "ir_cli.offline.cell_commands",
     "robot": "ir_cli.offline.robot_commands",
@@ -62,6 +63,7 @@ HELP = {
     "optimize": "make the motion of a trace cheaper between its ends; needs no ROS",
     "energy": "compare measurements, fit power parameters, plan what identifies them; needs no ROS",
     "krl": "KUKA programs: what one costs in a cell, and planned ones as KRL",
+    "arena": "planners against each other over cells, tasks and seeds; needs no ROS",
     "compare": "today's program (KRL, a trace, or PTP at 100 %%) against the planner's",
     "cell": "check cell files, list the bundled cells",
     "robot": "check robot files, make one from a URDF, list the bundled ones",
@@ -81,6 +83,7 @@ WITHOUT_ROS = (
     "optimize",
     "energy",
     "krl",
+    "arena",
     "compare",
     "cell",
     "robot",
@@ -157,9 +160,10 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     from ir_description.errors import DescriptionError
     from ir_msgs_py.errors import MsgsError
     from ir_recorder.errors import RecorderError
+    from ir_studies.errors import StudyError
 
     # OSError: a full disk, no permission, no descriptor left
-    return (CommandError, DescriptionError, MsgsError, OSError, RecorderError)
+    return (CommandError, DescriptionError, MsgsError, OSError, RecorderError, StudyError)
 
 
 if __name__ == "__main__":

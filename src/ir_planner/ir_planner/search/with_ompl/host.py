@@ -77,11 +77,15 @@ def _connected() -> tuple[Connection, int]:
     raise RequestError(StatusCode.FAILURE, "OMPL's process does not start")
 
 
+def missing() -> str:
+    """How to install OMPL where it isn't; "" where it is."""
+    return "" if find_spec("ompl") else 'OMPL is missing: pip install "ir_planner[ompl]", or pip install ompl'
+
+
 def check_installed(name: str) -> None:
     """Raise RequestError with how to install OMPL where it isn't."""
-    if find_spec("ompl") is None:
-        sentence = f'planner_id "{name}" needs OMPL: pip install "ir_planner[ompl]" or pip install ompl'
-        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence)
+    if missing():
+        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, f"planner_id {name!r}: {missing()}")
 
 
 def asked(problem: Problem, work: Work) -> Outcome:

@@ -1,0 +1,7 @@
+"""The arena: planners against each other over cells, tasks, seeds, payloads and timings."""
+
+from ir_studies.arena.entries import Entry
+from ir_studies.arena.runs import Finished, run_arena
+from ir_studies.arena.settings import EXAMPLE, PORTFOLIO, ArenaSettings, read_settings
+
+__all__ = ["EXAMPLE", "PORTFOLIO", "ArenaSettings", "Entry", "Finished", "read_settings", "run_arena"]

@@ -1,0 +1,70 @@
+"""The runs of an arena: every planner on every task with every seed, in an order that treats all alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from ir_description import Cell, load_cell
+from ir_msgs_py.arrays import FloatArray
+from ir_studies.arena.settings import MOST_RUNS, ArenaSettings
+from ir_studies.errors import SettingsError
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One run: a planner, a task of a cell as start->goal, a seed, what is attached, and the timing."""
+
+    planner: str
+    cell: str
+    task: str
+    seed: int
+    load: str
+    timing: str
+
+    @property
+    def key(self) -> str:
+        """What it is known by in the results."""
+        return "|".join(str(value) for value in asdict(self).values())
+
+    @property
+    def question(self) -> tuple[str, str, str, str]:
+        """What all planners and seeds are asked alike."""
+        return self.cell, self.task, self.load, self.timing
+
+
+def tasks_of(cell: Cell) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+    """Ends (n,) of every task, there and back: home->p1 and p1->home."""
+    found: dict[str, tuple[FloatArray, FloatArray]] = {}
+    for task in cell.tasks:
+        start, goal = np.array(task.start), np.array(task.goal)
+        first, _, last = task.name.partition("->")
+        found[task.name] = start, goal
+        found[f"{last}->{first}" if last else f"{task.name} back"] = goal, start
+    return found
+
+
+def entries(settings: ArenaSettings) -> list[Entry]:
+    """All runs; planners change fastest and seeds slowest, so that what is there early is a fair part."""
+    tasks = {cell: _chosen(cell, settings.tasks) for cell in settings.cells}
+    count = settings.seeds * sum(map(len, tasks.values()))
+    count *= len(settings.loads) * len(settings.timings) * len(settings.planners)
+    if count > MOST_RUNS:
+        raise SettingsError(f"these are {count} runs: at most {MOST_RUNS} are made")
+    return list(_entries(settings, tasks))
+
+
+def _chosen(cell: str, names: tuple[str, ...]) -> list[str]:
+    return [name for name in tasks_of(load_cell(cell)) if not names or name in names]
+
+
+def _entries(settings: ArenaSettings, tasks: Mapping[str, list[str]]) -> Iterator[Entry]:
+    for seed in range(settings.seeds):
+        for cell, names in tasks.items():
+            for task in names:
+                for load in settings.loads:
+                    for timing in settings.timings:
+                        for planner in settings.planners:
+                            yield Entry(planner, cell, task, seed, load, timing)

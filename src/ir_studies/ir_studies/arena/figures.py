@@ -1,0 +1,137 @@
+"""What the runs of planners say together: success, times and costs, and how they grow with time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_msgs_py.arrays import FloatArray
+from ir_studies.arena.table import Run
+
+GRID = 400  # instants of the curves over time
+Question = tuple[str, str, str, str]
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Runs of one planner: how many were solved of how many, medians of seconds, and of J over the best that
+    anybody found for the same question; cut and dead ones.
+    """
+
+    planner: str
+    solved: int
+    count: int
+    first: float
+    final: float
+    cost_ratio: float
+    duration: float
+    energy: float
+    movement_ratio: float
+    clearance: float
+    lost: int
+
+    @property
+    def success(self) -> float:
+        """Share of the runs that were solved."""
+        return self.solved / self.count if self.count else math.nan
+
+
+def best_costs(runs: Iterable[Run], name: str = "cost_j") -> dict[Question, float]:
+    """The least figure of each question, whoever found it."""
+    best: dict[Question, float] = {}
+    for run in runs:
+        value = run.number(name)
+        if run.solved and value < best.get(run.entry.question, math.inf):
+            best[run.entry.question] = value
+    return best
+
+
+def figures(planner: str, runs: Sequence[Run]) -> Figures:
+    """The figures of a planner among runs of all of them."""
+    J, W = best_costs(runs), best_costs(runs, "movement_cost")
+    own = [run for run in runs if run.entry.planner == planner]
+    solved = [run for run in own if run.solved]
+    return Figures(
+        planner,
+        len(solved),
+        len(own),
+        _median(run.number("first_s") for run in solved),
+        _median(run.number("final_s") for run in solved),
+        _median(run.number("cost_j") / J[run.entry.question] for run in solved),
+        _median(run.number("duration_s") for run in solved),
+        _median(run.number("energy_j") for run in solved),
+        _median(run.number("movement_cost") / W[run.entry.question] for run in solved),
+        min((run.number("clearance_m") for run in solved), default=math.nan),
+        sum(run.row.get("outcome", "answered") != "answered" for run in own),
+    )
+
+
+def success_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
+    """Percent of the runs (N, planners) that were solved until each time (N,)."""
+    return np.stack([_solved_until([r for r in runs if r.entry.planner == p], time) for p in planners], 1)
+
+
+def cost_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
+    """Median (N, planners) over the runs of J so far, in percent above the best known; NaN while fewer than
+    half of them are solved.
+    """
+    best = best_costs(runs)
+    found = []
+    for planner in planners:
+        own = [_ratio_until(run, best, time) for run in runs if run.entry.planner == planner]
+        found.append(np.median(np.stack(own), 0) if own else np.full(len(time), np.inf))
+    value = 100.0 * (np.stack(found, 1) - 1.0)
+    return np.where(np.isfinite(value), value, np.nan)
+
+
+def energy_and_time(planners: Sequence[str], runs: Sequence[Run]) -> dict[str, tuple[float, float]]:
+    """Mean seconds and joules at the mains of each planner over the questions that all of them solved."""
+    by_planner: dict[str, dict[Question, list[Run]]] = {planner: {} for planner in planners}
+    for run in runs:
+        if run.solved:
+            by_planner[run.entry.planner].setdefault(run.entry.question, []).append(run)
+    solving = [own for own in by_planner.values() if own]
+    common = set.intersection(*(set(own) for own in solving)) if solving else set()
+    return {
+        planner: (_mean(own, common, "duration_s"), _mean(own, common, "energy_j"))
+        for planner, own in by_planner.items()
+        if own and common
+    }
+
+
+def _mean(own: Mapping[Question, Sequence[Run]], common: Iterable[Question], name: str) -> float:
+    return float(
+        np.mean([np.mean([run.number(name) for run in own[question]]) for question in sorted(common)])
+    )
+
+
+def _solved_until(own: Sequence[Run], time: FloatArray) -> FloatArray:
+    first = np.sort([run.number("first_s") for run in own if run.solved])
+    return np.asarray(100.0 * np.searchsorted(first, time, side="right") / max(len(own), 1))
+
+
+def _ratio_until(run: Run, best: Mapping[Question, float], time: FloatArray) -> FloatArray:
+    """J so far (N,) over the best known, inf before the first answer."""
+    if not run.solved or not run.progress:
+        return np.full(len(time), np.inf)
+    at, cost = np.array(run.progress).T
+    known = np.concatenate([[np.inf], cost]) / best[run.entry.question]
+    return np.asarray(known[np.searchsorted(at, time, side="right")])
+
+
+def _median(values: Iterable[float]) -> float:
+    found = [value for value in values if math.isfinite(value)]
+    return float(np.median(found)) if found else math.nan
+
+
+def of_cell(runs: Iterable[Run], cell: str) -> list[Run]:
+    """Runs in a cell."""
+    return [run for run in runs if run.entry.cell == cell]
+
+
+def longest(runs: Iterable[Run]) -> float:
+    """Seconds until the last run improved its answer, or ended."""
+    return max((run.number("total_s") for run in runs if run.number("total_s") > 0.0), default=1.0)

@@ -1,0 +1,98 @@
+"""Runs as a database of Planner Arena, in the tables that OMPL's ompl_benchmark_statistics.py writes."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sqlite3
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from ir_studies.arena.settings import ArenaSettings
+from ir_studies.arena.table import Run
+
+_TABLES = """
+CREATE TABLE experiments (id INTEGER PRIMARY KEY AUTOINCREMENT, name VARCHAR(512), totaltime REAL,
+  timelimit REAL, memorylimit REAL, runcount INTEGER, version VARCHAR(128), hostname VARCHAR(1024),
+  cpuinfo TEXT, date DATETIME, seed VARCHAR(24), setup TEXT);
+CREATE TABLE plannerConfigs (id INTEGER PRIMARY KEY AUTOINCREMENT, name VARCHAR(512) NOT NULL, settings TEXT);
+CREATE TABLE enums (name VARCHAR(512), value INTEGER, description TEXT, PRIMARY KEY (name, value));
+CREATE TABLE runs (id INTEGER PRIMARY KEY AUTOINCREMENT, experimentid INTEGER, plannerid INTEGER,
+  time REAL, solved BOOLEAN, correct_solution BOOLEAN, time_to_first_solution REAL, solution_cost REAL,
+  solution_duration REAL, solution_energy REAL, movement_cost REAL, solution_clearance REAL, free_ptp BOOLEAN,
+  iterations INTEGER, status ENUM,
+  FOREIGN KEY (experimentid) REFERENCES experiments(id) ON DELETE CASCADE,
+  FOREIGN KEY (plannerid) REFERENCES plannerConfigs(id) ON DELETE CASCADE);
+CREATE TABLE progress (runid INTEGER, time REAL, best_cost REAL, PRIMARY KEY (runid, time),
+  FOREIGN KEY (runid) REFERENCES runs(id) ON DELETE CASCADE);
+"""
+_STATUS = ("answered", "died", "cut")
+
+
+def write_database(runs: Sequence[Run], settings: ArenaSettings, path: Path) -> Path:
+    """Write the database in place of an earlier one."""
+    part = path.with_name(path.name + ".part")
+    part.unlink(missing_ok=True)
+    database = sqlite3.connect(part)
+    try:
+        with database:
+            database.executescript(_TABLES)
+            database.executemany("INSERT INTO enums VALUES ('status', ?, ?)", list(enumerate(_STATUS)))
+            _fill(database, runs, settings)
+    finally:
+        database.close()
+    os.replace(part, path)
+    return path
+
+
+def _fill(database: sqlite3.Connection, runs: Sequence[Run], settings: ArenaSettings) -> None:
+    planners: dict[str, int] = {}
+    for name in settings.planners:
+        words = "INSERT INTO plannerConfigs (name, settings) VALUES (?, '')"
+        planners[name] = int(database.execute(words, (name,)).lastrowid or 0)
+    by_question: dict[tuple[str, ...], list[Run]] = {}
+    for run in runs:
+        by_question.setdefault(run.entry.question, []).append(run)
+    for question, own in by_question.items():
+        experiment = _experiment(database, question, own, settings)
+        for run in own:
+            _insert(database, run, experiment, planners[run.entry.planner])
+
+
+def _experiment(
+    database: sqlite3.Connection, question: Iterable[str], runs: Sequence[Run], settings: ArenaSettings
+) -> int:
+    total = sum(run.number("total_s") for run in runs if run.number("total_s") > 0.0)
+    values = (
+        " ".join(part for part in question if part), total, settings.seconds, 0.0, settings.seeds,
+        "ir_studies 0.1.0", platform.node(), platform.processor(),
+        datetime.now(UTC).isoformat(" ", "seconds"), "0", json.dumps(settings.budget),
+    )  # fmt: skip
+    words = (
+        "INSERT INTO experiments (name, totaltime, timelimit, memorylimit, runcount, version, hostname, "
+        "cpuinfo, date, seed, setup) VALUES (?,?,?,?,?,?,?,?,?,?,?)"
+    )
+    return int(database.execute(words, values).lastrowid or 0)
+
+
+def _insert(database: sqlite3.Connection, run: Run, experiment: int, planner: int) -> None:
+    outcome = str(run.row.get("outcome", _STATUS[0]))
+    figures = [
+        run.number(name)
+        for name in ("first_s", "cost_j", "duration_s", "energy_j", "movement_cost", "clearance_m")
+    ]
+    values = (
+        experiment, planner, run.number("total_s"), run.solved, run.solved, *figures, run.free_ptp,
+        int(run.number("requests")) if "requests" in run.row else 0, _STATUS.index(outcome),
+    )  # fmt: skip
+    words = (
+        "INSERT INTO runs (experimentid, plannerid, time, solved, correct_solution, time_to_first_solution, "
+        "solution_cost, solution_duration, solution_energy, movement_cost, solution_clearance, free_ptp, "
+        f"iterations, status) VALUES ({','.join('?' * 14)})"
+    )
+    key = database.execute(words, values).lastrowid
+    database.executemany(
+        "INSERT OR REPLACE INTO progress VALUES (?, ?, ?)", [(key, at, cost) for at, cost in run.progress]
+    )

@@ -1,0 +1,176 @@
+"""What an arena compares, from a YAML file; whatever makes no sense is refused before anything is planned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ir_description import DescriptionError, load_cell, load_power_data
+from ir_msgs_py.options import TIMINGS
+from ir_planner import PlannerError
+from ir_planner.scene import scene_with
+from ir_planner.search import SEARCHES
+from ir_planner.search.with_ompl import missing, needs_ompl
+from ir_studies.errors import SettingsError
+
+FORMAT = "ir_arena/1"
+PORTFOLIO = "portfolio"
+"""The name of an empty planner_id."""
+MOST_RUNS = 1_000_000
+_MOST_CHARACTERS = 1_000_000  # of a settings file
+
+EXAMPLE = """\
+format: ir_arena/1
+planners: [portfolio, genetic, tree, sbl, kpiece, bkpiece, lbkpiece, prm, rrt, rrt_connect, aorrtc]
+cells: [open, table_columns, cnc_door, deep_box]   # bundled, or files
+tasks: []                    # names as home->p1; [] is all of them, there and back
+seeds: 10
+loads: [""]                  # what is attached: "" is the tool of the cell, none nothing
+timings: [synchronous]       # and asynchronous
+seconds: 1.0                 # per run: the planner is asked again with other seeds until they are over
+requests: 0                  # per run at most; 0: as many as the seconds hold
+max_iterations: 0            # work of a request; 0: the planner's default
+safety_distance: 0.02        # m; less where an end of the task is nearer
+time_value: 500.0            # W in J = energy of the drives + time_value x T
+hang_after: 60.0             # s beyond `seconds` after which a run is cut
+"""
+
+
+@dataclass(frozen=True)
+class ArenaSettings:
+    """The axes of the comparison, and what each run may cost; EXAMPLE says what each means."""
+
+    cells: tuple[str, ...]
+    planners: tuple[str, ...] = (PORTFOLIO,)
+    tasks: tuple[str, ...] = ()
+    seeds: int = 10
+    loads: tuple[str, ...] = ("",)
+    timings: tuple[str, ...] = ("synchronous",)
+    seconds: float = 1.0
+    requests: int = 0
+    max_iterations: int = 0
+    safety_distance: float = 0.02
+    time_value: float = 500.0
+    hang_after: float = 60.0
+
+    def __post_init__(self) -> None:
+        for name in ("cells", "planners", "loads", "timings", "tasks"):
+            _check_names(name, getattr(self, name), may_be_empty=name == "tasks")
+        _check_known("planners", self.planners, (PORTFOLIO, *SEARCHES))
+        _check_known("timings", self.timings, TIMINGS)
+        for name, low, high in _WHOLE:
+            _check(name, getattr(self, name), low, high, whole=True)
+        for name, least, most in _REAL:
+            _check(name, getattr(self, name), least, most, whole=False)
+        wanted = [name for name in self.planners if name in SEARCHES and needs_ompl(SEARCHES[name])]
+        if wanted and missing():
+            raise SettingsError(f"planners: {', '.join(wanted)}: {missing()}")
+        self._check_cells()
+
+    @property
+    def budget(self) -> dict[str, Any]:
+        """What the results of a run depend on beside the axes."""
+        axes = ("cells", "planners", "tasks", "seeds", "loads", "timings", "hang_after")
+        return {name: value for name, value in asdict(self).items() if name not in axes}
+
+    def _check_cells(self) -> None:
+        known_tasks: list[str] = []
+        for name in self.cells:
+            try:
+                cell = load_cell(name)
+                for load in filter(None, self.loads):
+                    scene_with(cell, load, load_power_data())
+            except (DescriptionError, PlannerError, OSError) as error:
+                raise SettingsError(f"cells: {name}: {error}") from error
+            if not cell.tasks:
+                raise SettingsError(f"cells: {name} has no tasks")
+            known_tasks += [task.name for task in cell.tasks]
+        _check_known("tasks", self.tasks, known_tasks)
+
+
+_WHOLE = (("seeds", 1, 100_000), ("requests", 0, 1_000_000), ("max_iterations", 0, 2**32 - 1))
+_REAL = (
+    ("seconds", 0.01, 86_400.0),
+    ("safety_distance", 0.0, 10.0),
+    ("time_value", 0.0, 1e9),
+    ("hang_after", 1.0, 86_400.0),
+)
+
+
+def read_settings(path: str | Path) -> ArenaSettings:
+    """The settings of a YAML file; cell files count from its folder. SettingsError names the key."""
+    file = Path(path)
+    try:
+        if file.stat().st_size > _MOST_CHARACTERS:
+            raise SettingsError(f"{path} is larger than {_MOST_CHARACTERS} bytes: it is no settings file")
+        read = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"{path} can't be read: {error.strerror}") from error
+    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        said = " ".join(str(error).split())
+        raise SettingsError(f"{path} is no YAML: {said}") from error
+    try:
+        return _settings_of(read, file.parent)
+    except SettingsError as error:
+        raise SettingsError(f"{path}: {error}") from error
+
+
+def _settings_of(read: Any, folder: Path) -> ArenaSettings:
+    if not isinstance(read, dict) or read.get("format") != FORMAT:
+        raise SettingsError(f"expected keys and values with format: {FORMAT}")
+    known = {field.name: field for field in fields(ArenaSettings)}
+    values: dict[str, Any] = {}
+    for key, value in read.items():
+        if key == "format":
+            continue
+        if key not in known:
+            raise SettingsError(f"{key} is unknown: known are {', '.join(known)}")
+        values[key] = tuple(value) if isinstance(value, list) else value
+    if "cells" not in values:
+        raise SettingsError("cells are missing: names of bundled cells, or files")
+    if isinstance(values["cells"], tuple):
+        values["cells"] = tuple(_placed(name, folder) for name in values["cells"])
+    return ArenaSettings(**values)
+
+
+def _placed(name: Any, folder: Path) -> Any:
+    """A cell file beside the settings by its path; a bundled name, and what is no name, as it is."""
+    is_file = isinstance(name, str) and name.endswith((".yaml", ".yml"))
+    return str(folder / name) if is_file else name
+
+
+def _check_names(key: str, names: Any, *, may_be_empty: bool) -> None:
+    if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
+        raise SettingsError(f"{key} is {names!r:.60}: it must be a list of names")
+    if not names and not may_be_empty:
+        raise SettingsError(f"{key} is empty")
+    if len(set(names)) < len(names):
+        raise SettingsError(f"{key} names one twice")
+
+
+def _check_known(key: str, names: Collection[str], known: Collection[str]) -> None:
+    for name in names:
+        if name not in known and _reverse(name) not in known:
+            raise SettingsError(
+                f"{key}: {name!r:.60} is unknown: known are {', '.join(dict.fromkeys(known))}"
+            )
+
+
+def _reverse(name: str) -> str:
+    """The task that leads back."""
+    first, _, last = name.partition("->")
+    return f"{last}->{first}" if last else name
+
+
+def _check(key: str, value: Any, low: float, high: float, *, whole: bool) -> None:
+    kind: Callable[[Any], bool] = (
+        (lambda v: isinstance(v, int)) if whole else (lambda v: isinstance(v, int | float))
+    )
+    if isinstance(value, bool) or not kind(value) or not math.isfinite(value) or not low <= value <= high:
+        number = "a whole number" if whole else "a number"
+        raise SettingsError(f"{key} is {value!r:.60}: it must be {number} in {low:g} .. {high:g}")

@@ -1,0 +1,25 @@
+"""What can go wrong with studies, as one tree.
+
+StudyError
+├── SettingsError  a settings file makes no sense: the key, its value, and what it may be
+├── FolderError    the folder of the results holds others, or is in use
+└── WorkerError    the processes that plan can't be started
+"""
+
+
+class StudyError(Exception):
+    """Root of everything that ir_studies raises; a sentence for people."""
+
+
+class SettingsError(StudyError):
+    """Settings that make no sense."""
+
+    exit_code = 2
+
+
+class FolderError(StudyError):
+    """A folder that can't be used."""
+
+
+class WorkerError(StudyError):
+    """Processes that can't be started."""

@@ -1,0 +1,22 @@
+"""Compares planners over cells, tasks and seeds, and shows what follows."""
+
+from setuptools import find_packages, setup
+
+PACKAGE = "ir_studies"
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed", "arena/*.html"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+    ],
+    install_requires=["setuptools", "numpy", "scipy", "PyYAML"],
+    zip_safe=False,
+    maintainer="The maintainers",
+    maintainer_email="maintainers@example.org",
+    description="Compares planners over cells, tasks and seeds, and shows what follows",
+    license="Apache-2.0",
+)
