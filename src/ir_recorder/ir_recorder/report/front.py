@@ -53,8 +53,8 @@ def pareto(points: Sequence[Point]) -> list[Point]:
     return best
 
 
-def front_chart(points: Sequence[Point]) -> str:
-    """The drawing as SVG; "" for fewer than two points."""
+def front_chart(points: Sequence[Point], along: str = "cycle time") -> str:
+    """The drawing as SVG, its axis named `along`; "" for fewer than two points."""
     if len(points) < 2:
         return ""
     times, energies = [p.seconds for p in points], [p.energy for p in points]
@@ -66,7 +66,7 @@ def front_chart(points: Sequence[Point]) -> str:
     return (
         '<div class="figure scroll"><svg class="front" id="energy_over_cycle_time" '
         f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{text(said)}">'
-        f'{_grid(x, y)}<polyline class="line" points="{line}"/>{marks}</svg></div>'
+        f'{_grid(x, y, along)}<polyline class="line" points="{line}"/>{marks}</svg></div>'
     )
 
 
@@ -91,7 +91,7 @@ class _Axis:
         return [k * step for k in range(first, math.floor((low + 1.2 * span) / step) + 1)]
 
 
-def _grid(x: _Axis, y: _Axis) -> str:
+def _grid(x: _Axis, y: _Axis, along: str) -> str:
     right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
     parts = []
     for value in y.ticks():
@@ -103,7 +103,7 @@ def _grid(x: _Axis, y: _Axis) -> str:
         parts.append(f'<path class="grid" d="M{at:.1f} {_TOP:g}V{bottom:g}"/>')
         parts.append(f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{seconds(value)}</text>')
     middle = (_LEFT + right) / 2.0
-    return "".join(parts) + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">cycle time</text>'
+    return "".join(parts) + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
 
 
 def _mark(point: Point, index: int, x: _Axis, y: _Axis) -> str:

@@ -75,8 +75,8 @@ def success_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatA
 
 
 def cost_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
-    """Median (N, planners) over the runs of J so far, in percent above the best known; NaN while fewer than
-    half of them are solved.
+    """Median (N, planners) over the runs of J until each time (N,), in percent above the best known; NaN
+    while fewer than half of them are solved.
     """
     best = best_costs(runs)
     found = []

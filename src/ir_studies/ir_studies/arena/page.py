@@ -105,7 +105,7 @@ def _cell_section(runs: Sequence[Run], name: str, planners: Sequence[str]) -> st
             rows = [_row(figures(planner, part)) for planner in planners]
             parts.append(f"<h3>{title}</h3>{table(_HEADS, rows, f'{cell.name}: {title.lower()}')}")
     means = energy_and_time(planners, own)
-    drawn = front_chart([Point(planner, *means[planner], "measured") for planner in means])
+    drawn = front_chart([Point(planner, *means[planner], "measured") for planner in means], "duration")
     if drawn:
         parts.append(f'<h3>Time against energy</h3><p class="hint">{_FRONT_HINT}</p>{drawn}')
     return f"<section>{''.join(parts)}</section>".replace(
