@@ -22,6 +22,7 @@ COMMAND_MODULES = {
     "front": "ir_cli.front_command",
     "live": "ir_cli.live_command",
     "report": "ir_cli.report_command",
+    "fleet": "ir_cli.fleet_command",
     "replan": "ir_cli.replan.command",
     "plan": "ir_cli.offline.plan_command",
     "move": "ir_cli.offline.move_command",
@@ -52,6 +53,7 @@ HELP = {
     "front": "energy over cycle time: front home infeed_pick park",
     "live": "watch the running cell in a browser of this machine",
     "report": "write the HTML report of a recording, or compare several",
+    "fleet": "recordings of many robots and shifts on one page, summed up",
     "replan": "plan a recording's requests again and compare the ids",
     "plan": "plan a cell's program: seconds, joules, clearance; needs no ROS",
     "move": "plan one movement from START to GOAL; needs no ROS",
@@ -73,6 +75,7 @@ HELP = {
 
 WITHOUT_ROS = (
     "report",
+    "fleet",
     "plan",
     "move",
     "path",

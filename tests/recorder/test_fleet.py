@@ -1,0 +1,82 @@
+"""A fleet: sums over robots and shifts, hostile files by a sentence each, and the files that are written."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ir_cli.main import main
+from ir_recorder import Analysis
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.fleet import Member, fleet_columns, fleet_html, member_of
+from ir_recorder.report.fleet.totals import by_measure, by_mode, by_movement, robots_of, yearly_of
+
+
+@pytest.fixture
+def member(analysis: Analysis) -> Member:
+    found = member_of(analysis, "left")
+    assert found is not None
+    return found
+
+
+def test_the_sums_are_those_of_the_members(member: Member) -> None:
+    costs = Costs()
+    other = replace(member, robot="right", joules=2.0 * member.joules)
+    robots = robots_of([member, other], costs)
+    assert [robot.name for robot in robots] == ["right", "left"]
+    assert robots[0].yearly == pytest.approx(2.0 * yearly_of(member, costs))
+    by_robot = {robot.name: robot.yearly for robot in robots}
+    for found in (by_mode([member, other], costs),):
+        for robot, yearly in by_robot.items():
+            assert sum(own.get(robot, 0.0) for own in found.values()) == pytest.approx(yearly)
+    moved = by_movement([member], costs)
+    assert sum(sum(own.values()) for own in moved.values()) <= 1.001 * by_robot["left"]
+    measures = by_measure([member], costs)
+    assert all(0.0 <= joules <= by_robot["left"] for own in measures.values() for joules in own.values())
+
+
+def test_shifts_of_one_robot_are_averaged(member: Member) -> None:
+    """Law: the same shift twice changes nothing."""
+    costs = Costs()
+    (once,), (twice,) = robots_of([member], costs), robots_of([member, member], costs)
+    assert twice == replace(once, recordings=2)
+    assert by_mode([member, member], costs) == by_mode([member], costs)
+    assert by_movement([member, member], costs) == by_movement([member], costs)
+
+
+def test_the_page_and_the_table_carry_texts_safely(member: Member) -> None:
+    evil = replace(member, robot="<img src=x>", cell="=1+1")
+    page = fleet_html([evil], ["<b>bad</b>: left out"])
+    assert "<img" not in page
+    assert "<b>bad</b>" not in page
+    columns = fleet_columns([evil])
+    assert {len(column) for column in columns.values()} == {len(columns["robot"])}
+
+
+def test_the_command_sums_folders_up_and_names_what_it_leaves_out(
+    demo_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for robot in ("left", "right"):
+        (tmp_path / robot).mkdir()
+        shutil.copy(demo_file, tmp_path / robot / "monday.mcap")
+    (tmp_path / "bad.mcap").write_bytes(b"not a recording")
+    (tmp_path / "empty.mcap").write_bytes(b"")
+    page, table = tmp_path / "out" / "fleet.html", tmp_path / "out" / "fleet.csv"
+    arguments = ["fleet", str(tmp_path), "-o", str(page), "--table", str(table), "--root", str(tmp_path)]
+    assert main(arguments) == 0
+    said = capsys.readouterr().err
+    assert "bad.mcap: left out" in said
+    assert "empty.mcap: left out" in said
+    assert "2 robots, 2 recordings" in page.read_text(encoding="utf-8")
+    with table.open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["what"] == "cycle"]
+    assert [row["robot"] for row in rows] == ["left", "right"]
+
+
+def test_nothing_to_sum_up_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fleet", str(tmp_path), "--root", str(tmp_path)]) == 1
+    assert "no recording could be used" in capsys.readouterr().err
