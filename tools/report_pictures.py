@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/report.md: a report at a desk, on a tablet, on a phone and on paper.
+"""Draw the pictures of docs/report.md: a report at a desk, on a tablet, a phone and paper; the live view.
 
     make demo && python tools/report_pictures.py [--recording out/demo.mcap] [--folder docs/images]
 
@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from _chromium import Browser
+from _live_picture import live_view
 
-from ir_recorder import analyse, findings, read_recording
+from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.report import write_report
 
 PAPER = (740, 1094)  # px at 96 dpi: A4 less the margins of the page's style
@@ -40,6 +41,7 @@ SHOTS = (
     Shot("report_phone.png", (390, 844), touch=True),
     Shot("report_print.png", PAPER, media="print"),
 )
+LIVE_SHOTS = (Shot("live.png", (1400, 1500)), Shot("live_phone.png", (390, 1500), dark=True, touch=True))
 
 
 def main() -> int:
@@ -57,20 +59,31 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder, Browser() as browser:
         file = write_report(analysis, findings(analysis), Path(folder) / "report.html")
         faults = [fault for shot in SHOTS for fault in _draw(browser, file, shot, asked.folder)]
-    sys.stdout.write("".join(f"{asked.folder / shot.name}\n" for shot in SHOTS))
+        with live_view(analysis, _instant(analysis)) as server:
+            for shot in LIVE_SHOTS:
+                faults += _draw(browser, server.address, shot, asked.folder)
+    sys.stdout.write("".join(f"{asked.folder / shot.name}\n" for shot in (*SHOTS, *LIVE_SHOTS)))
     sys.stderr.write("".join(f"{fault}\n" for fault in faults))
     return 1 if faults else 0
 
 
-def _draw(browser: Browser, file: Path, shot: Shot, folder: Path) -> list[str]:
+def _instant(analysis: Analysis) -> float:
+    """The middle of the longest movement [s], when the robot is on its path."""
+    longest = max(analysis.movements, key=lambda result: result.seconds)
+    return longest.step.start + 0.6 * longest.seconds
+
+
+def _draw(browser: Browser, file: Path | str, shot: Shot, folder: Path) -> list[str]:
     """Writes one picture; returns what was wrong with the page."""
     page = browser.open(file, *shot.size, dark=shot.dark, touch=shot.touch)
+    if isinstance(file, str):
+        page.wait("document.getElementById('no-motion').hidden")
     if shot.media == "print":
         page.call("Emulation.setEmulatedMedia", media="print")
         page.run("dispatchEvent(new Event('beforeprint'))")
     page.run(f"document.querySelector('{shot.at}').scrollIntoView({{behavior: 'instant'}})")
     page.picture(folder / shot.name, whole=False)
-    wrong = [*page.faults, *page.requests]
+    wrong = [*page.faults, *(page.requests if isinstance(file, Path) else ())]
     page.close()
     return wrong
 
