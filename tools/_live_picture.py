@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -61,8 +62,17 @@ def live_view(analysis: Analysis, until: float) -> Iterator[LiveServer]:
                 "note": "",
             }
         stream.add(values, always=("w",))
-    server = LiveServer(stream, lambda name, value: Answer(False, ""), lambda: view.scene)
+    server, ended = LiveServer(stream, lambda name, value: Answer(False, ""), lambda: view.scene), Event()
+
+    def beat() -> None:
+        while not ended.wait(0.5):
+            stream.add({})
+
+    heart = Thread(target=beat)
+    heart.start()
     yield server
+    ended.set()
+    heart.join()
     server.close()
 
 

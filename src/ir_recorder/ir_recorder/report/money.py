@@ -115,6 +115,7 @@ def _assumptions(costs: Costs, counts: tuple[float, ...]) -> str:
         shown = value if isinstance(value, str) else f"{value:g} {each.unit}".strip()
         mark = "" if each.name in costs.given else " (assumed)"
         items.append(f"{each.name.replace('_', ' ')} {shown}{mark}")
-    made = f"{counts[1]:,.0f} cycles a shift, {counts[2]:,.0f} a year".replace(",", " ")
+    a_shift, a_year = (f"{count:,.0f}".replace(",", " ") for count in counts[1:3])
+    made = f"{a_shift} cycles a shift, {a_year} a year"
     assumed = "" if set(NAMES) <= set(costs.given) else " Give your own with --costs costs.yaml."
     return f'<p class="hint">{text(made)}; {text(", ".join(items))}.{assumed}</p>'

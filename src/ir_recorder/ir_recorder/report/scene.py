@@ -75,7 +75,7 @@ def _load_changes(analysis: Analysis) -> list[tuple[float, str]]:
     changes: list[tuple[float, str]] = []
     for time, load in analysis.loads.observations:
         if not changes or changes[-1][1] != load:
-            changes.append((time, load))
+            changes.append((time if changes else -1e9, load))  # what is seen first was there before
     if not changes and analysis.cell is not None and analysis.cell.tool is not None:
         changes.append((-1e9, analysis.cell.tool.name))
     return changes

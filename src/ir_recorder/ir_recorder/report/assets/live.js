@@ -160,6 +160,7 @@ class LiveClearanceChart extends ClearanceChart {
       motion.show.nearest = true; /* the planned path is drawn with it */
     }
     sceneShown = number;
+    scale();
     find("no-motion").hidden = true;
     timeline.notify();
   };
@@ -196,13 +197,17 @@ class LiveClearanceChart extends ClearanceChart {
     find("clock").textContent = timeline.tick(timeline.now);
     find("when").textContent = timeline.follows ? "" : `${(timeline.end - timeline.now).toFixed(1)} s ago`;
   };
+  const scale = () => {
+    motion.mostPower = mostPower;
+    find("trail-max").textContent = `${Math.round(mostPower)} W`;
+  };
   const update = () => {
     power.show(history);
     clearance.show(history, history.last.bound);
     if (motion) {
       motion.bound = history.last.bound;
-      motion.mostPower = mostPower = Math.max(mostPower, history.last.w ? history.last.w[1] : 0);
-      find("trail-max").textContent = `${Math.round(motion.mostPower)} W`;
+      mostPower = Math.max(mostPower, history.last.w ? history.last.w[1] : 0);
+      scale();
     }
     timeline.start = history.records[0].t;
     timeline.advance(history.last.t);
