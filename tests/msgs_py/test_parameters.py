@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
+from rcl_interfaces.msg import Parameter as ParameterMsg
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -115,3 +118,42 @@ def test_a_node_started_with_a_bad_value_says_so(ros_context, name, value, sente
     with pytest.raises(ParameterError, match=sentence):
         Parameters(node, Search)
     node.destroy_node()
+
+
+@pytest.fixture
+def ask(ros_context, ros_executor, ros_node, wait_for):
+    """Send a request to a node with parameters, as ROS tools do."""
+    node = ros_executor.add_node(Node("searcher", context=ros_context))
+    ros_executor.run(lambda: Parameters(node, Search))
+
+    def send(kind, name, parameters):
+        client = ros_executor.run(lambda: ros_node.create_client(kind, f"/searcher/{name}"))
+        wait_for(client.service_is_ready)
+        future = ros_executor.run(lambda: client.call_async(kind.Request(parameters=parameters)))
+        wait_for(future.done, timeout=10.0, what=f"{name} answers")
+        return future.result()
+
+    return send
+
+
+SPEED = ParameterMsg(
+    name="speed", value=ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.5)
+)
+NO_TYPE = ParameterMsg(name="speed", value=ParameterValue(type=255))
+
+
+def test_a_value_of_no_type_is_refused_and_what_was_set_before_it_is_said(ask):
+    results = ask(SetParameters, "set_parameters", [SPEED, NO_TYPE, SPEED]).results
+    assert [each.successful for each in results] == [True, False, False]
+    assert "255" in results[1].reason
+    result = ask(SetParametersAtomically, "set_parameters_atomically", [SPEED, NO_TYPE]).result
+    assert not result.successful
+    assert "255" in result.reason
+
+
+def test_ten_megabytes_are_refused_in_a_sentence(ask):
+    text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="x" * 10_000_000)
+    for name in ("method", "x" * 10_000_000):
+        (result,) = ask(SetParameters, "set_parameters", [ParameterMsg(name=name, value=text)]).results
+        assert not result.successful
+        assert len(result.reason) < 5_000

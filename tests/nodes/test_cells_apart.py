@@ -6,12 +6,14 @@ import socket
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ir_msgs.msg import PowerMode
 from ir_msgs.srv import QueryModes, SetPlcInput, StartPause
 from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
 from ir_sim_driver.node import SimDriver
 
 QUICK = {
@@ -93,3 +95,21 @@ def test_diagnostics_say_which_cell_they_are_of(start_driver, ros_node, wait_for
     start_driver(None, 0)
     parts = {"ir_sim_driver: plant", "ir_sim_driver: controller", "ir_sim_driver: executor"}
     wait_for(lambda: heard == parts | {f"cell_1/{part}" for part in parts})
+
+
+def test_two_nodes_of_one_name_say_so(ros_context, ros_executor, ros_node, wait_for):
+    heard = []
+    ros_node.create_subscription(DiagnosticArray, names.DIAGNOSTICS, lambda msg: heard.extend(msg.status), 10)
+    node = ros_executor.add_node(Node("ir_sim_driver", context=ros_context, namespace="cell_1"))
+    ros_executor.add_node(Node("ir_sim_driver", context=ros_context, namespace="cell_2"))
+    diagnostics = ros_executor.run(lambda: Diagnostics(node))
+
+    def said(name):
+        ros_executor.run(lambda: diagnostics.publish([Condition("ir_sim_driver: plant", OK, "")]))
+        return any(each.name == name for each in heard)
+
+    wait_for(lambda: said("cell_1/ir_sim_driver: plant"))
+    assert not said("cell_1/ir_sim_driver: name")
+    ros_executor.add_node(Node("ir_sim_driver", context=ros_context, namespace="cell_1"))
+    wait_for(lambda: said("cell_1/ir_sim_driver: name"))
+    assert heard[-1].message.startswith("2 nodes are named /cell_1/ir_sim_driver")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 from typing import BinaryIO
 
@@ -149,6 +150,24 @@ def test_a_full_disk_is_a_sentence_and_stays_one(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(FileRoots, "open_to_write", full)
     with pytest.raises(WriteError, match=r"full\.mcap: No space left on device after 0 messages"):
         RecordingWriter(tmp_path / "full.mcap")
+
+
+@pytest.mark.parametrize("end", ["flush", "finish"])
+@pytest.mark.parametrize("happens", ["deleted", "replaced", "folder"])
+def test_a_file_that_is_gone_is_no_recording(tmp_path: Path, end: str, happens: str) -> None:
+    folder = tmp_path / "shift"
+    folder.mkdir()
+    writer = RecordingWriter(folder / "gone.mcap")
+    if happens == "folder":
+        shutil.rmtree(folder)
+    else:
+        (folder / "gone.mcap").unlink()
+    if happens == "replaced":
+        (folder / "gone.mcap").write_bytes(b"")
+    with pytest.raises(
+        WriteError, match=r"gone\.mcap: it was deleted, moved or replaced .* recording has ended"
+    ):
+        getattr(writer, end)()
 
 
 def test_a_writer_that_failed_refuses_further_messages(tmp_path: Path) -> None:

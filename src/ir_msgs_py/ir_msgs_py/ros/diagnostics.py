@@ -41,9 +41,22 @@ class Diagnostics:
     def publish(self, conditions: Iterable[Condition]) -> None:
         """Publish these conditions in one message."""
         namespace = self._node.get_namespace()
-        message = DiagnosticArray(status=[_status(namespace, condition) for condition in conditions])
+        said = [*conditions, *self._doubled()]
+        message = DiagnosticArray(status=[_status(namespace, condition) for condition in said])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
+
+    def _doubled(self) -> list[Condition]:
+        """What there is to say where other nodes have this node's name."""
+        name, namespace = self._node.get_name(), self._node.get_namespace()
+        count = self._node.get_node_names_and_namespaces().count((name, namespace))
+        if count < 2:
+            return []
+        sentence = (
+            f"{count} nodes are named {self._node.get_fully_qualified_name()}, and each takes what is sent "
+            "to that name: end all but one, or start it in another namespace"
+        )
+        return [Condition(f"{name}: name", WARN, sentence)]
 
 
 def _status(namespace: str, condition: Condition) -> DiagnosticStatus:

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ir_msgs_py.errors import MsgsError, ParameterError
+from ir_msgs_py.ros.parameter_services import answer_always
 from ir_msgs_py.settings import Setting, changed, tree
 
 T = TypeVar("T")
@@ -56,6 +57,7 @@ class Parameters(Generic[T]):
         self._check(started_with.items())
         node.add_on_set_parameters_callback(self._answer)
         node.add_post_set_parameters_callback(self._take)
+        answer_always(node)
 
     @property
     def value(self) -> T:

@@ -7,6 +7,7 @@ channel, so everything else (cell file, URDF, facts) goes into attachments and m
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -134,6 +135,7 @@ class RecordingWriter:
         """Hands all messages so far to the operating system; they end a chunk."""
         with self._storage():
             self._writer.flush()  # type: ignore[no-untyped-call]
+            self._check_there()
 
     def finish(self) -> RecordingSummary:
         """Writes indexes and statistics and closes the file. A second call changes nothing."""
@@ -142,10 +144,20 @@ class RecordingWriter:
                 self._writer.finish()  # type: ignore[no-untyped-call]
                 self._file.flush()
                 os.fsync(self._file.fileno())
+                self._check_there()
                 self._file.close()
             self._finished = True
         first = self._last if self._first is None else self._first
         return RecordingSummary(self.path, self._messages, (self._last - first) * 1e-9)
+
+    def _check_there(self) -> None:
+        """A file that was deleted takes whatever is written, and nobody will find it."""
+        try:
+            there = os.path.samestat(os.stat(self.path), os.fstat(self._file.fileno()))
+        except FileNotFoundError:
+            there = False
+        if not there:
+            raise OSError(errno.ENOENT, "it was deleted, moved or replaced by another file")
 
     def _storage(self) -> _Storage:
         if self._failure is not None:
