@@ -28,13 +28,14 @@ class Pause:
 
 
 def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
-    """In the mode that is asked for, the sequence of least energy (AUTO), or on motors; longer than the
-    controller stands on motors: on brakes, which it would close anyway, so that they are open again in time.
+    """In the mode that is asked for, where the pause is long enough for it, the sequence of least energy
+    (AUTO), or on motors; longer than the controller stands on motors: on brakes, which it would close anyway,
+    so that they are open again in time.
     """
     rests, mode = rests_at(pause.q, pause.scene, times), pause.requested
     if pause.requested == AUTO:
         mode = DEEPER.join(step.rest.name for step in rests.known(pause.seconds)[1]) or MOTORS
-    elif not pause.requested and rests.cost((), pause.seconds)[1] > 0.0:
+    elif not np.isfinite(_rested(pause, mode, rests)) and rests.cost((), pause.seconds)[1] > 0.0:
         mode = BRAKES
     return _spent(pause, mode, rests)
 
@@ -44,9 +45,14 @@ def pause_by_itself(pause: Pause, times: TransitionTimes) -> PlannedMovement:
     return _spent(pause, "", rests_at(pause.q, pause.scene, times))
 
 
-def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
+def _rested(pause: Pause, mode: str, rests: Rests) -> float:
+    """Energy [J] in a mode that is entered and left in time; inf: on motors, or the pause is too short."""
     sequence = tuple(rests.named(each.name) for each in modes_of(mode))
-    energy = rests.in_time(sequence, pause.seconds) if sequence else np.inf
+    return rests.in_time(sequence, pause.seconds) if sequence else np.inf
+
+
+def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
+    energy = _rested(pause, mode, rests)
     if not np.isfinite(energy):  # on motors, also where it is asked for by name though it is too short
         energy = rests.cost((), pause.seconds)[0]
     report = TrajectoryReport(duration=pause.seconds, energy=energy, base_energy=energy, certified=True)
