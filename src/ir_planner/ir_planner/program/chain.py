@@ -20,7 +20,9 @@ from ir_planner.service import ExitSearch, ServiceLine
 # with the default work for better answers, and in proportion with more of it
 _DEFAULT_WORK = 8_000
 TOLERANCE = 2e-3  # of the cost: a cheaper chain than that isn't looked for
-_PLANNED_PER_STOP = 8  # movements that may be planned for each stop once there is a chain
+# movements that may be planned once there is a chain: so many besides, and for each stop; small programs with
+# many chains need more per stop than large ones have time for
+_PLANNED, _PLANNED_PER_STOP = 24, 8
 _LATE_PER_STOP, _LATE = 8, 100  # once time or work have ended: movements planned, and chains looked at
 _PLANNED_PER_STOP_BY_W = 32  # the same by W, whose bound says little where segments are not free
 
@@ -63,7 +65,7 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
     edges = (TravelEdges if travel else CostEdges)(movements, improvement)
 
     effort = max(context.work.improvement / _DEFAULT_WORK, 1.0)
-    most = count * (3 + effort * (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP))
+    most = count * (3 + effort * (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP)) + _PLANNED
 
     late: list[int] = []  # how many movements were planned when time or work had ended
 
