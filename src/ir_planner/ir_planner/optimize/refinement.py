@@ -17,7 +17,8 @@ from ir_kernels.spline import RowArray
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Violation
-from ir_planner.curves import UniformSpline, along_path, fewest_seconds
+from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
+from ir_planner.optimize.by_value import within_duration
 from ir_planner.optimize.slowing import beyond_limits, slowed_to_limits
 from ir_planner.optimize.stages import QUICK, THOROUGH, Effort, Stage, decisive
 from ir_planner.optimize.terms import spline_cost
@@ -116,11 +117,26 @@ class Refinement:
                     slower = self._optimised(replace(solution, speed=speed), path)
                     found = self._refined(slower, path, effort)
             if found is None:
-                return self._fastest_stretched(path)
+                return self._within_limits(path)
         return found
 
-    def _fastest_stretched(self, path: FloatArray) -> Movement | None:
-        """The fastest movement near a path, at a requested duration that leaves no joules to choose."""
+    def near(self, known: Movement) -> Movement | None:
+        """The movement by descent from a known one, from its path and its own time scaling; None where that
+        can't be certified.
+        """
+        robot, path, own = self.context.scene.cell.robot, known.path, known.trajectory.duration
+        least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
+        count = int(np.clip(np.ceil(least / SPACING), FEWEST, MOST))
+        start = along_motion(known.trajectory, count, self.context.options.duration or max(own, least))
+        control = np.clip(start.control, robot.position_min, robot.position_max)
+        coarse = self.coarse_from(UniformSpline(control, start.interval), path, QUICK.coarse)
+        found = self.refined(coarse, path)
+        return found if found is not None and found.certified else None
+
+    def _within_limits(self, path: FloatArray) -> Movement | None:
+        """The movement near a path at a requested duration that hardly leaves joules to choose: the fastest
+        one stretched, or a cheaper one.
+        """
         requested = self.context.options.duration
         fastest = Refinement(self.context.asking("time"))
         for effort in (QUICK, THOROUGH):
@@ -132,7 +148,8 @@ class Refinement:
             if duration <= requested * (1.0 + DURATION_SLACK):
                 movement = replace(found, context=self.context).stretched_by(max(requested / duration, 1.0))
                 if movement.clearance is None:
-                    return movement
+                    cheaper = within_duration(found, self.context, _near)
+                    return min((m for m in (movement, cheaper) if m is not None), key=lambda m: m.cost)
             if duration > _WITHIN_REACH * requested:
                 break
         return None
@@ -269,3 +286,7 @@ class Refinement:
                 return None
             slowed = slowed.lasting(options.duration)
         return slowed.trajectory(self.context.joint_names)
+
+
+def _near(known: Movement, context: Context) -> Movement | None:
+    return Refinement(context).near(known)

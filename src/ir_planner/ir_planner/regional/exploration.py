@@ -27,7 +27,7 @@ _GOALS, _FEWEST_GUESSES = 6, 8  # that guesses lead to, and so many to each of t
 # Where a straight segment is free, another class is rarely cheaper: fewer guesses, and only those descend
 # further that cost less than so many times the straight one at first sight.
 _FEW_GUESSES, _WORTH_FOLLOWING = 8, 1.3
-_RIVALS = 2  # refined beside the best where a duration is requested: their order in joules is less certain
+_RIVALS = 2  # refined like the best where a duration is requested: their order in joules is less certain
 _REFINED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
 
 
@@ -118,7 +118,7 @@ def _refined_first(
         minima += _fast_ones(ends, paths, portfolio)
     certified = portfolio.refine_best(1, THOROUGH)
     if requested:
-        certified += portfolio.refine_best(_RIVALS)
+        certified += portfolio.refine_best(_RIVALS, THOROUGH)
     return f"{minima} local minima from guesses; {certified} certified"
 
 

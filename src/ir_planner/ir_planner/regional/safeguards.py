@@ -58,7 +58,9 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
         method, path = exploration.paths[0]
         if not (context.work.exhausted or np.array_equal(best[1].path, path)):
             own.refine_anew(method, path)
-        return own.best(), shortest
+        best, shortest = own.best(), own.refinement.shortest
+        if not np.isfinite(shortest):  # there is time for least energy
+            return best, shortest
     if options.duration > 0.0:
         free, duration = _as_asked(_optimised_again(own, context.asking("time_and_energy")), context)
         best, shortest = _cheaper(best, free), min(shortest, duration)
