@@ -19,9 +19,9 @@ from ir_planner.cartesian.speed_law import Span
 from ir_planner.cartesian.timed import timed_stroke
 from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Context
+from ir_planner.request import DURATION_MAX, Context
 from ir_planner.scene import MotionLimits
-from ir_planner.timing import Movement, check_duration, within_torque
+from ir_planner.timing import Movement, within_torque
 
 T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
 COMPARED = 3  # movements, over the cheapest chains by the estimate
@@ -71,7 +71,7 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
         asked.context.work.check()
         with journal.stage("search") as notes:
             try:
-                found = chains(layers, asked.path.tool_speed, asked.context.scene, _TRIED)
+                found = chains(layers, asked.path.tool_speed, asked.space, _TRIED)
             except PathRefusedError as error:
                 raise reason or error from error
             notes.append(f"{len(found)} chains")
@@ -159,7 +159,7 @@ def _timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
             timed_stroke(curve, _spans(whole, a, b, slower), path.speed_tolerance, limits, scene)
             for curve, (a, b) in zip(curves, ends, strict=True)
         )
-        check_duration(sum(stroke.duration for stroke in strokes), asked.context.options)
+        _check_duration(sum(stroke.duration for stroke in strokes), asked)
         points = sent(strokes, limits, scene)
         movement = Movement(chain.q, points.trajectory, asked.context)
         made.append(DrivenPath(movement, points, angle, chain))
@@ -169,17 +169,31 @@ def _timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
     return made[-1]
 
 
+def _check_duration(duration: float, asked: Asked) -> None:
+    if duration > DURATION_MAX:
+        raise PathRefusedError(
+            f"tool_speed {asked.path.tool_speed:g} m/s makes a movement of {duration:.4g} s along "
+            f"{asked.whole.length:.3f} m: it must be at most {DURATION_MAX:g} s",
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+        )
+
+
 def _strokes(whole: ToolPath) -> list[tuple[int, int]]:
     """From which corner to which the tool moves without a stop."""
     return list(itertools.pairwise(k for k, radius in enumerate(whole.radius) if radius == 0.0))
 
 
 def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span, ...]:
-    lengths = np.diff(whole.ends)
-    return tuple(
-        Span(float(lengths[k]), whole.parts[k].speed * slower, whole.parts[k].kept)
-        for k in range(first, last)
-    )
+    """Parts of a stroke; those that follow each other at one speed are one, so that ramps may reach over
+    them.
+    """
+    spans: list[Span] = []
+    for part, length in zip(whole.parts[first:last], np.diff(whole.ends)[first:last], strict=True):
+        span = Span(float(length), part.speed * slower, part.kept)
+        if spans and (spans[-1].speed, spans[-1].kept) == (span.speed, span.kept):
+            span = replace(span, length=spans.pop().length + span.length)
+        spans.append(span)
+    return tuple(spans)
 
 
 def _flange_share(asked: Asked, curves: list[JointCurve]) -> float:

@@ -54,7 +54,8 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
     if asked > 0.0 and angle > _TANGENT:
         return Joint(min(asked, half), angle)
     radius = min(_LONGEST_JOINT, half)
-    while radius >= SHORTEST_JOINT:
+    shortest = min(SHORTEST_JOINT, half) if angle < _TANGENT else SHORTEST_JOINT
+    while radius >= shortest:
         leaves, turns = _left_by(before, after, radius)
         if leaves <= SMOOTHING and turns <= SMOOTHING_TURN:
             return Joint(radius, angle, leaves, turns)

@@ -20,6 +20,7 @@ _DEGREE = 5
 _FEWEST = 12  # intervals of a stroke
 _FINER = (1, 2, 4, 8, 16)
 _LAST = 4.0  # times as much at the finest: near a singularity the axes bend without end
+_SHARP = ", where it bends too sharply"
 _WRIST = np.radians(5.0)  # an axis 5 nearer to 0 than this is near the singularity of the wrist
 
 Angle = Callable[[FloatArray], FloatArray]
@@ -65,9 +66,10 @@ def curve_of(
         worst, place = float(error.max()), float(middle[int(np.argmax(error))])
         if worst <= (1.0 if finer < _FINER[-1] else _LAST):
             return curve
+    why = singularity(curve.spline(place), scene) or _SHARP
     raise PathRefusedError(
-        f"the axes can't follow the path at {place:.3f} m{singularity(curve.spline(place), scene)}: between "
-        f"samples {1e3 * (s[1] - s[0]):.2g} mm apart they leave it by {worst * SPLINE_ERROR * 1e3:.3g} mm"
+        f"the axes can't follow the path at {place:.3f} m{why}: between samples "
+        f"{1e3 * (s[1] - s[0]):.2g} mm apart they leave it by {worst * SPLINE_ERROR * 1e3:.3g} mm"
     )
 
 

@@ -160,11 +160,11 @@ def nearest_sentence(q: FloatArray, space: FreeSpace) -> str:
     )
 
 
-def chains(layers: Layers, speed: float, scene: PlanningScene, most: int) -> list[Chain]:
+def chains(layers: Layers, speed: float, space: FreeSpace, most: int) -> list[Chain]:
     """The cheapest chains through all layers, at most `most`, each with another end (whole turns apart count
     once), at the tool's speed [m/s]. Raises PathRefusedError where none leads through.
     """
-    nodes = np.flatnonzero(layers.free)
+    nodes, scene = np.flatnonzero(layers.free), space.scene
     q, layer = layers.q[nodes], layers.layer[nodes]
     before, after = _neighbours(q, layer)
     joules = _edge_joules(q, layer, before, after, layers.s, speed, scene)
@@ -172,11 +172,7 @@ def chains(layers: Layers, speed: float, scene: PlanningScene, most: int) -> lis
     cost, parent = _cheapest(layer, before, after, joules, len(layers.s))
     last = np.flatnonzero((layer == len(layers.s) - 1) & np.isfinite(cost))
     if len(last) == 0:
-        reached = layer[np.isfinite(cost)].max()
-        raise PathRefusedError(
-            f"no configuration leads past {layers.s[reached]:.3f} m without a jump of an axis: "
-            "a singularity, a collision, or an axis limit that asks for another configuration"
-        )
+        raise _no_further(layers, q[np.isfinite(cost)], layer[np.isfinite(cost)], space)
     found: list[Chain] = []
     for node in _different(last, cost, q, scene, (apart, most)):
         trace = [int(node)]
@@ -185,6 +181,23 @@ def chains(layers: Layers, speed: float, scene: PlanningScene, most: int) -> lis
         order = nodes[trace[::-1]]
         found.append(Chain(layers.s, layers.q[order], layers.angle[order], float(cost[node])))
     return found
+
+
+def _no_further(layers: Layers, q: FloatArray, layer: IntArray, space: FreeSpace) -> PathRefusedError:
+    """Why no chain goes on: q (M, n) in layer (M,) were reached."""
+    last = int(layer.max())
+    ahead = layers.q[layers.layer == last + 1]
+    joined = np.abs(ahead[:, None] - q[layer == last][None]).max(axis=2).min(axis=1) <= JUMP
+    if joined.any():
+        return PathRefusedError(
+            f"every configuration that leads up to {layers.s[last]:.3f} m collides at "
+            f"{layers.s[last + 1]:.3f} m: {nearest_sentence(ahead[joined], space)}",
+            StatusCode.INVALID_MOTION_PLAN,
+        )
+    return PathRefusedError(
+        f"no configuration leads past {layers.s[last]:.3f} m without a jump of an axis: a singularity, or an "
+        "axis limit that asks for another configuration"
+    )
 
 
 def _neighbours(q: FloatArray, layer: IntArray) -> tuple[IntArray, IntArray]:

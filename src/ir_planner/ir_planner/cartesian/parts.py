@@ -75,7 +75,10 @@ def _segment(segment: CartesianSegment, here: FloatArray, name: str, path: Carte
     elif segment.kind == CIRCLE:
         arc = arc_through(*places)
         if arc is None:
-            raise _refused(f"{name}: start, the point between and the end lie on a line: that is no circle")
+            raise _refused(
+                f"{name}: start, the point between and the end lie on a line, or two of them are one place: "
+                "that is no circle; a whole turn is two arcs"
+            )
         curve, poses = arc, [poses[0], poses[2]]
     else:
         curve = Through(places)

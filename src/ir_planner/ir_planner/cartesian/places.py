@@ -103,12 +103,13 @@ def arc_through(
     start: FloatArray, via: FloatArray, end: FloatArray, angle: float | None = None
 ) -> Arc | None:
     """The circle through three places (3,) [m], up to the end or to an angle [rad]; None where they lie on a
-    line.
+    line, or the end where the start is.
     """
     a, b = via - start, end - start
     normal = np.cross(a, b)
     size = float(normal @ normal)
-    if size < (STRAIGHT * float(np.linalg.norm(b))) ** 2 or float(a @ a) < STRAIGHT**2:
+    nearest = min(float(a @ a), float(b @ b))
+    if nearest < STRAIGHT**2 or size < (STRAIGHT * float(np.linalg.norm(b))) ** 2:
         return None
     centre = start + np.cross(float(a @ a) * b - float(b @ b) * a, normal) / (2.0 * size)
     radius = start - centre

@@ -20,7 +20,6 @@ from ir_planner.cartesian.tool_path import HeadingError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
 from ir_planner.request import Context, checked_options, chosen
-from ir_planner.timing import check_duration
 
 PLANNER_ID = "cartesian"
 TOOL_ERROR_MAX = 1e-4  # m
@@ -65,7 +64,6 @@ def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: C
             f"{kept.tool_error * 1e3:.3g} mm"
         )
     trajectory = found.movement.trajectory
-    check_duration(trajectory.duration, context.options)
     status, info = Status.success(), context.journal.info(trajectory.positions[0], context.joint_names)
     return CartesianPlan(
         status, info, found.movement.report, trajectory, *_values(kept), whole.ends[1:], len(layers.q)

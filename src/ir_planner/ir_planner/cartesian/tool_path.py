@@ -17,7 +17,8 @@ from ir_planner.cartesian.orientations import about_tool
 from ir_planner.cartesian.parts import Part
 from ir_planner.cartesian.places import ArcLength
 
-_PER_ZONE = 6  # breaks of a rounded corner, between which the speed of the parameter is smooth
+_PER_ZONE = 3  # breaks of a rounded corner, between which the speed of the parameter is smooth
+_SAME = 1e-9  # m
 _ALONG_AXIS = np.radians(3.0)  # a path nearer to the tool's axis than this gives no heading
 
 
@@ -32,6 +33,13 @@ def covering(u: FloatArray, radius: float) -> FloatArray:
     """The derivative of `covered` (M,)."""
     y = np.clip((u + radius) / (2.0 * radius), 0.0, 1.0)
     return np.asarray(y**4 * (35.0 + y * (-84.0 + y * (70.0 - 20.0 * y))))
+
+
+def _apart(u: FloatArray) -> FloatArray:
+    """Different values of u (M,) in order; none nearer to the one before than rounding brings it."""
+    values = np.unique(u)
+    kept = values[np.concatenate([[True], np.diff(values) > _SAME])]
+    return np.append(kept[:-1], values[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +67,7 @@ class ToolPath:
             for corner, radius in zip(self.corners, self.radius, strict=True)
             if radius > 0.0
         ]
-        return ArcLength(np.unique(np.concatenate([*breaks, *zones])), self._speed)
+        return ArcLength(_apart(np.concatenate([*breaks, *zones])), self._speed)
 
     @property
     def length(self) -> float:
@@ -76,8 +84,7 @@ class ToolPath:
         """Arc lengths (B,) between which places and orientations are smooth [m]."""
         inner = [part.places.breaks + begin for part, begin in zip(self.parts, self.corners, strict=False)]
         zones = [self.corners - self.radius, self.corners, self.corners + self.radius]
-        u = np.unique(np.clip(np.concatenate([*inner, *zones]), 0.0, self.corners[-1]))
-        u = u[np.concatenate([[True], np.diff(u) > 1e-9])]
+        u = _apart(np.clip(np.concatenate([*inner, *zones]), 0.0, self.corners[-1]))
         return u if self._arc is None else self._arc.of(u)
 
     @cached_property
@@ -157,8 +164,7 @@ class ToolPath:
         ends = self._clipped(np.array([-np.inf, np.inf]))
         inner = self.corners + np.linspace(-1.0, 1.0, 33)[:, None] * self.radius
         even = np.linspace(ends[0], ends[1], 40 * len(self.parts) + 200)
-        u = np.unique(np.clip(np.concatenate([even, inner.ravel()]), *ends))
-        u = u[np.concatenate([[True], np.diff(u) > 1e-9])]
+        u = _apart(np.clip(np.concatenate([even, inner.ravel()]), ends[0], ends[1]))
         tangents = self.tangents(np.minimum(u, ends[1] - 1e-9))
         given = np.tile(np.eye(4), (len(u), 1, 1))
         for k, chosen in self._owners(np.minimum(u, ends[1] - 1e-9)):
