@@ -17,6 +17,8 @@ from ir_msgs_py.status import StatusCode
 from ir_planner import CartesianPlan, Planner
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of paths
+from _second_opinion import SecondOpinion
+from _tool_path_cases import MARGIN, oracle, random_path
 from _tool_path_judge import seen
 
 DOWN = Rotation.from_euler("y", 90.0, degrees=True)
@@ -79,6 +81,39 @@ def test_the_tool_keeps_to_its_path_and_its_speed(planner: Planner, name: str) -
     assert plan.speed_deviation <= path.speed_tolerance
     assert np.all(np.diff([0.0, *plan.lengths]) > 0.0)
     assert len(plan.lengths) == len(path.segments)
+
+
+def judged(planner: Planner, seed: int) -> None:
+    """A random path is kept as the answer says, or refused where no oracle drives it."""
+    scene, rng = planner.scene(), np.random.default_rng(seed)
+    path = random_path(rng, scene)
+    plan = planned(planner, path)
+    if plan.trajectory is None:
+        assert " m" in plan.status.message, "the place"
+        assert not oracle(path, scene, rng), plan.status.message
+        return
+    found = seen(plan.trajectory, path, scene)
+    assert found.error <= plan.tool_error + 1e-6, "a place of the judge lies between two of its polyline"
+    assert found.speed <= path.speed_tolerance
+
+
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 40), marks=pytest.mark.long)], ids=str)
+def test_random_paths_are_kept_or_refused_with_their_place(planner: Planner, seeds: range) -> None:
+    for seed in seeds:
+        judged(planner, seed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cell", ["demo", "table_columns", "cnc_door", "deep_box"])
+def test_no_judge_objects_to_what_is_certified(cell: str) -> None:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", cell)
+    scene, judge = planner.scene(), SecondOpinion(planner.scene())
+    for seed in range(10):
+        plan = planned(planner, random_path(np.random.default_rng(seed), scene))
+        if plan.trajectory is not None:
+            assert judge.largest_share(plan.trajectory) <= 1.0 + 1e-6
+            assert judge.clearance_left(plan.trajectory, MARGIN, step=0.002)[0] >= -2e-6
 
 
 def test_the_same_path_gives_the_same_bytes(planner: Planner) -> None:
