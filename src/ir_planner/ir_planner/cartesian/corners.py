@@ -24,13 +24,15 @@ _SAMPLES = 33
 @dataclass(frozen=True)
 class Joint:
     """radius [m], 0: the tool stops; angle [rad] of the corner; leaves, turns: by what smoothing leaves the
-    parts [m, rad], 0 where the radius was asked for.
+    parts [m, rad], 0 where the corner is rounded as
+    asked for.
     """
 
     radius: float
     angle: float
     leaves: float = 0.0
     turns: float = 0.0
+    rounded: bool = False
 
 
 def joined(path: CartesianPath, parts: tuple[Part, ...]) -> tuple[ToolPath, tuple[Joint, ...]]:
@@ -52,7 +54,7 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
     if angle > _REVERSAL:
         return Joint(0.0, angle)
     if asked > 0.0 and angle > _TANGENT:
-        return Joint(min(asked, half), angle)
+        return Joint(min(asked, half), angle, rounded=True)
     radius = min(_LONGEST_JOINT, half)
     shortest = min(SHORTEST_JOINT, half) if angle < _TANGENT else SHORTEST_JOINT
     while radius >= shortest:
@@ -60,7 +62,7 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
         if leaves <= SMOOTHING and turns <= SMOOTHING_TURN:
             return Joint(radius, angle, leaves, turns)
         radius *= _SHRINK
-    return Joint(min(asked, half), angle)
+    return Joint(min(asked, half), angle, rounded=asked > 0.0)
 
 
 def _left_by(before: Part, after: Part, radius: float) -> tuple[float, float]:

@@ -85,7 +85,7 @@ def _at_most(path: CartesianPath, speed: float) -> CartesianPath:
 
 def _reduced(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ...]) -> float:
     """The smallest radius [m] of a corner that is rounded as asked for."""
-    rounded = [joint.radius for joint in joints if joint.radius > 0.0 and joint.leaves == 0.0]
+    rounded = [joint.radius for joint in joints if joint.rounded]
     return min(rounded, default=path.blending_radius)
 
 
