@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from ir_kernels.reference.spline_profile import ProfileCost
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import movement_energy
@@ -20,7 +21,6 @@ from ir_planner.errors import CancelledError, RequestError
 from ir_planner.optimize.fixed_path import FixedPath, never_back
 from ir_planner.optimize.passing import Passing
 from ir_planner.optimize.path_timing import PathTiming, along_its_path
-from ir_planner.optimize.profile_descent import _Descent
 from ir_planner.optimize.rescaling import KEPT
 from ir_planner.optimize.terms import spline_cost
 from ir_planner.regional.regional import MovementPlan
@@ -233,14 +233,15 @@ def test_the_derivatives_are_those_of_differences(scene: PlanningScene) -> None:
     context = Context.of(scene, replace(TIME, objective="energy"), budget())
     weights = objective_weights(context, path.q)
     cost = spline_cost(context, scene.limits, weights, 4.0 * weights.power)
-    descent = _Descent(path, s, rules.duration, fixed=False)
+    along = path.cubics.breaks, path.cubics.cubics
+    descent = ProfileCost(cost._core, along, s, rules.duration, fixed=False)
     rng = np.random.default_rng(2)
     x = rng.normal(0.0, 0.02, len(s) + 1)
-    value, gradient = descent.value(x, cost)
+    value, gradient = descent.value(x)
     assert value > 0.0
     for direction in rng.normal(0.0, 1.0, (4, len(x))):
         step = 1e-5 * direction
-        difference = (descent.value(x + step, cost)[0] - descent.value(x - step, cost)[0]) / 2e-5
+        difference = (descent.value(x + step)[0] - descent.value(x - step)[0]) / 2e-5
         assert gradient @ direction == pytest.approx(
             difference, rel=2e-3, abs=1e-3 * np.linalg.norm(gradient)
         )

@@ -18,12 +18,22 @@ struct Descent {
 };
 
 inline double inner(const std::vector<double>& a, const std::vector<double>& b) {
-  Double8 sums{};
+  Double8 part[4] = {};  // four, that don't wait for each other
   std::size_t k = 0;
-  for (; k + 8 <= a.size(); k += 8) sums += load<Double8>(&a[k]) * load<Double8>(&b[k]);
+  for (; k + 32 <= a.size(); k += 32)
+    for (int i = 0; i < 4; ++i) part[i] += load<Double8>(&a[k + 8 * i]) * load<Double8>(&b[k + 8 * i]);
+  for (; k + 8 <= a.size(); k += 8) part[0] += load<Double8>(&a[k]) * load<Double8>(&b[k]);
+  const Double8 sums = (part[0] + part[1]) + (part[2] + part[3]);
   double sum = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
   for (; k < a.size(); ++k) sum += a[k] * b[k];
   return sum;
+}
+
+// a += k b
+inline void add_scaled(std::vector<double>& a, double k, const std::vector<double>& b) {
+  std::size_t i = 0;
+  for (; i + 8 <= a.size(); i += 8) store(&a[i], load<Double8>(&a[i]) + k * load<Double8>(&b[i]));
+  for (; i < a.size(); ++i) a[i] += k * b[i];
 }
 
 // function(x, gradient) -> value; precondition(v): v <- M^-1 v for a positive definite M near the Hessian. Ends after
@@ -49,7 +59,7 @@ Descent descend(std::vector<double>& x, Function&& function, Precondition&& prec
     direction = g;
     for (std::size_t k = pairs.size(); k-- > 0;) {
       alpha[k] = inner(pairs[k].s, direction) * pairs[k].inverse;
-      for (std::size_t i = 0; i < size; ++i) direction[i] -= alpha[k] * pairs[k].y[i];
+      add_scaled(direction, -alpha[k], pairs[k].y);
     }
     precondition(direction);
     if (!pairs.empty()) {  // the scale of M from the last step
@@ -60,7 +70,7 @@ Descent descend(std::vector<double>& x, Function&& function, Precondition&& prec
     }
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       const double beta = inner(pairs[k].y, direction) * pairs[k].inverse;
-      for (std::size_t i = 0; i < size; ++i) direction[i] += (alpha[k] - beta) * pairs[k].s[i];
+      add_scaled(direction, alpha[k] - beta, pairs[k].s);
     }
     double slope = -inner(g, direction);
     if (!(slope < 0.0)) {  // only rounding can lead here: start again from the steepest direction

@@ -202,6 +202,21 @@ py::tuple polynomial_extrema(const Array& coefficients, const Array& durations) 
   return py::make_tuple(low, high, when_low, when_high);
 }
 
+py::tuple polynomial_samples(const Array& coefficients, const Array& durations, const Array& begins, const Array& times) {
+  if (coefficients.ndim() != 3 || durations.ndim() != 1 || durations.shape(0) != coefficients.shape(0) ||
+      begins.size() != durations.size() || durations.size() == 0)
+    throw std::invalid_argument("coefficients have to be (S, n, K), durations and begins (S,)");
+  const py::ssize_t M = times.size(), n = coefficients.shape(1);
+  Array q({M, n}), qd({M, n}), qdd({M, n});
+  double *to_q = q.mutable_data(), *to_qd = qd.mutable_data(), *to_qdd = qdd.mutable_data();
+  {
+    py::gil_scoped_release released;
+    core::polynomial_samples(coefficients.data(), durations.data(), begins.data(), durations.size(), static_cast<int>(n),
+                             static_cast<int>(coefficients.shape(2)), times.data(), M, to_q, to_qd, to_qdd);
+  }
+  return py::make_tuple(q, qd, qdd);
+}
+
 }  // namespace
 
 void bind_dynamics(py::module_& m) {
@@ -222,4 +237,5 @@ void bind_dynamics(py::module_& m) {
       .def("power_bounds", &Dynamics::power_bounds);
   m.def("dc_bus", &dc_bus);
   m.def("polynomial_extrema", &polynomial_extrema);
+  m.def("polynomial_samples", &polynomial_samples);
 }

@@ -42,13 +42,14 @@ inline void add_scaled(Vector<S>& to, const Vector<S>& v, const S& k) {
 
 // Adds to by_q, by_qd, by_qdd the derivatives of sum_i u_i tau_i, tau from newton_euler on the same numbers (with
 // gravity) traced in `link`; sn, cs of q + theta0.
-template <class S, class T>
+template <int kJoints = 0, class S, class T>
 // long: the recursion backwards, step by step
 inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, const S* qd, const LinkTrace<S>* link,
                                  const S* u, S* by_q, S* by_qd, S* by_qdd) {
-  const int n = m.n;
+  const int n = kJoints ? kJoints : m.n;  // a number known at compile time unrolls the loops
+  constexpr int kMost = kJoints ? kJoints : kMaxJoints;
   const S zero = u[0] * T(0);
-  Vector<S> of_force[kMaxJoints], of_moment[kMaxJoints];
+  Vector<S> of_force[kMost], of_moment[kMost];
   of_force[0] = {zero, zero, zero};
   of_moment[0] = {zero, zero, u[0]};
   for (int i = 1; i < n; ++i) {

@@ -47,7 +47,10 @@ void polynomial_extrema(const double* coefficients, const double* durations, lon
       for (int k = 0; k < terms - d; ++k) chain[d][k] = chain[d - 1][k + 1] * (k + 1);
     double points[kMaxDegree + 2] = {0.0, 1.0}, next[kMaxDegree + 2];
     int m = 2;
-    for (int d = terms - 2; d >= 1; --d) {  // roots of the d-th derivative, between those of the next one
+    double bent = 0.0;  // the slope changes by no more
+    for (int k = 2; k < terms; ++k) bent += k * std::abs(chain[0][k]);
+    const bool monotonic = terms > 1 && std::abs(chain[0][1]) > bent;
+    for (int d = monotonic ? 0 : terms - 2; d >= 1; --d) {  // roots of the d-th derivative, between those of the next one
       next[0] = 0.0;
       for (int k = 0; k + 1 < m; ++k) next[k + 1] = root(chain[d], chain[d + 1], terms - d, points[k], points[k + 1]);
       next[m] = 1.0;
@@ -67,6 +70,27 @@ void polynomial_extrema(const double* coefficients, const double* durations, lon
         maximum[s] = value;
         time_of_maximum[s] = points[k] * T;
       }
+    }
+  }
+}
+
+// long: three polynomials side by side
+void polynomial_samples(const double* coefficients, const double* durations, const double* begins, long S, int n, int terms,
+                        const double* times, long M, double* q, double* qd, double* qdd) {
+  for (long k = 0, s = 0; k < M; ++k) {
+    const double t = times[k];
+    if (t < begins[s] || (s + 1 < S && t >= begins[s + 1]))  // mostly the next one, or the same
+      s = std::max<long>(std::upper_bound(begins, begins + S, t) - begins - 1, 0);
+    const double u = std::min(std::max(t - begins[s], 0.0), durations[s]);
+    for (int j = 0; j < n; ++j) {
+      const double* c = coefficients + (s * n + j) * terms;
+      double place = 0.0, speed = 0.0, change = 0.0;
+      for (int i = terms - 1; i >= 0; --i) {
+        change = change * u + speed;
+        speed = speed * u + place;
+        place = place * u + c[i];
+      }
+      q[k * n + j] = place, qd[k * n + j] = speed, qdd[k * n + j] = 2.0 * change;
     }
   }
 }

@@ -8,6 +8,8 @@
 #include "bindings.hpp"
 #include "descent.hpp"
 #include "spline_cost.hpp"
+#include "spline_profile.hpp"
+#include "spline_starts.hpp"
 
 namespace py = pybind11;
 
@@ -71,8 +73,8 @@ class SplineCost {
   // control (K, n), of which three points at both ends stay; new control, interval, value, evaluations
   py::tuple descend(const Array& control, const Rows& row, double interval, bool fixed, int most, double tolerance) const {
     check(control, row);
-    const int K = static_cast<int>(control.shape(0)), m = K - 6;
-    if (m < 1) throw std::invalid_argument("control has to be (K, n) with K >= 7");
+    const int K = static_cast<int>(control.shape(0));
+    ir::expect(K >= 7, "control has to be (K, n) with K >= 7");
     Array result({control.shape(0), control.shape(1)});
     double* all = result.mutable_data();
     std::copy_n(control.data(), control.size(), all);
@@ -80,35 +82,141 @@ class SplineCost {
     {
       py::gil_scoped_release released;
       const Borrowed cost(*this);
-      const std::size_t size = static_cast<std::size_t>(m) * n_;
-      double* inner = all + 3 * static_cast<std::size_t>(n_);
-      std::vector<double> x(inner, inner + size), slopes(control.size());
-      x.push_back(0.0);  // logarithm of the interval, relative
-      const ir::BendingMetric metric(m, terms_.velocity, holding);
-      const double first = interval;
-      const auto function = [&](const std::vector<double>& at, std::vector<double>& gradient) {
-        std::copy_n(at.begin(), size, inner);
-        const double now = first * std::exp(at[size]);
-        double of_interval;
-        const double value = (*cost)(all, K, row.data(), now, slopes.data(), of_interval);
-        std::copy_n(slopes.begin() + 3 * n_, size, gradient.begin());
-        gradient[size] = fixed ? 0.0 : of_interval * now;
-        return value;
-      };
-      const auto precondition = [&](std::vector<double>& v) {
-        metric.solve(v.data());
-        v[size] *= interval_weight;
-      };
-      done = ir::descend(x, function, precondition, most, tolerance);
-      std::copy_n(x.begin(), size, inner);
-      interval = first * std::exp(x[size]);
+      done = descended(*cost, all, K, row.data(), interval, fixed, most, tolerance);
     }
     return py::make_tuple(result, interval, done.value, done.evaluations);
+  }
+
+  // The same from starts along paths, points (P, n) one path after the other, counts (L,) of them, under the first row of
+  // thresholds; the control points stay within the joints' ranges. A list of what descend returns.
+  py::list descend_along(const Array& points, const ir::Indices& counts, double spacing, double slower, double duration,
+                         int fewest, int most, int evaluations, double tolerance) const {
+    ir::expect(points.ndim() == 2 && points.shape(1) == n_, "points have to be (P, n)");
+    struct Result {
+      ir::SplineStart spline;
+      ir::Descent done;
+    };
+    std::vector<Result> results;
+    {
+      py::gil_scoped_release released;
+      const Borrowed cost(*this);
+      const double* path = points.data();
+      for (py::ssize_t l = 0; l < counts.size(); path += counts.data()[l] * n_, ++l) {
+        ir::SplineStart start = ir::spline_along(path, counts.data()[l], n_, terms_.velocity, terms_.acceleration,
+                                                 {spacing, slower, duration, fewest, most});
+        const int K = static_cast<int>(start.control.size()) / n_;
+        const std::vector<std::int32_t> row(K - 3, 0);
+        cost->forget();
+        const ir::Descent done = descended(*cost, start.control.data(), K, row.data(), start.interval, duration > 0.0,
+                                           evaluations, tolerance);
+        for (std::size_t k = 0; k < start.control.size(); ++k)
+          start.control[k] = std::min(std::max(start.control[k], terms_.low[k % n_]), terms_.high[k % n_]);
+        results.push_back({std::move(start), done});
+      }
+    }
+    py::list found;
+    for (const Result& r : results) {
+      const Array control({static_cast<py::ssize_t>(r.spline.control.size()) / n_, static_cast<py::ssize_t>(n_)},
+                          r.spline.control.data());
+      found.append(py::make_tuple(control, r.spline.interval, r.done.value, r.done.evaluations));
+    }
+    return found;
+  }
+
+  // Of splines that pass p(s) at their inner knots, p by breaks (B + 1,) and cubics (4, B, n): from s (C,) and a duration;
+  // new s, duration, value, evaluations.
+  py::tuple descend_profile(const Array& breaks, const Array& cubics, const Array& s, double duration, bool fixed, int most,
+                            double tolerance) const {
+    ir::expect(cubics.ndim() == 3 && cubics.shape(0) == 4 && cubics.shape(1) + 1 == breaks.size() && cubics.shape(2) == n_,
+               "cubics have to be (4, B, n) and breaks (B + 1,)");
+    const int C = static_cast<int>(s.size());
+    ir::expect(C >= 4, "s has to be (C,) with C >= 4");
+    Array result(s.size());
+    ir::Descent done;
+    {
+      py::gil_scoped_release released;
+      const Borrowed cost(*this);
+      const ir::CubicPath path{breaks.data(), cubics.data(), static_cast<long>(cubics.shape(1)), n_};
+      done = profiled(*cost, path, s.data(), C, duration, fixed, most, tolerance, result.mutable_data());
+    }
+    return py::make_tuple(result, duration, done.value, done.evaluations);
   }
 
  private:
   static constexpr double interval_weight = 4.0;  // of the logarithm of the interval, against (rad/s)^2
   static constexpr double holding = 0.02;         // against bending
+  static constexpr double profile_bending = 0.03; // weight of the jerk of s in its metric
+  static constexpr double profile_scale = 0.03, profile_time = 0.1;  // of s, and of the duration's logarithm
+
+  ir::Descent descended(ir::SplineCost& cost, double* all, int K, const std::int32_t* row, double& interval, bool fixed,
+                        int most, double tolerance) const {
+    const int m = K - 6;
+    const std::size_t size = static_cast<std::size_t>(m) * n_;
+    double* inner = all + 3 * static_cast<std::size_t>(n_);
+    std::vector<double> x(inner, inner + size), slopes(static_cast<std::size_t>(K) * n_);
+    x.push_back(0.0);  // logarithm of the interval, relative
+    const ir::BendingMetric metric(m, terms_.velocity, holding);
+    const double first = interval;
+    const auto function = [&](const std::vector<double>& at, std::vector<double>& gradient) {
+      std::copy_n(at.begin(), size, inner);
+      const double now = first * std::exp(at[size]);
+      double of_interval;
+      const double value = cost(all, K, row, now, slopes.data(), of_interval);
+      std::copy_n(slopes.begin() + 3 * n_, size, gradient.begin());
+      gradient[size] = fixed ? 0.0 : of_interval * now;
+      return value;
+    };
+    const auto precondition = [&](std::vector<double>& v) {
+      metric.solve(v.data());
+      v[size] *= interval_weight;
+    };
+    const ir::Descent done = ir::descend(x, function, precondition, most, tolerance);
+    std::copy_n(x.begin(), size, inner);
+    interval = first * std::exp(x[size]);
+    return done;
+  }
+
+  // x: the change of s and of the duration's logarithm, each in its scale
+  // long: the function and its derivative side by side
+  ir::Descent profiled(ir::SplineCost& cost, const ir::CubicPath& path, const double* s, int C, double& duration, bool fixed,
+                       int most, double tolerance, double* result) const {
+    const ir::Banded knots = ir::knots_of(C), metric = ir::jerk_metric(C, profile_bending * std::pow(C + 3, 3));
+    const int K = C + 6;
+    const std::vector<std::int32_t> row(K - 3, 0);
+    std::vector<double> all(static_cast<std::size_t>(K) * n_), slopes(all.size()), along(static_cast<std::size_t>(C) * n_),
+        x(C + 1, 0.0), unused(n_);
+    double* inner = &all[3 * static_cast<std::size_t>(n_)];
+    for (int k = 0; k < 3; ++k) {
+      path.at(0.0, &all[static_cast<std::size_t>(k) * n_], unused.data());
+      path.at(1.0, &all[static_cast<std::size_t>(K - 1 - k) * n_], unused.data());
+    }
+    const auto place = [&](const std::vector<double>& at, int i) {
+      return std::min(std::max(s[i] + profile_scale * at[i], 0.0), 1.0);
+    };
+    const auto lasts = [&](const std::vector<double>& at) { return duration * std::exp(profile_time * at[C]); };
+    const auto function = [&](const std::vector<double>& at, std::vector<double>& gradient) {
+      for (int i = 0; i < C; ++i) path.at(place(at, i), inner + i * n_, &along[static_cast<std::size_t>(i) * n_]);
+      for (int k = 0; k < C * n_; ++k) inner[k] *= 6.0;
+      for (int j = 0; j < n_; ++j) inner[j] -= all[j], inner[(C - 1) * n_ + j] -= all[(K - 1) * n_ + j];
+      knots.solve(inner, n_);
+      double of_interval;
+      const double now = lasts(at) / (C + 3), value = cost(all.data(), K, row.data(), now, slopes.data(), of_interval);
+      double* owed = &slopes[3 * static_cast<std::size_t>(n_)];
+      knots.solve(owed, n_);
+      for (int i = 0; i < C; ++i) {
+        double sum = 0.0;
+        for (int j = 0; j < n_; ++j) sum += owed[i * n_ + j] * along[static_cast<std::size_t>(i) * n_ + j];
+        gradient[i] = 6.0 * profile_scale * sum;
+      }
+      gradient[C] = fixed ? 0.0 : profile_time * of_interval * now;
+      return value;
+    };
+    const auto precondition = [&](std::vector<double>& v) { metric.solve(v.data(), 1); };
+    const ir::Descent done = ir::descend(x, function, precondition, most, tolerance);
+    for (int i = 0; i < C; ++i) result[i] = place(x, i);
+    duration = lasts(x);
+    return done;
+  }
 
   // A workspace that nobody else uses meanwhile; it is kept for the next call.
   class Borrowed {
@@ -166,5 +274,7 @@ void bind_spline(py::module_& m) {
       .def(py::init<const ir::Model&, const dynamics::Core&, const py::object&>(), py::keep_alive<1, 2>(),
            py::keep_alive<1, 3>())
       .def("value", &SplineCost::value)
-      .def("descend", &SplineCost::descend);
+      .def("descend", &SplineCost::descend)
+      .def("descend_along", &SplineCost::descend_along)
+      .def("descend_profile", &SplineCost::descend_profile);
 }

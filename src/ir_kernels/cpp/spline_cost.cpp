@@ -21,13 +21,36 @@ Basis basis(double u) {
            {-v * v / 2, (3 * u * u - 4 * u) / 2, (-3 * u * u + 2 * u + 1) / 2, u * u / 2},
            {v, 3 * u - 2, 1 - 3 * u, u}}};
 }
-const Basis* bases() {
-  static const std::vector<Basis> all = [] {
-    std::vector<Basis> b;
-    for (int p = 0; p < P; ++p) b.push_back(basis(static_cast<double>(p) / P));
+
+// The same for the eight samples of four intervals.
+struct LaneBasis {
+  Double8 of[3][4];
+};
+const LaneBasis& lane_basis() {
+  static const LaneBasis all = [] {
+    LaneBasis b;
+    for (int l = 0; l < 8; ++l) {
+      const Basis at = basis(static_cast<double>(l % P) / P);
+      for (int d = 0; d < 3; ++d)
+        for (int a = 0; a < 4; ++a) b.of[d][a][l] = at.of[d][a];
+    }
     return b;
   }();
-  return all.data();
+  return all;
+}
+static_assert(P == 2, "a group of lanes is four intervals with two samples each");
+
+// Of eight control points those that count as number `a` in each sample of the first four intervals.
+template <int a> IR_INLINE Double8 spread(Double8 v) {
+  return Double8{v[a], v[a], v[a + 1], v[a + 1], v[a + 2], v[a + 2], v[a + 3], v[a + 3]};
+}
+// And back: what the samples owe to their control point number `a`, summed by control point.
+template <int a> IR_INLINE Double8 gathered(Double8 v) {
+  v += Double8{v[1], v[0], v[3], v[2], v[5], v[4], v[7], v[6]};
+  if constexpr (a == 0) return Double8{v[0], v[2], v[4], v[6], 0, 0, 0, 0};
+  else if constexpr (a == 1) return Double8{0, v[0], v[2], v[4], v[6], 0, 0, 0};
+  else if constexpr (a == 2) return Double8{0, 0, v[0], v[2], v[4], v[6], 0, 0};
+  else return Double8{0, 0, 0, v[0], v[2], v[4], v[6], 0};
 }
 
 // Of each pair the largest threshold of all rows, with the margin.
@@ -102,57 +125,63 @@ double SplineCost::operator()(const double* control, int K, const std::int32_t* 
   value += clearance(row, step);
   of_interval = -slower() / interval + of_step_ / P + terms_.time_value * intervals;
   value += terms_.time_value * intervals * interval;
+  value += knots(intervals, interval, gradient, of_interval);
   scatter(interval, gradient);
-  return value + knots(control, intervals, interval, gradient, of_interval);
+  return value;
 }
 
-// Joint values, speeds and accelerations of all samples; lanes without a sample repeat the last one.
+// Joint values, speeds and accelerations of all samples; lanes without a sample rest at the last control point.
 void SplineCost::sample(const double* control, double interval) {
+  const std::size_t last = count_ / P + 2;  // of the control points
   groups_.resize((count_ + 7) / 8);
   q_.resize(static_cast<std::size_t>(count_) * n_);
-  const Basis* at = bases();
+  column_ = 4 * groups_.size() + 16;  // eight lanes and three points may be read from any
+  columns_.resize(column_ * n_);
+  for (int j = 0; j < n_; ++j)
+    for (std::size_t i = 0; i < column_; ++i) columns_[j * column_ + i] = control[std::min(i, last) * n_ + j];
+  const LaneBasis& b = lane_basis();
   const double per = 1.0 / interval;
   for (std::size_t k = 0; k < groups_.size(); ++k) {
     Group& g = groups_[k];
-    for (int l = 0; l < 8; ++l) {
-      const int wanted = static_cast<int>(8 * k) + l, i = std::min(wanted, count_ - 1);
-      const Basis& b = at[i % P];
-      const double* c = control + static_cast<std::size_t>(i / P) * n_;
-      g.counts[l] = wanted < count_;
-      for (int j = 0; j < n_; ++j) {
-        double v[3];
-        for (int d = 0; d < 3; ++d)
-          v[d] = b.of[d][0] * c[j] + b.of[d][1] * c[n_ + j] + b.of[d][2] * c[2 * n_ + j] + b.of[d][3] * c[3 * n_ + j];
-        g.q[j][l] = v[0], g.qd[j][l] = v[1], g.qdd[j][l] = v[2];
-        q_[static_cast<std::size_t>(i) * n_ + j] = v[0];
-      }
-    }
+    const int used = std::min(8, count_ - static_cast<int>(8 * k));
+    for (int l = 0; l < 8; ++l) g.counts[l] = l < used;
     for (int j = 0; j < n_; ++j) {
-      g.qd[j] *= per;
-      g.qdd[j] *= per * per;
+      const Double8 c = load<Double8>(&columns_[j * column_ + 4 * k]);
+      const Double8 c0 = spread<0>(c), c1 = spread<1>(c), c2 = spread<2>(c), c3 = spread<3>(c);
+      const auto along = [&](const Double8* w) { return w[0] * c0 + w[1] * c1 + w[2] * c2 + w[3] * c3; };
+      g.q[j] = along(b.of[0]);
+      g.qd[j] = along(b.of[1]) * per;
+      g.qdd[j] = along(b.of[2]) * (per * per);
       g.of_q[j] = g.of_qdd[j] = Lane{};
+      double* to = &q_[8 * k * n_ + j];
+      for (int l = 0; l < used; ++l) to[l * n_] = g.q[j][l];
     }
   }
 }
 
 // From samples to control points.
-void SplineCost::scatter(double interval, double* gradient) const {
-  const Basis* at = bases();
+void SplineCost::scatter(double interval, double* gradient) {
+  const LaneBasis& b = lane_basis();
   const double per = 1.0 / interval;
-  for (int k = 0; k < count_; ++k) {
-    const Group& g = groups_[k / 8];
-    const Basis& b = at[k % P];
-    double* to = gradient + static_cast<std::size_t>(k / P) * n_;
+  const std::size_t points = count_ / P + 3;
+  std::fill(columns_.begin(), columns_.end(), 0.0);
+  for (std::size_t k = 0; k < groups_.size(); ++k) {
+    const Group& g = groups_[k];
     for (int j = 0; j < n_; ++j) {
-      const double q = g.of_q[j][k % 8], qd = g.of_qd[j][k % 8] * per, qdd = g.of_qdd[j][k % 8] * per * per;
-      for (int a = 0; a < 4; ++a) to[a * n_ + j] += b.of[0][a] * q + b.of[1][a] * qd + b.of[2][a] * qdd;
+      const Lane q = g.of_q[j], qd = g.of_qd[j] * per, qdd = g.of_qdd[j] * (per * per);
+      const auto owed = [&](int a) { return b.of[0][a] * q + b.of[1][a] * qd + b.of[2][a] * qdd; };
+      double* to = &columns_[j * column_ + 4 * k];
+      store(to, load<Lane>(to) + (gathered<0>(owed(0)) + gathered<1>(owed(1))) +
+                    (gathered<2>(owed(2)) + gathered<3>(owed(3))));
     }
   }
+  for (std::size_t i = 0; i < points; ++i)
+    for (int j = 0; j < n_; ++j) gradient[i * n_ + j] += columns_[j * column_ + i];
 }
 
 // Accelerations at the knots (linear between), jerk of each interval (constant), positions by the control points.
 // long: value and derivative side by side
-double SplineCost::knots(const double* control, int intervals, double interval, double* gradient,
+double SplineCost::knots(int intervals, double interval, double* gradient,
                          double& of_interval) const {
   const double second = 1.0 / (interval * interval), third = second / interval, weight = terms_.penalty * interval;
   double cost = 0.0;
@@ -164,35 +193,35 @@ double SplineCost::knots(const double* control, int intervals, double interval, 
     of_interval += terms_.penalty * over * over - order * slope * derivative / interval;
     return slope;
   };
-  for (int i = 0; i < intervals; ++i) {
-    const double* c = control + static_cast<std::size_t>(i) * n_;
-    double* g = gradient + static_cast<std::size_t>(i) * n_;
-    for (int j = 0; j < n_; ++j) {
-      const double jerk = (c[3 * n_ + j] - 3 * c[2 * n_ + j] + 3 * c[n_ + j] - c[j]) * third;
-      if (!(std::fabs(jerk) > terms_.jerk[j])) continue;
-      const double slope = beyond(jerk, terms_.jerk[j], 3) * third;
-      g[3 * n_ + j] += slope, g[2 * n_ + j] -= 3 * slope, g[n_ + j] += 3 * slope, g[j] -= slope;
-    }
-  }
-  for (int i = 0; i <= intervals; ++i) {
-    const double* c = control + static_cast<std::size_t>(i) * n_;
-    double* g = gradient + static_cast<std::size_t>(i) * n_;
-    for (int j = 0; j < n_; ++j) {
-      const double acceleration = (c[2 * n_ + j] - 2 * c[n_ + j] + c[j]) * second;
-      if (!(std::fabs(acceleration) > terms_.acceleration[j])) continue;
-      const double slope = beyond(acceleration, terms_.acceleration[j], 2) * second;
-      g[2 * n_ + j] += slope, g[n_ + j] -= 2 * slope, g[j] += slope;
-    }
-  }
-  for (int i = 0; i < intervals + 3; ++i)
-    for (int j = 0; j < n_; ++j) {
-      const std::size_t at = static_cast<std::size_t>(i) * n_ + j;
-      const double over = std::max(terms_.low[j] - control[at], control[at] - terms_.high[j]) * about;
-      if (!(over > 0.0)) continue;
+  // in eight places at a time: which of `most` exceed the limit in size
+  const auto each = [&](int most, const auto& size, double limit, const auto& punish) {
+    for (int first = 0; first < most; first += 8)
+      for (std::uint32_t left = bits(size(first) > limit); left != 0; left &= left - 1)
+        if (first + __builtin_ctz(left) < most) punish(first + __builtin_ctz(left));
+  };
+  for (int j = 0; j < n_; ++j) {
+    const double* c = &columns_[j * column_];
+    double* g = gradient + j;
+    const auto point = [c](int i) { return load<Lane>(c + i); };
+    const auto jerk = [&](const auto& at, int i) { return ((at(i + 3) - at(i)) + 3.0 * (at(i + 1) - at(i + 2))) * third; };
+    const auto acceleration = [&](const auto& at, int i) { return ((at(i + 2) - at(i + 1)) - (at(i + 1) - at(i))) * second; };
+    const auto one = [c](int i) { return c[i]; };
+    each(intervals, [&](int i) { return abs(jerk(point, i)); }, terms_.jerk[j], [&](int i) {
+      const double slope = beyond(jerk(one, i), terms_.jerk[j], 3) * third;
+      g[(i + 3) * n_] += slope, g[(i + 2) * n_] -= 3 * slope, g[(i + 1) * n_] += 3 * slope, g[i * n_] -= slope;
+    });
+    each(intervals + 1, [&](int i) { return abs(acceleration(point, i)); }, terms_.acceleration[j], [&](int i) {
+      const double slope = beyond(acceleration(one, i), terms_.acceleration[j], 2) * second;
+      g[(i + 2) * n_] += slope, g[(i + 1) * n_] -= 2 * slope, g[i * n_] += slope;
+    });
+    const double low = terms_.low[j], high = terms_.high[j];
+    each(intervals + 3, [&](int i) { return max(low - point(i), point(i) - high); }, 0.0, [&](int i) {
+      const double over = std::max(low - c[i], c[i] - high) * about;
       cost += weight * over * over;
       of_interval += terms_.penalty * over * over;
-      gradient[at] += std::copysign(2.0 * weight * over * about, control[at] - terms_.high[j]);
-    }
+      g[i * n_] += std::copysign(2.0 * weight * over * about, c[i] - high);
+    });
+  }
   return cost;
 }
 

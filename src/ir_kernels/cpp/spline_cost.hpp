@@ -50,13 +50,15 @@ class SplineCost {
   void smooth_envelope();
   void sample(const double* control, double interval);
   double drives(double step);
+  template <int kJoints> double drives_of(double step);
   double bus(double step);
   void exact_bus(double step);
   double smooth_bus(double step);
   double clearance(const std::int32_t* row, double step);
   double slower();
-  double knots(const double* control, int intervals, double interval, double* gradient, double& of_interval) const;
-  void scatter(double interval, double* gradient) const;
+  template <int kJoints> double slower_of();
+  double knots(int intervals, double interval, double* gradient, double& of_interval) const;
+  void scatter(double interval, double* gradient);
 
   const Model& model_;
   const dynamics::Core& core_;
@@ -66,7 +68,9 @@ class SplineCost {
   std::vector<double> standing_;   // (n) torque limit at rest
   std::vector<double> bend_at_, bend_;  // (n, bends): speeds at which the smoothed limit changes its slope, by how much
   std::vector<Group> groups_;
-  std::vector<double> power_, of_power_, left_, q_;  // (N), (N), (N), (N, n)
+  std::size_t column_ = 0;          // control points of a joint side by side, the last one repeated
+  std::vector<double> columns_;     // (n, column): of the control points, or what the cost owes to them
+  std::vector<double> power_, of_power_, left_, q_;  // (lanes) three times, (N, n)
   // clearance
   std::vector<double> widest_;  // (pairs) the largest threshold of all rows, with the margin
   Shifts<float> shift_float_;

@@ -17,26 +17,34 @@ double sum(const Double8& v) {
 }
 
 // max(x, 0), a hyperbola that is `smoothing` above it at 0; its derivatives.
-struct Above {
-  double value, slope, of_smoothing;
+IR_INLINE double root_of(double x) { return std::sqrt(x); }
+IR_INLINE Double8 root_of(Double8 x) { return sqrt(x); }
+template <class V> struct Above {
+  V value, slope, of_smoothing;
 };
-inline Above above(double x, double smoothing) {
-  if (!(smoothing > 0.0)) return {std::max(x, 0.0), x > 0.0 ? 1.0 : 0.0, 0.0};
-  const double root = std::sqrt(x * x + 4.0 * smoothing * smoothing);
+template <class V> IR_INLINE Above<V> rounded(V x, double smoothing) {
+  const V root = root_of(x * x + 4.0 * smoothing * smoothing);
   return {0.5 * (x + root), 0.5 + 0.5 * x / root, 2.0 * smoothing / root};
+}
+IR_INLINE Above<Double8> above(Double8 x, double smoothing) {
+  if (smoothing > 0.0) return rounded(x, smoothing);
+  return {max(x, Double8{}), x > 0.0 ? splat<Double8>(1.0) : Double8{}, Double8{}};
 }
 
 }  // namespace
 
 // Torques, their penalties and those of speed; the powers.
-double SplineCost::drives(double step) {  // long: value and derivative side by side
+double SplineCost::drives(double step) { return n_ == 6 ? drives_of<6>(step) : drives_of<0>(step); }
+
+template <int kJoints>
+double SplineCost::drives_of(double step) {  // long: value and derivative side by side
   const auto& arm = core_.model;
   Lane cost{}, of_step{};
   for (Group& g : groups_) {
     Lane theta[dynamics::kMaxJoints];
     for (int j = 0; j < n_; ++j) theta[j] = g.q[j] + arm.joint[j].theta0;
     sincos(n_, theta, g.s, g.c);
-    dynamics::newton_euler(arm, g.s, g.c, g.qd, g.qdd, g.tau, true, dynamics::Trace<Lane>{g.link});
+    dynamics::newton_euler<kJoints>(arm, g.s, g.c, g.qd, g.qdd, g.tau, true, dynamics::Trace<Lane>{g.link});
     if (arm.balance.joint >= 0) {
       const int b = arm.balance.joint;
       g.tau[b] -= dynamics::balance_torque(arm.balance, g.s[b], g.c[b]);
@@ -82,13 +90,14 @@ double SplineCost::drives(double step) {  // long: value and derivative side by 
 // Energy at the mains over the common bus, sample after sample; and the derivative by each sample's power.
 double SplineCost::bus(double step) {
   const bool alone = terms_.regeneration == dynamics::Regeneration::kNone;
-  power_.assign(count_, 0.0);
-  of_power_.assign(count_, 1.0);
-  for (int k = 0; k < count_; ++k)
-    for (int j = 0; j < n_; ++j) {
-      const double p = groups_[k / 8].power[j][k % 8];
-      power_[k] += alone ? above(p, terms_.smoothing).value : p;
-    }
+  power_.resize(8 * groups_.size());
+  of_power_.assign(power_.size(), 1.0);
+  for (std::size_t k = 0; k < groups_.size(); ++k) {
+    const Group& g = groups_[k];
+    Lane sum{};
+    for (int j = 0; j < n_; ++j) sum += alone ? above(g.power[j], terms_.smoothing).value : g.power[j];
+    store(&power_[8 * k], sum);
+  }
   const double worth = terms_.energy_value;
   double of_step = 0.0;
   energy = 0.0;
@@ -136,37 +145,43 @@ double SplineCost::smooth_bus(double step) {
   const double most = terms_.smoothing * step;  // [J]
   const double back = terms_.regeneration == dynamics::Regeneration::kFedBack ? 1.0 : 0.0;
   double stored = 0.0;
-  left_.resize(count_);
+  left_.assign(power_.size(), 0.0);
   for (int k = 0; k < count_; ++k) {
     left_[k] = stored - power_[k] * step;  // in the capacitor, if it had no ends
-    const double mains = above(-left_[k], most).value, surplus = above(left_[k] - terms_.capacity, most).value;
+    const double mains = rounded(-left_[k], most).value, surplus = rounded(left_[k] - terms_.capacity, most).value;
     energy += mains - back * surplus;
     stored = left_[k] + mains - surplus;
   }
   double of_stored = 0.0, of_most = 0.0;
-  for (int k = count_ - 1; k >= 0; --k) {
-    const Above mains = above(-left_[k], most), surplus = above(left_[k] - terms_.capacity, most);
-    of_most += mains.of_smoothing * (1.0 + of_stored) - surplus.of_smoothing * (back + of_stored);
-    of_stored = of_stored * (1.0 - mains.slope - surplus.slope) - mains.slope - back * surplus.slope;
-    of_power_[k] = -of_stored;
+  for (std::size_t group = groups_.size(); group-- > 0;) {
+    const Lane left = load<Lane>(&left_[8 * group]);
+    const Above<Lane> mains = rounded(-left, most), surplus = rounded(left - terms_.capacity, most);
+    const Lane kept = 1.0 - mains.slope - surplus.slope, given = mains.slope + back * surplus.slope;
+    const Lane fixed = mains.of_smoothing - back * surplus.of_smoothing, moving = mains.of_smoothing - surplus.of_smoothing;
+    const int used = std::min(8, count_ - static_cast<int>(8 * group));
+    for (int l = used; l-- > 0;) {
+      of_most += fixed[l] + moving[l] * of_stored;
+      of_stored = of_stored * kept[l] - given[l];
+      of_power_[8 * group + l] = -of_stored;
+    }
   }
   return of_most * terms_.smoothing;
 }
 
 // From powers and torques back to positions, speeds and accelerations. Returns what the cost gains from a motion that is
 // slower, per relative change of the time between knots.
-double SplineCost::slower() {
+double SplineCost::slower() { return n_ == 6 ? slower_of<6>() : slower_of<0>(); }
+
+template <int kJoints> double SplineCost::slower_of() {
   const auto& arm = core_.model;
   double gain = 0.0;
   for (std::size_t k = 0; k < groups_.size(); ++k) {
     Group& g = groups_[k];
-    Lane of_power{};
-    for (int l = 0; l < 8; ++l) of_power[l] = 8 * k + l < static_cast<std::size_t>(count_) ? of_power_[8 * k + l] : 0.0;
+    const Lane of_power = load<Lane>(&of_power_[8 * k]) * g.counts;
     for (int j = 0; j < n_; ++j) {
       const auto& d = arm.drive[j];
-      Lane w = of_power;
-      if (terms_.regeneration == dynamics::Regeneration::kNone)
-        for (int l = 0; l < 8; ++l) w[l] *= above(g.power[j][l], terms_.smoothing).slope;
+      const bool alone = terms_.regeneration == dynamics::Regeneration::kNone;
+      const Lane w = alone ? of_power * above(g.power[j], terms_.smoothing).slope : of_power;
       g.of_tau[j] += w * (g.qd[j] + 2.0 * d.copper_at_joint * g.tau[j]);
       g.of_qd[j] += w * g.tau[j];
       const Lane root = g.qd[j] * g.qd[j] + still * still;
@@ -179,7 +194,7 @@ double SplineCost::slower() {
       const Dual s{g.s[b], g.c[b]}, c{g.c[b], -g.s[b]};
       g.of_q[b] -= g.of_tau[b] * dynamics::balance_torque(arm.balance, s, c).d;
     }
-    dynamics::newton_euler_adjoint(arm, g.s, g.c, g.qd, g.link, g.of_tau, g.of_q, g.of_qd, g.of_qdd);
+    dynamics::newton_euler_adjoint<kJoints>(arm, g.s, g.c, g.qd, g.link, g.of_tau, g.of_q, g.of_qd, g.of_qdd);
     Lane lane_gain{};
     for (int j = 0; j < n_; ++j) lane_gain += g.of_qd[j] * g.qd[j] + 2.0 * g.of_qdd[j] * g.qdd[j];
     gain += sum(lane_gain);

@@ -20,11 +20,19 @@ from ir_kernels.geometry import ENVIRONMENT, SELF, Pair
 from ir_kernels.ik_set import IkSet, InverseKinematics
 from ir_kernels.inverse_kinematics import inverse_kinematics
 from ir_kernels.limits import Extrema, MotionExtrema, motion_extrema, polynomial_extrema
+from ir_kernels.motion import polynomial_samples
 from ir_kernels.power import DcBus, DcBusParameters, DriveEnergy, dc_bus, drive_energy
 from ir_kernels.search import BidirectionalTree
 from ir_kernels.searched_ik import SearchedIk
 from ir_kernels.spherical_wrist import SphericalWristIk
-from ir_kernels.spline import SplineCost, SplineDescent, SplineValue
+from ir_kernels.spline import (
+    CubicPath,
+    ProfileDescent,
+    SplineCost,
+    SplineDescent,
+    SplineStarts,
+    SplineValue,
+)
 from ir_kernels.spline_terms import SplineTerms
 from ir_kernels.three_parallel import ThreeParallelIk
 from ir_kernels.torque_bounds import EXCEEDS, WITHIN, TorqueBounds
@@ -44,6 +52,7 @@ __all__ = [
     "Certificates",
     "Chain",
     "CollisionModel",
+    "CubicPath",
     "DcBus",
     "DcBusParameters",
     "DriveEnergy",
@@ -57,10 +66,12 @@ __all__ = [
     "MinDistance",
     "MotionExtrema",
     "Pair",
+    "ProfileDescent",
     "SearchedIk",
     "SphericalWristIk",
     "SplineCost",
     "SplineDescent",
+    "SplineStarts",
     "SplineTerms",
     "SplineValue",
     "ThreeParallelIk",
@@ -72,4 +83,5 @@ __all__ = [
     "inverse_kinematics",
     "motion_extrema",
     "polynomial_extrema",
+    "polynomial_samples",
 ]

@@ -14,6 +14,7 @@ the switch of the bus. Samples lie on the knots, where torque peaks, and midway 
 proof: see CollisionModel.certify_trajectory and DynamicsModel.torque_bounds.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ from ir_kernels import arguments, compiled, data
 from ir_kernels.collision import CollisionModel, core_of
 from ir_kernels.dynamics import DynamicsModel
 from ir_kernels.errors import InputError
+from ir_kernels.reference.spline_profile import descend_profile
+from ir_kernels.reference.spline_starts import descend_along
 from ir_kernels.spline_terms import SplineTerms, checked_terms
 from ir_msgs_py.arrays import FloatArray
 
@@ -41,6 +44,41 @@ class SplineValue:
     gradient: FloatArray
     of_interval: float
     energy: float
+
+
+@dataclass(frozen=True)
+class SplineStarts:
+    """How splines are laid along paths: `spacing` s between knots where the path is at full speed, within
+    `fewest` and `most` control points between the ends; `slower` by that factor, or over `duration` s.
+    """
+
+    spacing: float
+    slower: float
+    fewest: int
+    most: int
+    duration: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class CubicPath:
+    """p(s), s in [0, 1]: breaks (B + 1,); cubics (4, B, n), lowest power first, in s from the break before
+    each.
+    """
+
+    breaks: FloatArray
+    cubics: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileDescent:
+    """Where a descent on a speed profile ended: s (C,) at the inner knots, duration [s], cost, and how many
+    evaluations it took.
+    """
+
+    s: FloatArray
+    duration: float
+    value: float
+    evaluations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +109,7 @@ class SplineCost:
         self.n = dynamics.n
         _same_chain(collision, dynamics)
         kept = checked_terms(terms, self.n, len(collision.pairs))
-        self._rows = len(kept.threshold)
+        self._rows, self._terms = len(kept.threshold), kept
         if core is None:
             from ir_kernels.reference.spline import SplineCost as Reference
 
@@ -111,11 +149,61 @@ class SplineCost:
         """
         points, rows = self._checked(control, row, 7)
         seconds = arguments.number("interval", interval, 0.0, above=True)
-        gain = arguments.number("tolerance", tolerance, 0.0)
-        if isinstance(evaluations, bool) or not isinstance(evaluations, int | np.integer) or evaluations < 1:
-            raise InputError(f"evaluations is {evaluations!r}: expected a whole number of at least 1")
-        most = min(int(evaluations), MOST_EVALUATIONS)
+        gain, most = arguments.number("tolerance", tolerance, 0.0), _most(evaluations)
         return SplineDescent(*self._core.descend(points, rows, seconds, bool(fixed_interval), most, gain))
+
+    def descend_along(
+        self, paths: Sequence[FloatArray], starts: SplineStarts, *, evaluations: int, tolerance: float = 1e-4
+    ) -> list[SplineDescent]:
+        """The same from splines from rest to rest along paths (M, n), M >= 2, that go somewhere; with the
+        first row of thresholds. The control points found stay within the joints' ranges. Raises InputError.
+        """
+        checked = [data.array(path, "path", (None, self.n)) for path in paths]
+        for path in checked:
+            if len(path) < 2 or (path == path[0]).all():
+                raise InputError("a path has no length: expected two or more configurations that differ")
+        if not checked:
+            return []
+        settings = (
+            arguments.number("starts.spacing", starts.spacing, 0.0, above=True),
+            arguments.number("starts.slower", starts.slower, 0.0, above=True),
+            arguments.number("starts.duration", starts.duration, 0.0),
+            max(starts.fewest, 1),
+            max(starts.most, starts.fewest, 1),
+        )
+        points, counts = np.concatenate(checked), np.array([len(path) for path in checked])
+        most, gain = _most(evaluations), arguments.number("tolerance", tolerance, 0.0)
+        if hasattr(self._core, "descend_along"):
+            found = self._core.descend_along(points, counts, *settings, most, gain)
+        else:
+            found = descend_along(self._core, self._terms, points, counts, settings, most, gain)
+        return [SplineDescent(*each) for each in found]
+
+    def descend_profile(
+        self,
+        path: CubicPath,
+        s: ArrayLike,
+        duration: float,
+        *,
+        fixed_duration: bool = False,
+        evaluations: int = 100,
+        tolerance: float = 1e-5,
+    ) -> ProfileDescent:
+        """Descend by where a path is passed at the inner knots of a spline, s (C,), C >= 4, and by its
+        duration [s]; with the first row of thresholds. L-BFGS in a metric in which the jerk of s counts.
+        Raises InputError.
+        """
+        breaks = data.array(path.breaks, "path.breaks", (None,))
+        cubics = data.array(path.cubics, "path.cubics", (4, len(breaks) - 1, self.n))
+        places = data.array(s, "s", (None,))
+        if len(places) < 4:
+            raise InputError(f"s has {len(places)} places: expected at least 4")
+        seconds = arguments.number("duration", duration, 0.0, above=True)
+        gain, most = arguments.number("tolerance", tolerance, 0.0), _most(evaluations)
+        given = places, seconds, bool(fixed_duration), most, gain
+        if hasattr(self._core, "descend_profile"):
+            return ProfileDescent(*self._core.descend_profile(breaks, cubics, *given))
+        return ProfileDescent(*descend_profile(self._core, (breaks, cubics), *given))
 
     def _checked(self, control: ArrayLike, row: ArrayLike | None, fewest: int) -> tuple[FloatArray, RowArray]:
         points = data.array(control, "control", (None, self.n))
@@ -125,6 +213,12 @@ class SplineCost:
         if row is None:
             return points, np.zeros(count, np.int32)
         return points, data.indices(row, "row", (count,), self._rows).astype(np.int32)
+
+
+def _most(evaluations: int) -> int:
+    if isinstance(evaluations, bool) or not isinstance(evaluations, int | np.integer) or evaluations < 1:
+        raise InputError(f"evaluations is {evaluations!r}: expected a whole number of at least 1")
+    return min(int(evaluations), MOST_EVALUATIONS)
 
 
 def _same_chain(collision: CollisionModel, dynamics: DynamicsModel) -> None:

@@ -11,6 +11,7 @@ from ir_kernels.collision import FREE, Witnesses
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.curves import motion_at
 from ir_planner.scene import PlanningScene
 
 _STEP, _FEWEST, _MOST = 0.01, 32, 2000  # s between the samples of a profile, and how many of them
@@ -85,7 +86,7 @@ def clearance_profile(
     begin, span = float(trajectory.times[0]), trajectory.duration - float(trajectory.times[0])
     count = int(np.clip(np.ceil(span / _STEP), _FEWEST, _MOST)) + 1
     times = np.linspace(begin, begin + span, count)
-    q = trajectory.sample(times).q
+    q = motion_at(trajectory, times).q
     allowed = scene.allowed(station)
     offset = np.where(allowed, -np.inf, 0.0)
     near = scene.collision.min_distance(q, offset)
@@ -129,7 +130,7 @@ def _nearest_between(
     """
     step = float(times[1] - times[0])
     time = _zoomed(trajectory, scene, offset, times[_local_minima(distances)], step)
-    near = scene.collision.min_distance(trajectory.sample([time]).q, offset)
+    near = scene.collision.min_distance(motion_at(trajectory, np.array([time])).q, offset)
     coefficients, durations = trajectory.coefficients()
     tight = _TIGHT
     for _ in range(_PROOFS):
@@ -141,7 +142,7 @@ def _nearest_between(
             return _Lowest(time, near, level)
         first, last = (float(times[0]) + t for t in found.interval)
         there = _zoomed(trajectory, scene, offset, np.array([0.5 * (first + last)]), last - first)
-        again = scene.collision.min_distance(trajectory.sample([there]).q, offset)
+        again = scene.collision.min_distance(motion_at(trajectory, np.array([there])).q, offset)
         if again.distance[0] < near.distance[0]:
             time, near = there, again
         else:
@@ -164,7 +165,7 @@ def _zoomed(
     best, time = np.inf, float(centres[0])
     for _ in range(_ZOOMS):
         zoom = np.clip(centres[:, None] + np.linspace(-half, half, _PER_ZOOM), begin, end)
-        distance = scene.collision.min_distance(trajectory.sample(zoom.ravel()).q, offset).distance
+        distance = scene.collision.min_distance(motion_at(trajectory, zoom.ravel()).q, offset).distance
         lowest = np.argmin(distance.reshape(zoom.shape), axis=1)
         centres = zoom[np.arange(len(zoom)), lowest]
         k = int(np.argmin(distance))

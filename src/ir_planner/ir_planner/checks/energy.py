@@ -13,6 +13,7 @@ import numpy as np
 from ir_kernels import DcBus, dc_bus
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.curves import motion_at
 from ir_planner.scene import PlanningScene
 
 STEP_S = 1e-3
@@ -87,7 +88,7 @@ def _on_bus(
 
 def _axis_power(trajectory: JointTrajectory, scene: PlanningScene, times: FloatArray) -> FloatArray:
     """What each axis takes from the DC bus (N, n) W at times (N,) s."""
-    motion = trajectory.sample(times)
+    motion = motion_at(trajectory, times)
     torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
     return scene.dynamics.axis_power(motion.qd, torque)
 

@@ -14,6 +14,7 @@ from ir_description import AXIS_UNITS
 from ir_kernels import DcBus, dc_bus
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_planner.curves import motion_at
 from ir_planner.scene import RUNNING, PlanningScene
 
 STEP_S = 8e-3  # intervals need no finer samples than these
@@ -35,7 +36,7 @@ class Sampled:
         span = trajectory.duration - begin
         count = int(np.clip(np.ceil(span / STEP_S), 1, _MOST)) if span > 0.0 else 0
         dt = span / max(count, 1)
-        return Sampled(trajectory.sample(begin + (np.arange(count) + 0.5) * dt), dt, span)
+        return Sampled(motion_at(trajectory, begin + (np.arange(count) + 0.5) * dt), dt, span)
 
 
 def sampled_energy(at: Sampled, scene: PlanningScene) -> float:

@@ -2,6 +2,7 @@
 
 from ir_planner.curves.arc_length import at_shares, evenly_spaced
 from ir_planner.curves.polynomials import Extremes, extremes
+from ir_planner.curves.sampling import motion_at
 from ir_planner.curves.splines import natural_durations, spline_through, to_ppoly, virtual_knots
 from ir_planner.curves.uniform_spline import UniformSpline, along_motion, along_path, fewest_seconds
 
@@ -14,6 +15,7 @@ __all__ = [
     "evenly_spaced",
     "extremes",
     "fewest_seconds",
+    "motion_at",
     "natural_durations",
     "spline_through",
     "to_ppoly",

@@ -8,6 +8,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dpbtrs
 
+from ir_kernels import CubicPath
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
@@ -41,19 +42,19 @@ class FixedPath:
         self._s = s / s[-1]
         self.q = q
         spline = make_interp_spline(self._s, q, k=3)
-        self._breaks = np.unique(spline.t)
-        begins = self._breaks[:-1]
-        self._cubics = np.stack(
-            [spline(begins), spline(begins, 1), spline(begins, 2) / 2, spline(begins, 3) / 6]
-        )
+        breaks = np.unique(spline.t)
+        begins = breaks[:-1]
+        cubics = [spline(begins), spline(begins, 1), spline(begins, 2) / 2, spline(begins, 3) / 6]
+        self.cubics = CubicPath(breaks, np.stack(cubics))
         self._passed = np.interp(knots[_in_order(given.positions, points)], self._share, self._s)
 
-    def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """p (N, n) rad and its derivative by s (N, n) at s (N,) in [0, 1]."""
-        k = np.clip(np.searchsorted(self._breaks, s, side="right") - 1, 0, len(self._breaks) - 2)
-        u = (s - self._breaks[k])[:, None]
-        a, b, c, d = self._cubics[:, k]
-        return a + u * (b + u * (c + u * d)), b + u * (2.0 * c + 3.0 * u * d)
+    def at(self, s: FloatArray) -> FloatArray:
+        """p (N, n) rad at s (N,) in [0, 1]."""
+        breaks = self.cubics.breaks
+        k = np.clip(np.searchsorted(breaks, s, side="right") - 1, 0, len(breaks) - 2)
+        u = (s - breaks[k])[:, None]
+        a, b, c, d = self.cubics.cubics[:, k]
+        return np.asarray(a + u * (b + u * (c + u * d)))
 
     def places(self, count: int) -> FloatArray:
         """s at the inner knots (count - 3,) with the speed profile that was given."""
@@ -73,10 +74,7 @@ class FixedPath:
 
     def spline(self, s: FloatArray, duration: float) -> UniformSpline:
         """The spline that passes p(s) at its inner knots, at rest at both ends."""
-        return self.spline_over(self.at(s)[0], duration)
-
-    def spline_over(self, inner: FloatArray, duration: float) -> UniformSpline:
-        """The spline that passes `inner` (C, n) at its inner knots, at rest at both ends."""
+        inner = self.at(s)
         right = 6.0 * inner
         right[0] -= self.q[0]
         right[-1] -= self.q[-1]
@@ -95,7 +93,7 @@ class FixedPath:
         for k in range(len(around) - 1):
             near = self.at(
                 np.linspace(around[max(k - 1, 0)], around[min(k + 2, len(around) - 1)], 16 * _NEAREST)
-            )[0]
+            )
             mine = q[k * _NEAREST : (k + 1) * _NEAREST]
             worst = max(worst, float(np.abs(mine[:, None] - near[None]).max(axis=2).min(axis=1).max()))
         return worst

@@ -71,7 +71,7 @@ class Portfolio:
         differ as far as free paths are, if they cost less than `worth` times the best candidate; the number
         of them that are new.
         """
-        looks = [(self.refinement.coarse(guess, _FIRST_LOOK), guess) for guess in guesses]
+        looks = list(zip(self.refinement.coarse_of_all(guesses, _FIRST_LOOK), guesses, strict=True))
         if self.candidates and np.isfinite(worth):
             most = worth * self.candidates[0].solution.cost
             looks = [look for look in looks if look[0].cost < most]
@@ -123,7 +123,8 @@ class Portfolio:
             self.journal.reject("not certified after refinement")
             return False
         self.found.append((candidate.method, movement))
-        self.found.sort(key=lambda entry: entry[1].coarse_cost)
+        if len(self.found) > 1:  # one alone is compared with nothing
+            self.found.sort(key=lambda entry: entry[1].coarse_cost)
         return True
 
     def best(self) -> tuple[str, Movement] | None:

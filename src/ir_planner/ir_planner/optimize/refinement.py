@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ir_kernels import SplineCost
+from ir_kernels import SplineCost, SplineStarts
 from ir_kernels.spline import RowArray
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
@@ -104,9 +104,34 @@ class Refinement:
 
     def coarse_from(self, spline: UniformSpline, path: FloatArray, evaluations: int) -> Solution:
         """The coarse solution by descent from a spline of any origin; path (M, n): what it came from."""
+        return self._optimised(self._begun(spline, evaluations), path)
+
+    def coarse_of_all(self, paths: list[FloatArray], evaluations: int) -> list[Solution]:
+        """Coarse solutions near paths (M, n), which need not be free; in one call where all have one cost."""
+        work, options = self.context.work, self.context.options
+        most = len(paths) * evaluations * MOST * EDGES_PER_INTERVAL
+        alike = len(self._kept) == 1 and options.objective != "movement_cost"
+        if not alike or most > _SHARE_OF_WORK * work.left:
+            return [self.coarse(path, evaluations) for path in paths]
+        work.check()
+        begin = self._begun(along_path(paths[0], FEWEST, 1.0), evaluations)
+        starts = SplineStarts(SPACING, SLOWER, FEWEST, MOST, options.duration)
+        found = self._cost(begin, paths[0]).descend_along(
+            paths, starts, evaluations=evaluations, tolerance=begin.stage.tolerance
+        )
+        solutions = [
+            replace(begin, spline=UniformSpline(each.control, each.interval), cost=each.value)
+            for each in found
+        ]
+        for each, solution in zip(found, solutions, strict=True):
+            work.spend(int(np.ceil(each.evaluations * solution.spline.intervals * EDGES_PER_INTERVAL)))
+        return solutions
+
+    def _begun(self, spline: UniformSpline, evaluations: int) -> Solution:
+        """A spline about to descend with so many evaluations of the first stage."""
         speed = SPEED_MARGINS[0] if self.context.options.duration > 0.0 else 1.0
         stage = replace(QUICK.stages[0], evaluations=evaluations)
-        return self._optimised(Solution(spline, stage, np.inf, self._kept, speed), path)
+        return Solution(spline, stage, np.inf, self._kept, speed)
 
     def refined(self, solution: Solution, path: FloatArray, effort: Effort = QUICK) -> Movement | None:
         """The movement that a coarse solution on a path (M, n) becomes, proved; None if none can be."""

@@ -15,6 +15,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import movement_energy
+from ir_planner.curves import motion_at
 from ir_planner.request import Context
 from ir_planner.scene import PlanningScene, path_cost
 
@@ -25,6 +26,7 @@ _SLOWER = np.array(
 _CLOSE, _USUAL = 1.05 ** np.arange(54.0), 18  # so near that the least cost is hardly missed; how many for J
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported
+_BOUND_STEP = 10e-3  # s: of a bound that is about right
 _FEWEST_STEPS, _MOST_STEPS = 100, 5000  # of a movement that is short, or lasts long
 _DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it moves
 _TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
@@ -132,7 +134,7 @@ def least_stretched_cost(fastest: JointTrajectory, context: Context) -> float:
         return coarse_cost(fastest, context)
     else:
         factors = _CLOSE[: None if options.objective == "energy" else _USUAL]
-    return float(stretched_costs(fastest, factors, context).min())
+    return float(stretched_costs(fastest, factors, context, _BOUND_STEP).min())
 
 
 def best_stretch(fastest: JointTrajectory, context: Context) -> float:
@@ -148,24 +150,30 @@ def best_stretch(fastest: JointTrajectory, context: Context) -> float:
     return float(around[best]) if refined[best] < costs[k] else float(factors[k])
 
 
-def stretched_costs(fastest: JointTrajectory, factors: FloatArray, context: Context) -> FloatArray:
+def stretched_costs(
+    fastest: JointTrajectory, factors: FloatArray, context: Context, step: float = _COARSE_STEP
+) -> FloatArray:
     """J, or E_drive where the objective is not J (F,), of a trajectory stretched by `factors` (F,); all of
     them from the same samples.
     """
     scene, begin = context.scene, float(fastest.times[0])
     span = fastest.duration - begin
-    count = int(np.clip(np.ceil(span / _COARSE_STEP), _FEWEST_STEPS, _MOST_STEPS))
-    motion = fastest.sample(begin + (np.arange(count) + 0.5) * (span / count))
-    slower = factors[:, None, None]
+    count = int(np.clip(np.ceil(span / step), _FEWEST_STEPS, _MOST_STEPS))
+    motion = motion_at(fastest, begin + (np.arange(count) + 0.5) * (span / count))
+    slower, still = factors[:, None, None], np.zeros_like(motion.q)
+    drives, speed = scene.dynamics.data, motion.qd / slower
+    # what holds the arm and dry friction stay, the viscous one falls with the speed, the rest with its square
+    holding = scene.dynamics.inverse_dynamics(motion.q, still, still)
+    viscous, dry = drives.viscous * motion.qd, drives.coulomb * np.sign(motion.qd)
+    whole = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
+    torque = (whole - holding - viscous - dry) / slower**2 + viscous / slower + (holding + dry)
     shape = (len(factors) * count, -1)
-    q = np.broadcast_to(motion.q, (len(factors), *motion.q.shape)).reshape(shape)
-    qd, qdd = (motion.qd / slower).reshape(shape), (motion.qdd / slower**2).reshape(shape)
-    axes = scene.dynamics.axis_power(qd, scene.dynamics.inverse_dynamics(q, qd, qdd))
-    drives = _drawn(axes.reshape(len(factors), count, -1), factors * span / count, scene)
+    axes = scene.dynamics.axis_power(speed.reshape(shape), torque.reshape(shape))
+    joules = _drawn(axes.reshape(len(factors), count, -1), factors * span / count, scene)
     options = context.options
     free = options.duration <= 0.0 and options.objective == "time_and_energy"
     per_second = options.time_value if free else 0.0
-    return drives + per_second * factors * span
+    return joules + per_second * factors * span
 
 
 def _drawn(axes: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatArray:
