@@ -19,7 +19,7 @@ from ir_recorder.read.reader import read_recording
 
 MOST = 200  # recordings of a fleet
 PLANNED = "its program as planned"  # a measure beside the levers
-Told = Callable[[str], None]
+Said = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Member:
 
 
 def read_members(
-    paths: Sequence[str | Path], roots: FileRoots, left_out: Told, shown: Told = lambda _: None
+    paths: Sequence[str | Path], roots: FileRoots, left_out: Said, shown: Said = lambda _: None
 ) -> list[Member]:
     """The members of files and folders, folders with all recordings below them. What can't be read is
     handed to `left_out` as a sentence; `shown` hears each file before it is read. ReadError where nothing is
@@ -118,7 +118,7 @@ def _by_name(rows: Iterator[tuple[str, float, float]]) -> dict[str, Share]:
 
 
 def _files(
-    paths: Sequence[str | Path], roots: FileRoots, left_out: Told
+    paths: Sequence[str | Path], roots: FileRoots, left_out: Said
 ) -> Iterator[tuple[Path, Path | None]]:
     """Recordings, each with the folder that it was found below."""
     for path in map(Path, paths):
