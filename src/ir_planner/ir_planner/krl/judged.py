@@ -1,14 +1,15 @@
-"""Steps of a planned program, each judged as it was planned: with its load, its parts where they lie, and
-what its station allows.
+"""Steps of a planned program, each judged as it was planned: with its load, its parts where they lie, doors
+as its signals move them, sweeping while they do, and what its station allows.
 """
 
 from collections.abc import Sequence
 
-from ir_description import Cell, PowerData, ProgramStep
+from ir_description import Cell, PowerData, ProgramStep, Signal, cell_in
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Evaluation, evaluate_trajectory
 from ir_planner.krl.export import Judge
+from ir_planner.program import doors_along
 from ir_planner.scene import Drives, PlanningScene, with_parts
 
 
@@ -18,11 +19,13 @@ def judge_of(
     """A judge of these steps, S_m `margin` m."""
     scenes: dict[int, PlanningScene] = {}
     places = cell.parts_at_start()
-    for step in steps:
-        standing = with_parts(cell, places)
-        for text in step.states:  # of machines: those that the step was planned with
+    doors = [dict(before) for before, _ in doors_along(cell, [_signalling(step) for step in steps])]
+    for step, standing_doors in zip(steps, doors, strict=True):
+        standing = cell_in(with_parts(cell, places), standing_doors)
+        for text in step.states:  # of machines that no signal moves: those that the step was planned with
             machine, _, state = text.partition("=")
-            standing = standing.with_equipment(machine, state=state)
+            if machine not in standing_doors:
+                standing = standing.with_equipment(machine, state=state)
         scenes[id(step)] = PlanningScene(standing, cell.loads(places.held), power, drives)
         if step.attach or step.detach:
             places = places.after(
@@ -37,3 +40,19 @@ def judge_of(
         return evaluate_trajectory(trajectory, scenes[id(step)], margin, at)
 
     return judge
+
+
+def _signalling(step: PlannedMovement) -> ProgramStep:
+    """What a step waits for and sets, and how long it dwells."""
+    return ProgramStep(
+        "POSTURE",
+        "home",
+        dwell=step.duration if step.is_pause else 0.0,
+        wait_for=tuple(_signal(text) for text in step.wait_for),
+        set_signals=tuple(_signal(text) for text in step.set_signals),
+    )
+
+
+def _signal(text: str) -> Signal:
+    name, _, value = text.partition("=")
+    return Signal(name, value != "0")

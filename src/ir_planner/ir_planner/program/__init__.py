@@ -1,6 +1,7 @@
 """Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
 
 from ir_planner.program.charge import Charge
+from ir_planner.program.doors import doors_along
 from ir_planner.program.pause_lengths import Lengths, lengths_of
 from ir_planner.program.pauses import AUTO, Pause, pause_by_itself
 from ir_planner.program.program import plan_program
@@ -24,6 +25,7 @@ __all__ = [
     "Standby",
     "Trip",
     "best_posture",
+    "doors_along",
     "lengths_of",
     "nobody",
     "pause_by_itself",
