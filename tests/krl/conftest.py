@@ -36,3 +36,9 @@ def followed(planner: Planner) -> Callable[..., Followed]:
 @pytest.fixture
 def home(planner: Planner) -> np.ndarray:
     return planner.cell.machine_home
+
+
+@pytest.fixture(autouse=True)
+def few_statements(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop that never ends is named sooner."""
+    monkeypatch.setattr("ir_krl.run.control.STATEMENTS_MAX", 5_000)

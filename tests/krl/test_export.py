@@ -56,13 +56,13 @@ def test_names_that_a_controller_does_not_take(planned, name: str) -> None:
 
 def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "visit.src"
-    assert main(["krl", "export", "demo", "-o", str(source), "--stations", "gauge_measure", "home"]) == 0
+    assert main(["krl", "export", "open", "-o", str(source), "--stations", "p1", "home"]) == 0
     assert "certified" in capsys.readouterr().out
-    assert main(["krl", "import", str(source), str(source.with_suffix(".dat")), "--cell", "demo"]) == 0
+    assert main(["krl", "import", str(source), str(source.with_suffix(".dat")), "--cell", "open"]) == 0
     shown = capsys.readouterr().out
-    assert "stations: gauge_measure" in shown
+    assert "stations: p1" in shown
     assert "free of violations" in shown
-    assert main(["krl", "export", "demo", "-o", str(source)]) == 2  # never over a file that is there
+    assert main(["krl", "export", "open", "-o", str(source)]) == 2  # never over a file that is there
     assert "is there already" in capsys.readouterr().err
 
 

@@ -31,6 +31,7 @@ from ir_krl.write import (
     WrittenPause,
     WrittenSignals,
     WrittenSpline,
+    check_name,
     written,
 )
 
@@ -60,6 +61,7 @@ __all__ = [
     "WrittenPause",
     "WrittenSignals",
     "WrittenSpline",
+    "check_name",
     "follow",
     "parse",
     "written",

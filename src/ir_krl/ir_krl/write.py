@@ -63,17 +63,22 @@ AWAKE = "AWAKE"
 """The signal by which the PLC says that the controller is back."""
 
 
+def check_name(name: str) -> None:
+    """Raise KrlError for a name that the controller doesn't take."""
+    if not _NAME.fullmatch(name):
+        raise KrlError(
+            f"the program's name is {name[:40]!r}: a letter, then letters, digits and _, "
+            f"at most {NAME_MAX} characters"
+        )
+
+
 def written(
     name: str, start: FloatArray, parts: Sequence[Part], attached: Attached, header: Sequence[str]
 ) -> tuple[str, str]:  # long: the lines of two files
     """Texts of NAME.src and NAME.dat: from `start` (6,) [rad] through the parts. Raises KrlError for a name
     that the controller doesn't take.
     """
-    if not _NAME.fullmatch(name):
-        raise KrlError(
-            f"the program's name is {name[:40]!r}: a letter, then letters, digits and _, "
-            f"at most {NAME_MAX} characters"
-        )
+    check_name(name)
     body = _Body()
     for part in parts:
         body.add(part)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ir_krl.errors import KrlRunError, Place
+from ir_krl.run.system import STANDING
 from ir_krl.run.values import Array, Structure, Value, copied
 
 Step = tuple[str, tuple[int, ...] | None]
@@ -31,6 +32,11 @@ class Memory:
         (name, index), *rest = path
         home = self._home(name)
         if name not in home:
+            if name in STANDING:
+                raise KrlRunError(
+                    f"{name} is known on the controller only: a program that computes with it isn't read",
+                    place,
+                )
             raise KrlRunError(f"{name} has no value", place)
         value = _element(home[name], name, index, place)
         written = name if index is None else f"{name}[{', '.join(map(str, index))}]"

@@ -11,7 +11,7 @@ from ir_krl.run.commands import Blend, Kind, Motion, Speeds, Target
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.frames import FRAME_NAMES, axes, components, is_axis_value, pose
 from ir_krl.run.memory import Memory
-from ir_krl.run.system import AXES, FULL
+from ir_krl.run.system import AXES, FULL, STANDING
 from ir_krl.run.values import Structure, Symbol, integer, kind_of, number
 
 _KINDS: dict[str, Kind] = {kind: kind for kind in get_args(Kind)}
@@ -47,6 +47,8 @@ class Motions:
     def target(self, tree: Tree, relative: bool, in_tool: bool) -> Target:
         """Where an expression leads to."""
         place = place_of(tree, self._expressions.file)
+        if tree.data == "access" and str(tree.children[0]) in STANDING:
+            return self._here(str(tree.children[0]), place)
         value = self._expressions.value(tree)
         if not isinstance(value, Structure):
             raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
@@ -63,6 +65,16 @@ class Motions:
             integer(value.fields[part], part, place) if part in value.fields else None for part in ("S", "T")
         )
         return Target(None, frame, status, turn, relative, in_tool, base, tool, name)
+
+    def _here(self, name: str, place: Place) -> Target:
+        """Where the robot stands: PTP $AXIS_ACT, as programs begin."""
+        if name.startswith("$AXIS"):
+            axis: dict[str, float] | None = {"A1": 0.0}
+            frame = None
+        else:
+            axis, frame = None, dict.fromkeys(FRAME_NAMES[:3], 0.0)
+        base, tool = (pose(self._memory.get(((n, None),), place), n, place) for n in ("$BASE", "$TOOL"))
+        return Target(axis, frame, None, None, True, False, base, tool, name)
 
     def speeds(self, place: Place) -> Speeds:
         """How fast the system variables say; each bounded by what a controller takes."""

@@ -24,6 +24,8 @@ HARMLESS = frozenset(
     ("$ADVANCE", "$BWDSTART", "$H_POS", "$GEAR_JERK", "$COLLMON_TOL_PRO", "$CIRC_TYPE", "$JERK", "$IPO_MODE")
 )
 """Set by nearly every program; nothing here follows from them."""
+STANDING = frozenset(("$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MEAS"))
+"""Where the robot stands: known when a program is driven, not when it is followed."""
 NULL: dict[str, Value] = dict.fromkeys(FRAME_NAMES, 0.0)
 
 
@@ -60,6 +62,8 @@ def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
         "BASE_DATA": Array({(n,): Structure(dict(NULL)) for n in range(1, BASES + 1)}),
         "XHOME": Structure(dict(angles), "E6AXIS"),
         "$H_POS": Structure(dict(angles), "E6AXIS"),
+        "PDEFAULT": Structure({"VEL": FULL, "ACC": FULL, "APO_DIST": FULL}),
+        "FHOME": Structure({"TOOL_NO": 0, "BASE_NO": 0}),
         "$STOPMESS": False,
         "$BWDSTART": False,
         "$OUT": Array(),

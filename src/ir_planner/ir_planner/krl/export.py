@@ -16,6 +16,7 @@ from ir_krl import (
     WrittenPause,
     WrittenSignals,
     WrittenSpline,
+    check_name,
     follow,
     parse,
     written,
@@ -65,6 +66,7 @@ def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, ju
     moving = [step for step in steps if not step.is_pause]
     if not moving:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
+    check_name(name)
     fitted = {id(step): _fitted(step, scene, judge) for step in moving}
     parts = [part for step in steps for part in _parts(step, fitted)]
     start = _points_of(moving[0]).positions[0]
