@@ -130,6 +130,7 @@ def test_a_press_by_service_counts_in_a_burst_and_all_are_answered(
     wait_for(lambda: PowerMode.EMERGENCY_STOP in modes, what="the stop is latched")
 
 
+@pytest.mark.long  # test_serving.py has the same with fewer requests
 def test_more_requests_than_may_wait_are_all_answered(
     modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> None:
