@@ -5,11 +5,35 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
 
 from ir_cli.main import main
-from ir_recorder import Verdict, analyse, findings, read_recording, summary
-from ir_recorder.read.raw import read_raw
+from ir_msgs.msg import RecordedCall
+from ir_msgs.srv import PlanProgram
+from ir_recorder import Analysis, Verdict, analyse, findings, read_recording, summary
+from ir_recorder.read.raw import RawRecording, read_raw
+from ir_recorder.report import report_html
+from ir_recorder.report.compare import comparison_html
+from ir_recorder.report.words import joules
+
+
+def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawRecording) -> None:
+    calls = raw.channel("/ir_planner/calls")
+    assert calls is not None
+    call = deserialize_message(calls.messages[-1], RecordedCall)
+    steps = deserialize_message(bytes(call.response), PlanProgram.Response).movements
+    planned = analysis.recording.planned
+    assert [step.report.energy for step in planned] == [step.report.energy for step in steps]
+    assert [step.duration for step in planned] == [step.duration for step in steps]
+    assert [step.from_station for step in planned] == [step.from_station for step in steps]
+    assert analysis.problems == ()  # nothing is missing: nothing was driven
+    energy = joules(sum(step.report.energy for step in steps))
+    assert f"<b>{energy}</b>" in report_html(analysis, ())
+    page = comparison_html([(analysis, ()), (analysis, ())])
+    assert page.count(f"<b>{energy}</b>") >= 2
+    assert page.count("predicted, not driven") == 2
+    assert page.count(f"<b>{joules(steps[0].report.energy)}</b>") >= 2
 
 
 def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
@@ -22,11 +46,14 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     assert raw.problems == ()
     assert raw.attachment("cell.yaml") is not None
     assert raw.attachment("ir_planner.parameters.yaml") is not None
-    assert len(raw.channel("/ir_planner/planned_trajectory").messages) >= 2
+    planned = raw.channel("/ir_planner/planned_trajectory")
+    assert planned is not None
+    assert len(planned.messages) >= 2
     with AnyReader([tmp_path / "plan.mcap"]) as reader:
         assert reader.message_count == sum(len(channel.messages) for channel in raw.channels)
-    checks = findings(analyse(read_recording(tmp_path / "plan.mcap")))
-    assert summary(checks)[0] is Verdict.NOT_CHECKED  # nothing was driven
+    analysis = analyse(read_recording(tmp_path / "plan.mcap"))
+    assert summary(findings(analysis))[0] is Verdict.NOT_CHECKED  # nothing was driven
+    assert_planned_figures_are_those_of_the_answer(analysis, raw)
     capsys.readouterr()
     assert main(["replan", "plan.mcap"]) == 0
     assert "1 of 1 requests planned again with equal ids" in capsys.readouterr().out

@@ -231,7 +231,7 @@ def test_a_page_of_an_empty_recording_has_no_error(browser: Any, demo_file: Path
 
 @pytest.fixture
 def live() -> Iterator[tuple[LiveServer, Stream, list[tuple[str, bool]]]]:
-    """A live view of a cell that is told here what it heard; the presses of its buttons."""
+    """A live view of a cell whose words are made here; the presses of its buttons."""
     stream, pressed, view = Stream(), list[tuple[str, bool]](), CellView()
     robot = load_cell("demo").robot
 

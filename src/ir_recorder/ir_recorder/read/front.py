@@ -38,18 +38,18 @@ def recorded_front(
     raw = read_raw(path, roots)
     prefix = chosen_namespace(raw, namespace)[0].rstrip("/")
     channel = raw.channel(f"{prefix}/{names.PLANNER}/{names.CALLS}")
-    definition = _result_definition()
+    definition = result_definition()
     if channel is None or channel.message_encoding != "cdr" or not definition:
         return ()
-    for answer in _answers(channel):
+    for answer in answers(channel):
         points = front_of(answer, definition)
         if points:
             return points
     return ()
 
 
-def _answers(channel: RawChannel) -> Iterator[bytes]:
-    """Results of the action, the last one first; what can't be decoded is left out."""
+def answers(channel: RawChannel, kinds: tuple[str, ...] = (ACTION,)) -> Iterator[bytes]:
+    """Results and answers of these types, the last one first; what can't be decoded is left out."""
     schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
     try:
         decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
@@ -61,7 +61,7 @@ def _answers(channel: RawChannel) -> Iterator[bytes]:
             kind, answer = (call.type, bytes(call.response)) if call is not None else ("", b"")
         except Exception:  # damaged bytes: the decoder raises nearly anything
             continue
-        if kind == ACTION and answer:
+        if kind in kinds and answer:
             yield answer
 
 
@@ -83,7 +83,7 @@ def front_of(answer: bytes, definition: str) -> tuple[ProgramPoint, ...]:
 
 
 @cache
-def _result_definition() -> str:
+def result_definition() -> str:
     """Text of the result's type and of all it is built from; "" where the interfaces aren't installed."""
     package, _, name = ACTION.split("/")
     files = [prefix / "share" / package / "action" / f"{name}.action" for prefix in installed_prefixes()]

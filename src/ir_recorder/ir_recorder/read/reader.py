@@ -5,7 +5,7 @@ refusal.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,6 +26,7 @@ from ir_recorder.read.cdr import Columns
 from ir_recorder.read.cells import chosen_namespace
 from ir_recorder.read.chunks import ReadLimits
 from ir_recorder.read.decoded import contact_sentence, movement_from, savings_from
+from ir_recorder.read.planned import planned_steps
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
     BitSeries,
@@ -41,6 +42,7 @@ from ir_recorder.read.recording import (
 )
 
 _T = TypeVar("_T")
+_OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PROGRAM_STATE)
 _WARN = 30  # rcl_interfaces/Log
 # action_msgs/GoalStatus
 _OUTCOMES = {1: "accepted", 2: "executing", 3: "canceling", 4: "succeeded", 5: "canceled", 6: "aborted"}
@@ -78,7 +80,7 @@ class _Reader:
         for channel in raw.channels:
             if channel.message_encoding != "cdr" and channel.messages:
                 self._problems.append(f"{channel.topic} is {channel.message_encoding}, not cdr: left out")
-        return Recording(
+        found = Recording(
             path=raw.path,
             start_ns=self._start,
             duration=(self._end - self._start) * 1e-9,
@@ -104,6 +106,12 @@ class _Reader:
             facts=raw.facts,
             problems=tuple(self._problems),
         )
+        if found.joints is not None or found.power is not None or found.events:
+            return found
+        planned = planned_steps(self._channel(f"{names.PLANNER}/{names.CALLS}"))
+        missing = {f"{self._prefix}{name} isn't in the recording" for name in _OF_A_RUN}
+        kept = tuple(problem for problem in found.problems if problem not in missing)
+        return replace(found, planned=planned, problems=kept) if planned else found
 
     def _channel(self, name: str) -> RawChannel | None:
         channel = self._raw.channel(name if name.startswith("/") else self._prefix + name)

@@ -141,7 +141,8 @@ class Recording:
 
     start_ns: node clock of time 0. hardware: the driver's name of its plant ("..., simulated"). cell_yaml and
     urdf are "" where none is attached, so are power_yaml (data of the controller) and plant_yaml (the
-    simulated plant with its figures). facts: texts by key.
+    simulated plant with its figures). facts: texts by key. planned: steps of the last planned program, where
+    nothing was driven.
     """
 
     path: Path
@@ -166,6 +167,12 @@ class Recording:
     problems: tuple[str, ...]
     power_yaml: str = ""
     plant_yaml: str = ""
+    planned: tuple[PlannedMovement, ...] = ()
+
+    @property
+    def only_planned(self) -> bool:
+        """Whether it holds a plan that was not driven, and no robot."""
+        return bool(self.planned)
 
     @property
     def origin(self) -> str:

@@ -12,8 +12,10 @@ import numpy as np
 
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.savings import ProgramSavings
-from ir_recorder.analysis import Analysis, Finding, StepResult, summary
+from ir_recorder.analysis import Analysis, Finding, summary
 from ir_recorder.analysis.flows import energy_flows
+from ir_recorder.analysis.results import ProgramTotals, Share
+from ir_recorder.analysis.steps import step_label
 from ir_recorder.report.axes import Curves, packed
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.files import write_output
@@ -21,6 +23,7 @@ from ir_recorder.report.front import Point, front_chart
 from ir_recorder.report.headline import plant_of
 from ir_recorder.report.money import cycle_of, money
 from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.planned import planned_clearance, planned_share
 from ir_recorder.report.series import Json
 from ir_recorder.report.tables import table
 from ir_recorder.report.words import DASH, joules, millimetres, percent, seconds, text, watts
@@ -105,8 +108,17 @@ def _yearly(analysis: Analysis, costs: Costs) -> str:
     return text(money(costs.money(cycle.energy * costs.cycles_per_year(cycle.seconds)), costs.currency))
 
 
-def _of_cycle(of: Callable[[Analysis], float]) -> Callable[[Analysis], float]:
-    return lambda analysis: of(analysis) if analysis.program is not None else math.nan
+def _of_program(part: str, value: str) -> Callable[[Analysis], float]:
+    """Energy [J] or seconds of a part of the program that was executed, else of the one that was planned."""
+
+    def found(analysis: Analysis) -> float:
+        program: ProgramTotals | None = analysis.program
+        if program is not None:
+            return float(getattr(getattr(program, part), value))
+        planned = planned_share(analysis.recording.planned, part)
+        return math.nan if planned is None else float(getattr(planned, value))
+
+    return found
 
 
 def _flow(name: str) -> Callable[[Analysis], float]:
@@ -122,24 +134,22 @@ def _saved(of: Callable[[ProgramSavings], float]) -> Callable[[Analysis], float]
 
 
 def _least(analysis: Analysis) -> float:
-    return min((r.clearance.least for r in analysis.movements if r.clearance is not None), default=math.nan)
+    executed = [r.clearance.least for r in analysis.movements if r.clearance is not None]
+    return min(executed, default=planned_clearance(analysis.recording.planned))
+
+
+def _peak(analysis: Analysis) -> float:
+    planned = [step.report.peak_power for step in analysis.recording.planned]
+    return max(planned) if planned else analysis.peak_power
 
 
 _VALUES: tuple[tuple[str, Callable[[float], str], Callable[[Analysis], float]], ...] = (
-    ("program", joules, _of_cycle(lambda a: a.program.whole.energy if a.program else math.nan)),
-    ("its time", seconds, _of_cycle(lambda a: a.program.whole.seconds if a.program else math.nan)),
-    ("movements", joules, _of_cycle(lambda a: a.program.movements.energy if a.program else math.nan)),
-    (
-        "time of movements",
-        seconds,
-        _of_cycle(lambda a: a.program.movements.seconds if a.program else math.nan),
-    ),
-    ("pauses", joules, _of_cycle(lambda a: a.program.pauses.energy if a.program else math.nan)),
-    (
-        "waiting between steps",
-        joules,
-        _of_cycle(lambda a: a.program.waiting.energy if a.program else math.nan),
-    ),
+    ("program", joules, _of_program("whole", "energy")),
+    ("its time", seconds, _of_program("whole", "seconds")),
+    ("movements", joules, _of_program("movements", "energy")),
+    ("time of movements", seconds, _of_program("movements", "seconds")),
+    ("pauses", joules, _of_program("pauses", "energy")),
+    ("waiting between steps", joules, _of_program("waiting", "energy")),
     ("returned by braking axes", joules, _flow("returned")),
     ("brake resistor", joules, _flow("resistor")),
     ("motors and inverters", joules, _flow("motors")),
@@ -147,7 +157,7 @@ _VALUES: tuple[tuple[str, Callable[[float], str], Callable[[Analysis], float]], 
     ("planned in the common program's time", joules, _saved(lambda s: s.total.planned)),
     ("common program", joules, _saved(lambda s: s.total.common)),
     ("saved by the plan", joules, _saved(lambda s: s.total.saved)),
-    ("peak power", watts, lambda a: a.peak_power),
+    ("peak power", watts, _peak),
     ("least clearance", millimetres, _least),
 )
 
@@ -159,6 +169,8 @@ def _points(analyses: Sequence[Analysis], names: Sequence[str]) -> list[Point]:
         if analysis.program is not None and math.isfinite(analysis.program.whole.energy):
             whole = analysis.program.whole
             points.append(Point(name, whole.seconds, whole.energy, analysis.recording.origin))
+        elif (planned := planned_share(analysis.recording.planned)) is not None:
+            points.append(Point(name, planned.seconds, planned.energy, "predicted"))
         elif analysis.savings is not None:
             total = analysis.savings.total
             points.append(Point(name, total.seconds, total.planned, "predicted"))
@@ -167,7 +179,7 @@ def _points(analyses: Sequence[Analysis], names: Sequence[str]) -> list[Point]:
 
 def _steps(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     """Energy of every step; steps are matched by their label and its number of times before."""
-    held = [dict(_keyed(analysis.steps)) for analysis in analyses]
+    held = [dict(_keyed(analysis)) for analysis in analyses]
     keys = list(dict.fromkeys(key for own in held for key in own))
     rows = []
     for key in keys:
@@ -178,15 +190,19 @@ def _steps(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     return table(("step", *(f">{name}" for name in names)), rows, "Steps")
 
 
-def _keyed(steps: Sequence[StepResult]) -> Iterator[tuple[tuple[str, int], StepResult]]:
+def _keyed(analysis: Analysis) -> Iterator[tuple[tuple[str, int], Share]]:
+    """Energy and duration of each step, executed or planned."""
+    steps = [(r.step.label, Share(r.step.label, r.seconds, r.energy)) for r in analysis.steps]
+    for movement in analysis.recording.planned:
+        label = step_label(movement)
+        steps.append((label, Share(label, movement.duration, movement.report.energy)))
     times: dict[str, int] = {}
-    for result in steps:
-        label = result.step.label
+    for label, found in steps:
         times[label] = times.get(label, 0) + 1
-        yield (label, times[label]), result
+        yield (label, times[label]), found
 
 
-def _step(result: StepResult | None, first: float, own: bool) -> str:
+def _step(result: Share | None, first: float, own: bool) -> str:
     if result is None:
         return DASH
     return f"{_against(result.energy, first, joules, own)}<small>{seconds(result.seconds)}</small>"

@@ -11,6 +11,7 @@ from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdic
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.report.costs import NAMES, Costs
 from ir_recorder.report.money import cycle_of, money
+from ir_recorder.report.planned import planned_clearance, planned_interval, planned_share
 from ir_recorder.report.words import (
     DASH,
     joules,
@@ -41,6 +42,9 @@ class Tile:
         return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'
 
 
+_PREDICTED = "predicted, not driven"
+
+
 def subtitle(analysis: Analysis) -> str:
     """File, start, length and energy of the whole recording."""
     recording = analysis.recording
@@ -55,15 +59,18 @@ def subtitle(analysis: Analysis) -> str:
 def plant_of(analysis: Analysis) -> str:
     """Whether the figures are simulated or measured, and the plant's name."""
     plant = analysis.recording.plant
-    if not analysis.steps and not analysis.recording.hardware and analysis.savings is not None:
-        return "predicted, not driven"
+    saved = not analysis.steps and not analysis.recording.hardware and analysis.savings is not None
+    if analysis.recording.only_planned or saved:
+        return _PREDICTED
     return f"{analysis.recording.origin}, plant {plant}" if plant else analysis.recording.origin
 
 
 def source(analysis: Analysis) -> str:
     """Whether the figures are simulated, and by which plant."""
     hardware = analysis.recording.hardware
-    if not hardware and not analysis.steps and analysis.savings is not None:
+    if not hardware and (
+        analysis.recording.only_planned or (not analysis.steps and analysis.savings is not None)
+    ):
         return '<p class="source open"><b>Predicted</b> a plan that was not driven</p>'
     if not hardware:
         return '<p class="source open">plant not recorded</p>'
@@ -98,14 +105,31 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     shown = (
         [_whole(analysis, program), _unshortened(program), *paid, *_parts(program, origin)]
         if program is not None
+        else [*_planned(analysis), *paid]
+        if analysis.recording.only_planned
         else [
             Tile("program", "none executed", ("figures of the whole recording only",)),
             *paid,
             _recorded(analysis),
         ]
     )
+    if analysis.recording.only_planned:
+        return "".join(tile.html() for tile in shown if tile is not None)
     peak = Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
     return "".join(tile.html() for tile in [*shown, peak, _clearance(analysis)] if tile is not None)
+
+
+def _planned(analysis: Analysis) -> list[Tile]:
+    """Figures of a plan that was not driven, all predicted."""
+    steps, tiles = analysis.recording.planned, []
+    for name, part in (("planned program", "whole"), ("movements", "movements"), ("pauses", "pauses")):
+        found, within = planned_share(steps, part), planned_interval(steps) if part == "whole" else None
+        if found is None:
+            continue
+        spread = f"90 % interval {joules(within[0])} to {joules(within[1])}" if within is not None else ""
+        tiles.append(Tile(name, joules(found.energy), (f"in {seconds(found.seconds)}, predicted", spread)))
+    near = millimetres(planned_clearance(steps))
+    return [*tiles, Tile("least clearance", near, ("planned, without pairs that may touch",))]
 
 
 def _recorded(analysis: Analysis) -> Tile:

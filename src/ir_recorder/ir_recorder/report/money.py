@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ir_msgs_py.savings import Saving
 from ir_recorder.analysis import Analysis
 from ir_recorder.report.costs import NAMES, SETTINGS, Costs
+from ir_recorder.report.planned import planned_share
 from ir_recorder.report.tables import table
 from ir_recorder.report.words import DASH, joules, kilowatt_hours, number, seconds, text
 
@@ -26,6 +27,9 @@ def cycle_of(analysis: Analysis) -> Cycle | None:
     not driven the planned one; None without either.
     """
     program, savings = analysis.program, analysis.savings
+    planned = planned_share(analysis.recording.planned)
+    if program is None and planned is not None:
+        return Cycle("planned program, predicted", planned.energy, planned.seconds)
     if program is None and savings is not None and savings.total.seconds > 0.0:
         name = "planned in the common program's time, predicted"
         return Cycle(name, savings.total.planned, savings.total.seconds)
