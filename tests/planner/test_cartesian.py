@@ -116,6 +116,30 @@ def test_no_judge_objects_to_what_is_certified(cell: str) -> None:
             assert judge.clearance_left(plan.trajectory, MARGIN, step=0.002)[0] >= -2e-6
 
 
+def test_approach_and_retract_lead_along_the_axis_of_the_tool(planner: Planner) -> None:
+    ends = pose(1.8, -0.2, 1.2), pose(1.8, 0.2, 1.2)
+    plan = planned(planner, CartesianPath(ends[0], line(ends[1]), 0.2, approach=0.1, retract=0.05))
+    assert plan.trajectory is not None, plan.status.message
+    first, last = planner.scene().chain.tcp_poses(plan.trajectory.positions[[0, -1]])[:, :3, 3]
+    assert np.allclose(first, ends[0][:3, 3] - 0.1 * ends[0][:3, 0], atol=1e-4)
+    assert np.allclose(last, ends[1][:3, 3] - 0.05 * ends[1][:3, 0], atol=1e-4)
+    assert np.allclose(plan.lengths, [0.5], atol=1e-6)
+
+
+def test_a_free_angle_serves_and_stays_within_its_bound(planner: Planner) -> None:
+    ends = pose(1.8, -0.3, 1.2), pose(1.8, 0.3, 1.2)
+    fixed, free = (
+        planned(planner, CartesianPath(ends[0], line(ends[1]), 0.2, free_angle=angle)) for angle in (0.0, 0.4)
+    )
+    assert fixed.trajectory is not None
+    assert free.trajectory is not None
+    tcp = planner.scene().chain.tcp_poses(free.trajectory.positions)
+    turned = ends[0][:3, :3].T @ tcp[:, :3, :3]
+    assert np.abs(np.arctan2(turned[:, 2, 1], turned[:, 1, 1])).max() <= 0.4 + 1e-3
+    assert free.report.energy <= fixed.report.energy * 1.001
+    assert free.configurations > fixed.configurations
+
+
 def test_the_same_path_gives_the_same_bytes(planner: Planner) -> None:
     first, second = planned(planner, PATHS["line"]), planned(planner, PATHS["line"])
     assert first.trajectory == second.trajectory

@@ -15,8 +15,9 @@ class CartesianPlan:
     """trajectory None unless the status is SUCCESS.
 
     tool_error [m]: a bound of the tcp's distance from the path; rotation_error [rad]; speed_deviation: share
-    of the tool's speed that it is off, without approach, retract and changes of speed; lengths (K,) m along
-    the path at which its parts end; configurations: how many were looked at.
+    of the tool's speed that it is off, without approach, retract and changes of speed; lengths (K,) m at
+    which its segments end, counted from the beginning of the approach; configurations: how many were looked
+    at.
     """
 
     status: Status

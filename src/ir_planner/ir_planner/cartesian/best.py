@@ -99,7 +99,7 @@ def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRef
     driven: list[DrivenPath] = []
     reason: PathRefusedError | None = None
     for chain in found:
-        if len(driven) == COMPARED:
+        if len(driven) == COMPARED or (driven and asked.context.work.exhausted):
             break
         try:
             driven.append(_timed(asked, chain))

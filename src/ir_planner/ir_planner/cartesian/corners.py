@@ -24,8 +24,7 @@ _SAMPLES = 33
 @dataclass(frozen=True)
 class Joint:
     """radius [m], 0: the tool stops; angle [rad] of the corner; leaves, turns: by what smoothing leaves the
-    parts [m, rad], 0 where the corner is rounded as
-    asked for.
+    parts [m, rad]; rounded: as asked for, which leaves them on purpose.
     """
 
     radius: float

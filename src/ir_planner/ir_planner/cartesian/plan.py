@@ -65,8 +65,9 @@ def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: C
         )
     trajectory = found.movement.trajectory
     status, info = Status.success(), context.journal.info(trajectory.positions[0], context.joint_names)
+    lengths = whole.ends[1:][[part.kept for part in whole.parts]]
     return CartesianPlan(
-        status, info, found.movement.report, trajectory, *_values(kept), whole.ends[1:], len(layers.q)
+        status, info, found.movement.report, trajectory, *_values(kept), lengths, len(layers.q)
     )
 
 
