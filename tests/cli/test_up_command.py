@@ -11,7 +11,9 @@ import time
 from pathlib import Path
 
 import pytest
+from rclpy.node import Node
 
+from ir_cli import up_command
 from ir_cli.errors import CommandError
 from ir_cli.main import main
 from ir_cli.node_parameters import given_parameters
@@ -155,3 +157,18 @@ def test_what_makes_no_sense_is_refused_before_anything_starts(
     said = capsys.readouterr()
     assert said.err.startswith("ir: ")
     assert said.out == ""
+
+
+@pytest.fixture
+def ros_discovery_range() -> str:
+    """The command looks from a context of its own."""
+    return "LOCALHOST"
+
+
+def test_nodes_that_are_there_already_are_listed(ros_context, ros_executor, monkeypatch) -> None:
+    ros_executor.add_node(Node("ir_planner", context=ros_context, namespace="cell_7"))
+    monkeypatch.setattr(up_command, "DISCOVERY_SECONDS", 60.0)  # it ends as soon as they are seen
+    with pytest.raises(CommandError, match=r"there already: /cell_7/ir_planner\. .*another --namespace"):
+        up_command._refuse_beside("/cell_7")
+    monkeypatch.setattr(up_command, "DISCOVERY_SECONDS", 0.1)
+    up_command._refuse_beside("/cell_8")

@@ -30,7 +30,7 @@ from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import PathError, ReadError, WriteError
 from ir_recorder.listen.topics import GLOBAL
-from ir_recorder.node import POLL_PERIOD, RecorderNode
+from ir_recorder.node import COMMAND_NODE, POLL_PERIOD, RecorderNode
 from ir_recorder.read.raw import read_raw
 from ir_recorder.settings import RecorderSettings
 from ir_recorder.write.worker import FLUSH_PERIOD
@@ -444,3 +444,17 @@ def test_recordings_leave_no_objects_behind(
 
     first = [record() for _ in range(3)][-1]
     assert [record() for _ in range(4)][-1] - first < 2 * len(topics)
+
+
+def test_a_command_beside_the_recorder_has_a_name_of_its_own_and_offers_no_services(
+    recorder: RecorderNode, settings: RecorderSettings, ros_context: Any, ros_executor: Any, ros_node: Any
+) -> None:
+    command = ros_executor.add_node(RecorderNode(settings, name=COMMAND_NODE, context=ros_context))
+    assert command.get_name() != recorder.get_name()
+
+    def offered(node: str) -> set[str]:
+        found = ros_node.get_service_names_and_types_by_node(node, "/")
+        return {types[0] for _, types in found if types[0].startswith("ir_msgs/")}
+
+    assert offered(recorder.get_name()) == {"ir_msgs/srv/StartRecording", "ir_msgs/srv/StopRecording"}
+    assert offered(command.get_name()) == set()

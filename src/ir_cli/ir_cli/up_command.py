@@ -32,6 +32,7 @@ LOOK_SECONDS = 0.5
 """Between two looks at the processes: a node that ended is reported within this."""
 DISCOVERY_SECONDS = 1.0
 """For nodes that are there already to be seen; discovery on one machine takes tenths of a second."""
+POLL_SECONDS = 0.05
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -121,8 +122,10 @@ def _refuse_beside(namespace: str) -> None:
     """CommandError with a list where nodes of the same names are in the graph."""
     names = {f"{namespace}/{name}" for name in NODES}
     with Client(node_name="ir_up") as client:
-        time.sleep(DISCOVERY_SECONDS)
-        there = sorted(names & set(client.graph.nodes()))
+        deadline, there = time.monotonic() + DISCOVERY_SECONDS, list[str]()
+        while not there and time.monotonic() < deadline:
+            time.sleep(POLL_SECONDS)
+            there = sorted(names & set(client.graph.nodes()))
     if there:
         raise CommandError(
             f"there already: {', '.join(there)}. End them, or choose another --namespace or --domain"
