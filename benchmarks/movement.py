@@ -3,9 +3,9 @@
     python benchmarks/movement.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
 Every task of the cells, there and back, apart by whether its straight movement (PTP) is free. Processor time,
-the least of the repetitions (the seed stays). Coarse: the first free path, and of its coarse solution and
-those of all guesses the cheapest; `first` is the coarse solution of the first path alone. Their costs, with
-the penalties of a coarse solution, are held against J of the answer.
+the least of the repetitions (the seed stays). Coarse: an estimate from the straight segment where it is free,
+else from guesses of all classes; `first`: from the first free path alone. Their costs, with the penalties of
+a coarse solution, are held against J of the answer.
 """
 
 from __future__ import annotations
@@ -21,15 +21,14 @@ from _results import Claim, at_least, at_most, command_line, finish, line_of
 
 from ir_kernels.collision import FREE
 from ir_planner.checks import FreeSpace
-from ir_planner.optimize import Portfolio, Refinement
+from ir_planner.optimize import Refinement, estimate
 from ir_planner.planner import Planner
-from ir_planner.regional.exploration import GUESS, first_paths
+from ir_planner.regional.exploration import first_paths
 from ir_planner.request import Context, Work
 from ir_planner.request.goals import Goal
 from ir_planner.search import Ends, guesses
 
 NEAR = 1.05  # of J of the answer
-FEW = 8  # guesses beside a free segment
 
 
 @dataclass(frozen=True)
@@ -57,20 +56,22 @@ def least(repetitions: int, function: Callable[[], float]) -> tuple[float, float
 
 
 def coarse(planner: Planner, task: Task, *, alone: bool) -> float:
-    """Cost of the cheapest coarse solution, `alone` of the first free path."""
+    """Cost of the coarse solution: `alone` of the straight segment where it is free, of the first free path
+    where not; else of the cheapest of guesses where the segment is not free.
+    """
     options, cell = asked(task), task.scene.cell
     work = Work(planner.settings.max_iterations, time.monotonic() + UNHURRIED, time.monotonic)
     context, searches = Context.of(task.scene, options, work), planner.settings.searches
     ends, space = Ends(task.start, task.goal[None]), FreeSpace.of(task.scene, task.margin, work)
+    segment = np.stack([task.start, task.goal])
+    if space.edges_free(segment[:1], segment[1:])[0]:
+        return estimate([segment], Refinement(context)).cost
+    if not alone:
+        looks = guesses(task.start, task.goal, np.array(cell.park), space.low, space.high)
+        return estimate(looks, Refinement(context)).cost
     paths = first_paths(ends, space, context, searches, briefly=True)
     paths = paths or first_paths(ends, space, context, searches, briefly=False)
-    portfolio = Portfolio(space, Refinement(context))
-    portfolio.add(paths[0][0], [path for _, path in paths])
-    if not alone:
-        free = any(len(path) == 2 for _, path in paths)
-        looks = guesses(task.start, task.goal, np.array(cell.park), space.low, space.high)
-        portfolio.descend(GUESS, looks[:FEW] if free else looks, 1.3 if free else np.inf)
-    return portfolio.candidates[0].solution.cost
+    return estimate([path for _, path in paths][:1], Refinement(context)).cost
 
 
 def answered(planner: Planner, task: Task) -> float:

@@ -1,6 +1,7 @@
 """Optimisation: path and time scaling are optimised together to certified movements; several are compared."""
 
 from ir_planner.optimize.descents import Descents, path_of
+from ir_planner.optimize.estimate import estimate
 from ir_planner.optimize.movement_over import movement_over
 from ir_planner.optimize.near import optimised_near
 from ir_planner.optimize.path_timing import QUICK_TIMING, PathTiming, TimingEffort, along_its_path
@@ -22,6 +23,7 @@ __all__ = [
     "Refinement",
     "TimingEffort",
     "along_its_path",
+    "estimate",
     "movement_over",
     "optimised_near",
     "path_of",

@@ -15,6 +15,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
+from ir_planner.optimize.estimate import first_looks
 from ir_planner.optimize.refinement import Refinement, Solution
 from ir_planner.optimize.stages import QUICK, THOROUGH, Effort
 from ir_planner.search import COARSE, apart, fewest_corners, first_different
@@ -71,7 +72,7 @@ class Portfolio:
         differ as far as free paths are, if they cost less than `worth` times the best candidate; the number
         of them that are new.
         """
-        looks = list(zip(self.refinement.coarse_of_all(guesses, _FIRST_LOOK), guesses, strict=True))
+        looks = list(zip(first_looks(guesses, self.refinement, _FIRST_LOOK), guesses, strict=True))
         if self.candidates and np.isfinite(worth):
             most = worth * self.candidates[0].solution.cost
             looks = [look for look in looks if look[0].cost < most]

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ir_kernels import SplineCost, SplineStarts
+from ir_kernels import SplineCost
 from ir_kernels.spline import RowArray
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
@@ -57,7 +57,7 @@ _STIFFER = 10.0  # penalties where a duration is requested: a second may be wort
 _LEAST_COST = 1.0  # J: of a movement that takes next to nothing
 _ZONE_SAMPLES = 4  # per interval
 _WITHIN_REACH = 1.06  # of a requested duration: from there more effort may get to it
-_SHARE_OF_WORK = 0.4  # of what is left, that one descent may take: finer ones and repairs come after it
+SHARE_OF_WORK = 0.4  # of what is left, that one descent may take: finer ones and repairs come after it
 EDGES_PER_INTERVAL = 0.25  # work of one evaluation, in certified edges: about what it takes beside one
 
 
@@ -104,30 +104,9 @@ class Refinement:
 
     def coarse_from(self, spline: UniformSpline, path: FloatArray, evaluations: int) -> Solution:
         """The coarse solution by descent from a spline of any origin; path (M, n): what it came from."""
-        return self._optimised(self._begun(spline, evaluations), path)
+        return self._optimised(self.begun(spline, evaluations), path)
 
-    def coarse_of_all(self, paths: list[FloatArray], evaluations: int) -> list[Solution]:
-        """Coarse solutions near paths (M, n), which need not be free; in one call where all have one cost."""
-        work, options = self.context.work, self.context.options
-        most = len(paths) * evaluations * MOST * EDGES_PER_INTERVAL
-        alike = len(self._kept) == 1 and options.objective != "movement_cost"
-        if not alike or most > _SHARE_OF_WORK * work.left:
-            return [self.coarse(path, evaluations) for path in paths]
-        work.check()
-        begin = self._begun(along_path(paths[0], FEWEST, 1.0), evaluations)
-        starts = SplineStarts(SPACING, SLOWER, FEWEST, MOST, options.duration)
-        found = self._cost(begin, paths[0]).descend_along(
-            paths, starts, evaluations=evaluations, tolerance=begin.stage.tolerance
-        )
-        solutions = [
-            replace(begin, spline=UniformSpline(each.control, each.interval), cost=each.value)
-            for each in found
-        ]
-        for each, solution in zip(found, solutions, strict=True):
-            work.spend(int(np.ceil(each.evaluations * solution.spline.intervals * EDGES_PER_INTERVAL)))
-        return solutions
-
-    def _begun(self, spline: UniformSpline, evaluations: int) -> Solution:
+    def begun(self, spline: UniformSpline, evaluations: int) -> Solution:
         """A spline about to descend with so many evaluations of the first stage."""
         speed = SPEED_MARGINS[0] if self.context.options.duration > 0.0 else 1.0
         stage = replace(QUICK.stages[0], evaluations=evaluations)
@@ -186,7 +165,7 @@ class Refinement:
 
     def _refined(self, solution: Solution, path: FloatArray, effort: Effort) -> Movement | None:
         for stage in effort.after(solution.stage.level):
-            solution = self._staged(solution, decisive(stage, effort.last, self._rounding(solution)), path)
+            solution = self.staged(solution, decisive(stage, effort.last, self._rounding(solution)), path)
             if stage.level == effort.last.level and solution.stage.stiffness == effort.last.stiffness:
                 break
         solution = self._as_fast_as_requested(solution, path)
@@ -199,7 +178,7 @@ class Refinement:
             solution = self._repaired(self._with_larger_margin(solution, found), path, _REPAIR_EVALUATIONS)
         return None
 
-    def _staged(self, solution: Solution, stage: Stage, path: FloatArray) -> Solution:
+    def staged(self, solution: Solution, stage: Stage, path: FloatArray) -> Solution:
         """The descent of a stage, on a spline as fine as it asks for."""
         spline = solution.spline
         for _ in range(stage.level - solution.stage.level):
@@ -235,10 +214,10 @@ class Refinement:
     def _optimised(self, solution: Solution, path: FloatArray) -> Solution:
         work, robot, spline = self.context.work, self.context.scene.cell.robot, solution.spline
         work.check()
-        affordable = int(_SHARE_OF_WORK * work.left / (EDGES_PER_INTERVAL * spline.intervals))
+        affordable = int(SHARE_OF_WORK * work.left / (EDGES_PER_INTERVAL * spline.intervals))
         if affordable < 1:
             return solution
-        found = self._cost(solution, path).descend(
+        found = self.cost(solution, path).descend(
             spline.control,
             spline.interval,
             self._rows(spline),
@@ -251,7 +230,8 @@ class Refinement:
         control = np.minimum(np.maximum(found.control, robot.position_min), robot.position_max)
         return replace(solution, spline=UniformSpline(control, found.interval), cost=found.value)
 
-    def _cost(self, solution: Solution, path: FloatArray) -> SplineCost:
+    def cost(self, solution: Solution, path: FloatArray) -> SplineCost:
+        """What a solution on a path (M, n) is optimised for."""
         weights = objective_weights(self.context, path)
         stage, stiffer = solution.stage, _STIFFER if self.context.options.duration > 0.0 else 1.0
         penalty = weights.power * max(stiffer * stage.stiffness, _STIFFNESS)
