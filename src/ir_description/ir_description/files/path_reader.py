@@ -60,7 +60,7 @@ def _segment(item: Item) -> CartesianSegment:
 def path_lines(
     named: CellPath, pose: Callable[[FloatArray], str], number: Callable[[float], str]
 ) -> Iterator[str]:
-    """The lines of a path in a cell file; `pose` writes the keys of a pose, `number` a number."""
+    """The lines of a path in a cell file; `pose` writes the keys of a pose (4, 4), `number` a number."""
     path = named.path
     yield f"name: {named.name}"
     for field in _SETTINGS:

@@ -12,7 +12,7 @@ from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.curves import extremes
 from ir_planner.scene import PlanningScene
 
-_BETWEEN = 1e-5  # m that the bound may add between samples
+_BETWEEN = 2e-5  # m that the bound may add between samples
 _STEP_MAX, _STEP_MIN = 5e-3, 1e-4  # s
 _PIECE = 20_000
 
