@@ -7,6 +7,14 @@ Each study is a room; they share nothing but the errors.
 """
 
 from ir_studies.arena import ArenaSettings, read_settings, run_arena
-from ir_studies.errors import StudyError
+from ir_studies.errors import FolderError, SettingsError, StudyError, WorkerError
 
-__all__ = ["ArenaSettings", "StudyError", "read_settings", "run_arena"]
+__all__ = [
+    "ArenaSettings",
+    "FolderError",
+    "SettingsError",
+    "StudyError",
+    "WorkerError",
+    "read_settings",
+    "run_arena",
+]

@@ -91,7 +91,7 @@ def energy_and_time(planners: Sequence[str], runs: Sequence[Run]) -> dict[str, t
     """Mean seconds and joules at the mains of each planner over the questions that all of them solved."""
     by_planner: dict[str, dict[Question, list[Run]]] = {planner: {} for planner in planners}
     for run in runs:
-        if run.solved:
+        if run.solved and run.entry.planner in by_planner:
             by_planner[run.entry.planner].setdefault(run.entry.question, []).append(run)
     solving = [own for own in by_planner.values() if own]
     common = set.intersection(*(set(own) for own in solving)) if solving else set()

@@ -51,7 +51,8 @@ class Results:
         lines = whole.splitlines()
         try:
             found = json.loads(lines[0]) if lines else head
-            if content and not (isinstance(found, dict) and found.get("format") == FORMAT):
+            begun = lines or json.dumps(head).encode().startswith(content)
+            if not (begun and isinstance(found, dict) and found.get("format") == FORMAT):
                 raise ValueError
             self.rows = {row["key"]: row for row in map(json.loads, lines[1:]) if "key" in row}
             cells = [cell for row in map(json.loads, lines[1:]) for cell in row.get("cells", {}).items()]

@@ -1,0 +1,34 @@
+"""An arena whose workers plan nothing."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ir_studies.arena import ArenaSettings, Finished, run_arena
+
+WORKER = Path(__file__).with_name("fake_worker.py")
+Fought = Callable[..., Finished]
+
+
+@pytest.fixture
+def command(tmp_path: Path) -> tuple[str, ...]:
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    return sys.executable, "-S", str(WORKER), str(marks)
+
+
+@pytest.fixture
+def fought(tmp_path: Path, command: tuple[str, ...]) -> Fought:
+    """Runs an arena of these planners in a folder."""
+
+    def run(*planners: str, folder: str = "out", seeds: int = 2, **more: object) -> Finished:
+        settings = ArenaSettings(
+            cells=("open",), planners=planners, tasks=("home->p1",), seeds=seeds, seconds=0.01, hang_after=2.0
+        )
+        return run_arena(settings, tmp_path / folder, 2, command=command, **more)  # type: ignore[arg-type]
+
+    return run

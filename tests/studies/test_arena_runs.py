@@ -1,0 +1,150 @@
+"""Runs that hang, die or are interrupted: the table is complete, and the same after a resume."""
+
+from __future__ import annotations
+
+import csv
+import os
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ir_studies.arena import ArenaSettings, Finished, run_arena
+from ir_studies.arena.entries import Entry
+from ir_studies.arena.results import NAME
+from ir_studies.errors import FolderError, WorkerError
+
+Fought = Callable[..., Finished]
+
+
+def table(finished: Finished) -> list[dict[str, str]]:
+    """Rows of table.csv."""
+    with finished.files[0].open() as file:
+        return list(csv.DictReader(file))
+
+
+def outcomes(finished: Finished) -> dict[str, set[object]]:
+    """What became of the runs, by planner."""
+    return {
+        planner: {run.row["outcome"] for run in finished.runs if run.entry.planner == planner}
+        for planner in dict.fromkeys(run.entry.planner for run in finished.runs)
+    }
+
+
+def test_what_hangs_is_cut_and_what_dies_is_tried_once_more(fought: Fought) -> None:
+    finished = fought("sbl", "tree", "prm", "rrt")
+    assert outcomes(finished) == {"sbl": {"answered"}, "tree": {"answered"}, "prm": {"died"}, "rrt": {"cut"}}
+    assert [row["solved"] for row in table(finished)] == ["1", "1", "0", "0"] * 2
+    lost = {run.row["message"] for run in finished.runs if not run.solved}
+    assert lost == {"twice the process died", "no answer within 2.01 s"}
+
+
+def test_interrupted_and_resumed_it_gives_the_same_table(fought: Fought, tmp_path: Path) -> None:
+    made: list[str] = []
+
+    def interrupt(done: int, of: int, entry: Entry) -> None:
+        made.append(entry.key)
+        if len(made) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fought("sbl", "genetic", seeds=4, progress=interrupt)
+    with (tmp_path / "out" / NAME).open("ab") as file:  # as a line that power loss cut
+        file.write(b'{"key": "sbl|open|home->p1|3||sync')
+    again: list[str] = []
+    resumed = fought("sbl", "genetic", seeds=4, progress=lambda done, of, entry: again.append(entry.key))
+    assert len(again) == len(set(again)) == 8 - 3
+    assert set(made).isdisjoint(again)
+    whole = fought("sbl", "genetic", seeds=4, folder="other")
+    assert table(resumed) == table(whole)
+
+
+def test_more_seeds_and_planners_are_added_to_a_folder(fought: Fought) -> None:
+    fought("sbl", seeds=1)
+    again: list[str] = []
+    finished = fought("sbl", "genetic", progress=lambda done, of, entry: again.append(entry.key))
+    assert len(again) == 3
+    assert len(finished.runs) == 4
+
+
+def test_a_folder_of_other_settings_is_refused(fought: Fought, tmp_path: Path) -> None:
+    fought("sbl")
+    other = ArenaSettings(cells=("open",), planners=("sbl",), seconds=2.0)
+    with pytest.raises(FolderError, match=r"results with seconds 0.01, the settings have 2.0"):
+        run_arena(other, tmp_path / "out")
+
+
+def test_two_arenas_in_one_folder_are_one_too_many(fought: Fought) -> None:
+    refused: list[str] = []
+
+    def second(done: int, of: int, entry: Entry) -> None:
+        with pytest.raises(FolderError) as error:
+            fought("sbl")
+        refused.append(str(error.value))
+
+    fought("sbl", seeds=1, progress=second)
+    assert "is in use by another arena" in refused[0]
+
+
+@pytest.mark.parametrize("content", [b"\x00\xff", b"hello\n", b"[]\n", b'{"format": "ir_cell/1"}\n'])
+def test_a_file_of_something_else_is_refused_and_kept(fought: Fought, tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "out" / NAME
+    path.parent.mkdir()
+    path.write_bytes(content)
+    with pytest.raises(FolderError, match="holds no results of an arena"):
+        fought("sbl")
+    assert path.read_bytes() == content
+
+
+def test_a_folder_that_cannot_be_written_is_named(fought: Fought, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(FolderError, match="can't be written"):
+        fought("sbl")
+
+
+def test_workers_that_never_start_end_the_arena(tmp_path: Path) -> None:
+    settings = ArenaSettings(cells=("open",), tasks=("home->p1",), seeds=5)
+    with pytest.raises(WorkerError, match="a worker died before it could start"):
+        run_arena(settings, tmp_path, 2, command=("false",))
+
+
+def test_no_worker_outlives_the_arena(fought: Fought, tmp_path: Path) -> None:
+    def stop(done: int, of: int, entry: Entry) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fought("sbl", "rrt", progress=stop)
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def test_the_database_has_what_planner_arena_asks_for(fought: Fought) -> None:
+    finished = fought("sbl", "prm")
+    with sqlite3.connect(finished.files[1]) as database:
+        names = dict(database.execute("SELECT id, name FROM plannerConfigs"))
+        solved = database.execute("SELECT plannerid, solved, solution_cost, status FROM runs").fetchall()
+        assert {(names[planner], *rest) for planner, *rest in solved} == {
+            ("sbl", 1, 1000.0, 0),
+            ("sbl", 1, 1100.0, 0),
+            ("prm", 0, None, 1),
+        }
+        progress = database.execute("SELECT time, best_cost FROM progress ORDER BY runid, time").fetchall()
+        assert progress == [(0.1, 2000.0), (0.2, 1000.0), (0.1, 2200.0), (0.2, 1100.0)]
+        assert database.execute("SELECT name, timelimit, runcount FROM experiments").fetchall() == [
+            ("open home->p1 synchronous", 0.01, 2)
+        ]
+        enums = dict(database.execute("SELECT value, description FROM enums WHERE name = 'status'"))
+        assert enums == {0: "answered", 1: "died", 2: "cut"}
+
+
+def test_the_page_holds_all_and_fetches_nothing(fought: Fought) -> None:
+    finished = fought("sbl", "prm", "genetic")
+    page = finished.files[2].read_text()
+    assert all(planner in page for planner in ("sbl", "prm", "genetic"))
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert "https://" not in page
+    assert "{{" not in page
+    assert "<b>2</b> of 2" in page
+    assert "<b>0</b> of 2" in page
+    assert "NaN" not in page.partition('id="data">')[2].partition("</script>")[0]
