@@ -1,6 +1,7 @@
 """Does every planner solve what it is asked, certified, and is an arena that was killed the same afterwards?
 
-    python benchmarks/studies.py [--cell NAME]... [--seeds N] [--planner NAME]... [--coal N] [--quick] [--json FILE]
+    python benchmarks/studies.py [--cell NAME]... [--seeds N] [--planner NAME]... [--coal N] [--quick]
+                                 [--json FILE]
 
 Every planner is asked for every task of the cells, there and back, until it has solved it with one of the
 seeds; Coal looks at its answers every 0.0005 rad, at so many per planner and cell. Then `ir arena` runs the

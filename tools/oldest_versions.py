@@ -26,7 +26,7 @@ LEFT_OUT = {
     "coal": "its wheels need NumPy 2",
     "pin": "its wheels need NumPy 2",
     "casadi": "only for benchmarks",
-    "ompl": "only for benchmarks",
+    "ompl": "an extra, tested once",
     "toppra": "only for benchmarks",
     "colcon-common-extensions": "builds with colcon are tested once",
     "ruff": "checks are made once",
@@ -44,6 +44,7 @@ NEEDS = re.compile(
     r"pybullet|pinocchio|\bcoal\b|coal_scene|oracles"  # their modules
     r"|sim_driver.node|SimDriver|program_runner|run_program"  # nodes that drive on physics
     r"|make_simulation\(cell\)|typical_plant"  # on physics
+    r"|with_ompl"
 )
 """Words of the test files that are left out with LEFT_OUT."""
 _ROS_OF_ANOTHER = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "AMENT_PREFIX_PATH")

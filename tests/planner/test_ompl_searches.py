@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from asking import planned
 
 from ir_kernels.collision import FREE
-from ir_planner import CancelledError, RequestError
+from ir_planner import CancelledError, PlanOptions, RequestError
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
@@ -90,3 +91,14 @@ def test_what_ompl_answers_is_never_returned_unchecked(
     monkeypatch.setattr(adapter, "asked", lambda problem, work: Outcome(straight, 1))
     (path,) = with_ompl.Rrt().find(ends, space, 1, space.work).paths
     assert (space.certificates(path[:-1].copy(), path[1:].copy()).verdict == FREE).all()
+
+
+@pytest.mark.parametrize("allowed", [1, 40, 700])
+def test_max_iterations_is_never_exceeded(allowed: int, scene_of: SceneOf) -> None:
+    scene = scene_of("table_columns")
+    task = scene.cell.tasks[0]
+    work = Work(allowed, 1.0, lambda: 0.0, improvement=allowed)
+    options = PlanOptions(planner_id="bkpiece")
+    plan = planned(np.array(task.start), np.array(task.goal), scene, options, work)
+    assert plan.info.iterations <= allowed
+    assert not plan.info.truncated

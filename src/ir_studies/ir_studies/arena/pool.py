@@ -33,7 +33,8 @@ class _Worker:
     """One process, and the run that it makes."""
 
     def __init__(self, command: Sequence[str], settings: ArenaSettings) -> None:
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
+        pipe = subprocess.PIPE  # a group of its own: Ctrl-C is for the arena, which ends its workers
+        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, bufsize=0, process_group=0)
         self.job: _Job | None = None
         self.ready, self._text = False, b""
         self.late = time.monotonic() + _START_S

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from ir_studies.arena.entries import Entry, entries
@@ -12,6 +13,7 @@ from ir_studies.arena.pool import COMMAND, Pool
 from ir_studies.arena.results import Results
 from ir_studies.arena.settings import ArenaSettings
 from ir_studies.arena.table import Run
+from ir_studies.errors import StudyError
 
 Progress = Callable[[int, int, Entry], None]
 
@@ -37,6 +39,8 @@ def run_arena(
 
     Raises StudyError. progress: called with the number of runs made, that of all, and the last one.
     """
+    if parquet and find_spec("pyarrow") is None:
+        raise StudyError("a Parquet file needs pyarrow: pip install pyarrow")
     wanted = entries(settings)
     with Results(Path(folder), settings) as results:
         missing = [entry for entry in wanted if entry.key not in results.rows]
