@@ -49,4 +49,4 @@ def could_be_carried(choice: Choice, count: int) -> float:
 
 
 def _above(cost: float, bound: float) -> float:
-    return 100.0 * max(cost - bound, 0.0) / cost if cost > 0.0 else 0.0
+    return 100.0 * max(cost - max(bound, 0.0), 0.0) / cost if cost > 0.0 else 0.0

@@ -16,7 +16,7 @@ from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.gap import cycle_gap, free_gap
 from ir_planner.program.ladder import Ladder
-from ir_planner.program.movements import Movements, cost_of, rates_of
+from ir_planner.program.movements import Movements, Near, cost_of, rates_of
 from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS
@@ -73,7 +73,11 @@ def best_answer(request: ProgramRequest, route: Route, context: Context, progres
 def chosen(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Choice:
     """The cheapest chain of configurations. Raises StageError where there is none."""
     layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
-    movements = Movements(route, layers, context, request.settings.searches)
+    searches = request.settings.searches
+    near = None
+    if context.options.objective == "time":  # the fastest lines are found from slower ones
+        near = Near(scaling=Movements(route, layers, context.asking("time_and_energy"), searches))
+    movements = Movements(route, layers, context, searches, near)
     improvement = min(request.settings.improvement_iterations, _CHOOSING)
     chain = cheapest_chain(movements, improvement, progress)
     return Choice(request, Ladder(movements, improvement), chain)
