@@ -77,6 +77,16 @@ class DynamicsModel:
         """Motor torque (N, n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
         return np.asarray(self._run("inverse_dynamics", q=q, qd=qd, qdd=qdd))
 
+    def inverse_dynamics_at(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """`inverse_dynamics` of one state, float64 arrays (n,), for who needs it a thousand times a second:
+        half the time.
+        """
+        if self._core is not None and q.shape == qd.shape == qdd.shape == (self.n,):
+            torque, all_finite = self._core.inverse_dynamics(q[None], qd[None], qdd[None])
+            if all_finite:
+                return np.asarray(torque[0])
+        return np.asarray(self.inverse_dynamics(q[None], qd[None], qdd[None])[0])
+
     def inverse_dynamics_single(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
         """`inverse_dynamics` computed in single precision, in half the time; 1e-5 of the largest torque
         exact.

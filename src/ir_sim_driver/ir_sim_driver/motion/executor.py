@@ -171,7 +171,7 @@ class Executor:
             label,
             max(0, round(delay / self._dt)),
             -1.0 if path_tolerance.has_velocity else quiet,
-            self._still,
+            np.zeros(len(self._still)),
         )
         # a route from rest starts with speed zero, so path time may start at once; one in motion carries on
         self._speed.value = 1.0 if moving else 0.0
@@ -242,17 +242,18 @@ class Executor:
     def supervise(self, robot: Backend) -> None:
         """Compare the robot with the command after the step: tube, tolerances, end."""
         q, run = robot.q, self._run
-        error, bound = self._still, 0.0
+        error, size, bound = self._still, self._still, 0.0
         if q is not self.command:
             error = self.command - q
-            bound = self._tool.bound(error)
+            size = np.abs(error)
+            bound = self._tool.bound(size)
         self.deviation = bound if bound <= EXACT_FROM else self._tool.deviation(self.command, q)
         if run is None:
             return
         if self.deviation > run.deviation:
             run.deviation = self.deviation
         if bound > 0.0:
-            run.error = np.maximum(run.error, np.abs(error))
+            np.maximum(run.error, size, out=run.error)
         if not run.stopping:
             sentence = "" if bound <= run.quiet else self._broken(run, error, robot)
             if sentence:

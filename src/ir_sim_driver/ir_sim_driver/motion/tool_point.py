@@ -41,9 +41,9 @@ class ToolPoint:
         positions: FloatArray = self.chain.tcp_poses(q)[:, :3, 3]
         return positions
 
-    def bound(self, error: FloatArray) -> float:
-        """Upper bound [m] of the tool's deviation when the joints are off by error (n,)."""
-        return float(self._reach @ np.abs(error))
+    def bound(self, size: FloatArray) -> float:
+        """Upper bound [m] of the tool's deviation when the joints are off by as much as size (n,) >= 0."""
+        return float(self._reach.dot(size))
 
     def quiet_bound(self, tolerance: FloatArray) -> float:
         """Bound [m] below which no joint can be off by more than its tolerance (n,)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +17,6 @@ from ir_sim_driver.plant.bullet_bodies import bodies_of, urdf_of
 GRAVITY = 9.80665
 SPEED_GUARD = 50.0
 """Speed [rad/s] that all joints together do not reach: beyond it the physics has diverged."""
-_GUARD = SPEED_GUARD * SPEED_GUARD
 
 
 class BulletArm:
@@ -30,6 +30,7 @@ class BulletArm:
         self._base = base_pose
         self._gravity = (base_pose[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
         self._bullet, self._client = _pybullet(), -1
+        self._errors = (self._bullet.error, SystemError, ValueError, TypeError)  # it raises what C leaves
         self._robot, self._dt = robot, dt
         self._loads: tuple[Load, ...] = ()
         self._still = [0.0] * robot.n
@@ -50,15 +51,26 @@ class BulletArm:
         self._build(urdf_of(self._robot, bodies_of(self._robot, self._loads)))
         self.inverse_dynamics(q, self._still, self._still)
 
-    def mass_matrix(self, q: Sequence[float]) -> FloatArray:
-        """H (n, n) at q, without rotor inertia."""
-        return np.array(self._call(self._bullet.calculateMassMatrix, self._body, q))
+    def mass_matrix(self, q: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+        """Rows of H (n, n) at q, without rotor inertia."""
+        try:
+            rows: tuple[tuple[float, ...], ...] = self._bullet.calculateMassMatrix(
+                self._body, q, physicsClientId=self._client
+            )
+        except self._errors as error:
+            raise _failed(error) from error
+        return rows
 
     def inverse_dynamics(
         self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]
     ) -> tuple[float, ...]:
         """Torque H qdd + h (n,) on the links."""
-        torque: tuple[float, ...] = self._call(self._bullet.calculateInverseDynamics, self._body, q, qd, qdd)
+        try:
+            torque: tuple[float, ...] = self._bullet.calculateInverseDynamics(
+                self._body, q, qd, qdd, physicsClientId=self._client
+            )
+        except self._errors as error:
+            raise _failed(error) from error
         return torque
 
     def link_com_position(self, link: int) -> FloatArray:
@@ -77,21 +89,21 @@ class BulletArm:
         for joint, position, speed in zip(self._joints, q, qd, strict=True):
             self._call(self._bullet.resetJointState, self._body, joint, position, speed)
 
-    def advance(self, torque: Sequence[float]) -> tuple[list[float], list[float]]:
+    def advance(self, torque: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Make a step with these torques on the links: position (n,), and speed (n,) over the step."""
-        states = self._call(self._step, torque)
-        speeds = [state[1] for state in states]
-        if not sum([v * v for v in speeds]) < _GUARD:  # NaN does not pass either
+        bullet, body, joints, client = self._bullet, self._body, self._joints, self._client
+        try:
+            bullet.setJointMotorControlArray(
+                body, joints, bullet.TORQUE_CONTROL, forces=torque, physicsClientId=client
+            )
+            bullet.stepSimulation(physicsClientId=client)
+            states = bullet.getJointStates(body, joints, physicsClientId=client)
+        except self._errors as error:
+            raise _failed(error) from error
+        positions, speeds, _, _ = zip(*states, strict=True)
+        if not math.hypot(*speeds) < SPEED_GUARD:  # NaN does not pass either
             raise BackendError(f"the physics has diverged: joints move faster than {SPEED_GUARD:g} rad/s")
-        return [state[0] for state in states], speeds
-
-    def _step(self, torque: Sequence[float], physicsClientId: int) -> Any:  # as in PyBullet
-        bullet, body, joints, client = self._bullet, self._body, self._joints, physicsClientId
-        bullet.setJointMotorControlArray(
-            body, joints, bullet.TORQUE_CONTROL, forces=torque, physicsClientId=client
-        )
-        bullet.stepSimulation(physicsClientId=client)
-        return bullet.getJointStates(body, joints, physicsClientId=client)
+        return positions, speeds
 
     def _build(self, text: str) -> None:
         """Make a new server: the inverse dynamics of a removed body live on in the old one. Where that is not
@@ -134,8 +146,12 @@ class BulletArm:
     def _call(self, function: Any, *arguments: Any, **more: Any) -> Any:
         try:
             return function(*arguments, physicsClientId=self._client, **more)
-        except (self._bullet.error, SystemError, ValueError, TypeError) as error:
-            raise BackendError(f"PyBullet failed: {error}") from error  # it raises whatever C leaves behind
+        except self._errors as error:
+            raise _failed(error) from error
+
+
+def _failed(error: Exception) -> BackendError:
+    return BackendError(f"PyBullet failed: {error}")
 
 
 def _pybullet() -> Any:

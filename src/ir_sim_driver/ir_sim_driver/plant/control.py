@@ -67,6 +67,31 @@ class ControlSettings:
         check_settings(self)
 
 
+_SEEN, _GOAL, _KEPT = 0, 1, slice(2, 7)
+"""Rows (n,) that the law acts on: encoders now, command at the end of the step, what the step before left."""
+_INTEGRAL, _NOW, _CHANGE, _MEASURED = 4, 5, 6, 7
+"""Rows that it gives, behind the new values of what is kept."""
+
+
+def control_law(settings: ControlSettings, dt: float) -> FloatArray:
+    """(8, 7): what is linear in the law, over one step of dt [s], the same for every joint.
+
+    It acts on: encoders, next command; of the step before: encoders, command, commanded speed, filtered error
+    of speed, integral. It gives: these five for the next step; commanded speed now, acceleration with
+    feedback, measured speed.
+    """
+    s = settings
+    seen, goal, seen_before, command, speed_before, slow_before, integral = np.eye(7)
+    measured = (seen - seen_before) / dt  # half a step old, as the commanded speed is
+    speed = (goal - command) / dt
+    acceleration = (speed - speed_before) / dt
+    slow = slow_before + dt / (s.speed_filter + dt) * (speed_before - measured - slow_before)
+    error = slow + s.position_gain * (command - seen)
+    now = speed_before + 0.5 * dt * acceleration
+    change = acceleration + s.speed_gain * (error + integral / s.integral_time)
+    return np.stack((seen, goal, speed, slow, integral + dt * error, now, change, measured))
+
+
 class ServoControl:
     """Turns commands (n,), one per step of dt [s], into motor torques at the joint (n,) [Nm].
 
@@ -77,11 +102,10 @@ class ServoControl:
         self, robot: RobotModel, dt: float, base_pose: FloatArray, settings: ControlSettings | None = None
     ) -> None:
         s = settings or ControlSettings()
-        self._dt, self._per_dt = dt, 1.0 / dt
-        self._kp, self._kv, self._per_ti = s.position_gain, s.speed_gain, 1.0 / s.integral_time
-        self._share = dt / (s.speed_filter + dt)
-        self._count: list[float] = (_TURN / s.encoder_counts / np.array(robot.gear_ratio)).tolist()
+        self._law = control_law(s, dt)
+        self._count: FloatArray = _TURN / s.encoder_counts / np.array(robot.gear_ratio)
         none = np.zeros(len(robot.joint_names))
+        self._rows: FloatArray = np.zeros((7, len(none)))
         self._bare = replace(robot, friction_viscous=none, friction_coulomb=none)
         self._viscous: list[float] = np.array(robot.friction_viscous).tolist()
         self._coulomb: list[float] = np.array(robot.friction_coulomb).tolist()
@@ -95,41 +119,29 @@ class ServoControl:
     def reset(self, q: FloatArray) -> None:
         """Start over with a command that stands at q."""
         self.command: FloatArray = q.copy()
-        self._wanted = q.tolist()
-        self._seen = self._measured(self._wanted)
-        still = [0.0] * len(q)
-        self._speed, self._integral, self._slow = still, still, still
+        self._rows[_KEPT] = 0.0
+        self._rows[_KEPT][:2] = self._encoders(q), q
 
     def torque(self, q_next: FloatArray, q: FloatArray) -> tuple[FloatArray, bool]:
         """Torque (n,) for the step that ends with the command q_next, the robot being at q now, and whether
         the envelope has cut it.
         """
+        rows = self._rows
+        rows[_SEEN], rows[_GOAL] = self._encoders(q), q_next
+        new = self._law.dot(rows)
+        speed = new[_NOW]
+        model = self._model.inverse_dynamics_at(self.command, speed, new[_CHANGE])
         # plain floats, joint by joint: half the time of arrays this small
-        seen, goal, per_dt, half = self._measured(q.tolist()), q_next.tolist(), self._per_dt, 0.5 * self._dt
-        rows = zip(seen, self._seen, goal, self._wanted, self._speed, self._slow, self._integral, strict=True)
-        measured, speeds, slow, errors, now, change = [], [], [], [], [], []
-        for x, x_before, c_next, c, v, e_slow, integral in rows:
-            moves = (x - x_before) * per_dt  # half a step old, as the commanded speed is
-            speed = (c_next - c) * per_dt
-            faster = (speed - v) * per_dt
-            lag = e_slow + self._share * (v - moves - e_slow)
-            wrong = lag + self._kp * (c - x)
-            measured.append(moves)
-            speeds.append(speed)
-            slow.append(lag)
-            errors.append(wrong)
-            now.append(v + half * faster)
-            change.append(faster + self._kv * (wrong + self._per_ti * integral))
-        model = self._model.inverse_dynamics(self.command[None], np.array((now,)), np.array((change,)))[0]
-        friction = zip(model.tolist(), self._viscous, self._coulomb, now, strict=True)
+        friction = zip(model.tolist(), self._viscous, self._coulomb, speed.tolist(), strict=True)
         wanted = [t + viscous * v + dry * math.tanh(v * _STEEP) for t, viscous, dry, v in friction]
-        torque, cut = self._drives.limited(wanted, measured)
-        if not cut:  # else the integral would wind up
-            self._integral = [i + self._dt * e for i, e in zip(self._integral, errors, strict=True)]
-        self._seen, self._speed, self._slow = seen, speeds, slow
-        self.command, self._wanted = q_next, goal
+        torque, cut = self._drives.limited(wanted, new[_MEASURED].tolist())
+        if cut:  # else the integral would wind up
+            new[_INTEGRAL] = rows[_KEPT][_INTEGRAL]
+        rows[_KEPT] = new[:_NOW]
+        self.command = q_next
         return torque, cut
 
-    def _measured(self, q: Sequence[float]) -> list[float]:
+    def _encoders(self, q: FloatArray) -> FloatArray:
         """What the encoders say (n,) [rad]."""
-        return [round(x / count) * count for x, count in zip(q, self._count, strict=True)]
+        seen: FloatArray = np.rint(q / self._count) * self._count
+        return seen

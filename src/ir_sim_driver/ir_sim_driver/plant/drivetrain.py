@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
+from operator import gt
 
 import numpy as np
 
@@ -69,6 +70,8 @@ class Drivetrain:
     def limited(self, torque: Sequence[float], qd: Sequence[float]) -> tuple[FloatArray, bool]:
         """Torque (n,) within the envelope at the speeds qd, and whether anything was cut off."""
         result, cut = np.array(torque), False
+        if not any(map(gt, map(abs, torque), self._least)):
+            return result, cut
         for j, (t, least) in enumerate(zip(torque, self._least, strict=True)):
             if abs(t) > least:
                 limit = self._limit_of(j, abs(qd[j]))

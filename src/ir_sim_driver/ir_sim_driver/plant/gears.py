@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import add, mul
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class Gears:
 
     def heat(self, friction: Sequence[float], speed: Sequence[float]) -> None:
         """Count one step in which the friction (n,) [Nm] took place at this speed."""
-        self._heat = [heat + f * v for heat, f, v in zip(self._heat, friction, speed, strict=True)]
+        self._heat = list(map(add, self._heat, map(mul, friction, speed)))
         self.cool()
 
     def cool(self) -> None:

@@ -9,6 +9,7 @@ the links.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import add, sub
 
 import numpy as np
 from scipy.linalg.lapack import dposv
@@ -47,19 +48,20 @@ class PyBulletBackend:
         self._arm = BulletArm(plant.robot, dt, base)
         self._dt, self._n = dt, len(plant.robot.joint_names)
         self._drives, self._gears = Drivetrain(plant.robot), Gears(plant.gears, dt)
-        self._diagonal = slice(None, None, self._n + 1)
+        self._axes = range(self._n)
+        self._inertia: FloatArray = np.zeros((self._n, self._n))  # H + J_r, and what friction adds
+        self._diagonal = self._inertia.ravel()[:: self._n + 1]
+        self._rotor: list[float] = self._drives.rotor_inertia.tolist()
         self._servo = ServoControl(model, dt, base, control)
         self._motor_torque: FloatArray = np.array(plant.robot.envelope_torque)[:, 0]
         self._brake_torque: FloatArray = BRAKE_FACTOR * self._motor_torque
         self._still: FloatArray = np.zeros(self._n)
         self.disturbance: FloatArray | None = None
         self.torque, self.saturated = self._still, False
-        self.q: FloatArray = np.array(plant.robot.machine_home, dtype=np.float64)
-        self.qd = self._still
-        self._speed: FloatArray = self._still  # of Bullet, half a step old
         self._rest = [0.0] * self._n
+        self._be(np.array(plant.robot.machine_home, dtype=np.float64))
         self._load = self._rest  # through the gears to the links in the last step
-        self._speeds: list[FloatArray] = []
+        self._speeds: list[Sequence[float]] = []
         self._torques: list[FloatArray] = []
         self._stale = False  # whether Bullet's state is older than ours
         self.set_load(())
@@ -70,9 +72,14 @@ class PyBulletBackend:
         self._arm.close()
 
     @property
+    def qd(self) -> FloatArray:
+        """Present speed (n,) [rad/s]."""
+        return np.array(self._now)
+
+    @property
     def standing(self) -> bool:
         """Whether the robot stands."""
-        return all(-STANDING < x < STANDING for x in self.qd.tolist())
+        return min(self._now) > -STANDING and max(self._now) < STANDING
 
     @property
     def temperature(self) -> FloatArray:
@@ -82,7 +89,7 @@ class PyBulletBackend:
     def reset(self, q: FloatArray) -> None:
         """Stand still at q; starts the physics server again when it is gone."""
         self._arm.connect_again()
-        self.q, self.qd, self._speed = np.array(q, dtype=np.float64), self._still, self._still
+        self._be(np.array(q, dtype=np.float64))
         self._servo.reset(self.q)
         self._write()
 
@@ -90,7 +97,7 @@ class PyBulletBackend:
         """Carry these loads, in the same motion. Raises BackendError where Bullet takes none of their
         inertia.
         """
-        self._arm.carry(loads, self.q.tolist())
+        self._arm.carry(loads, self._at)
         self._servo.declare(loads if declared is None else declared)
         self._write()
 
@@ -119,10 +126,10 @@ class PyBulletBackend:
 
     def _stop(self, most: FloatArray, motors: bool) -> None:
         """Take at most this torque (n,), of motors or brakes, to stop each joint within this step."""
-        H, h = self.mass_matrix(), self._bias(self._speed)
-        stopping = self._speed * (-1.0 / self._dt)
+        H, h = self.mass_matrix(), self._bias(self._lagging)
+        stopping = np.array(self._lagging) * (-1.0 / self._dt)
         links = H @ stopping + h
-        balance = np.array(self._drives.counterbalance(self.q.tolist()))
+        balance = np.array(self._drives.counterbalance(self._at))
         wanted = links + self._drives.rotor_inertia * stopping - balance
         torque: FloatArray = np.clip(wanted, -most, most)
         self.torque, self.saturated = torque if motors else self._still, False
@@ -134,13 +141,13 @@ class PyBulletBackend:
 
     def rest(self) -> None:
         """Stay where the closed brakes hold the robot."""
-        if self._speed.any():
-            self._speed = self.qd = self._still
+        if any(self._lagging):
+            self._be(self.q)
             self._servo.reset(self.q)
             self._stale = True
         self.torque, self.saturated = self._still, False
         self._gears.cool()
-        self._speeds.append(self._still)
+        self._speeds.append(self._rest)
         self._torques.append(self._still)
 
     def work(self) -> Work:
@@ -153,11 +160,11 @@ class PyBulletBackend:
 
     def mass_matrix(self) -> FloatArray:
         """H (n, n) at the present state, without rotor inertia."""
-        return self._arm.mass_matrix(self.q.tolist())
+        return np.array(self._arm.mass_matrix(self._at))
 
     def bias(self) -> FloatArray:
         """h = C qd + g (n,) at the present state."""
-        return self._bias(self.qd)
+        return self._bias(self._now)
 
     def link_com_position(self, link: int) -> FloatArray:
         """Centre of mass (3,) of link 1..n in the world [m]."""
@@ -172,49 +179,62 @@ class PyBulletBackend:
         torque: FloatArray = through + self._drives.rotor_inertia * qdd + friction
         return torque
 
-    def _bias(self, qd: FloatArray) -> FloatArray:
-        return np.array(self._arm.inverse_dynamics(self.q.tolist(), qd.tolist(), self._rest))
+    def _bias(self, qd: Sequence[float]) -> FloatArray:
+        return np.array(self._arm.inverse_dynamics(self._at, qd, self._rest))
+
+    def _be(self, q: FloatArray) -> None:
+        """Stand at q (n,)."""
+        self.q: FloatArray = q
+        self._at: Sequence[float] = q.tolist()
+        self._now: Sequence[float] = self._rest
+        self._lagging: Sequence[float] = self._rest  # Bullet's speed: it is half a step old
 
     def _drive(self, torque: FloatArray) -> None:
         """Make a step under this motor torque and the disturbance."""
-        gears, half = self._gears, 0.5 * self._dt
-        q, speed, lagging = self.q.tolist(), self.qd.tolist(), self._speed.tolist()
-        inertia, balance = self._arm.mass_matrix(q), self._drives.counterbalance(q)
-        inertia.ravel()[self._diagonal] += self._drives.rotor_inertia
-        bias = self._arm.inverse_dynamics(q, speed, self._rest)
-        outer = [t - h + c for t, h, c in zip(torque.tolist(), bias, balance, strict=True)]
+        arm, q = self._arm, self._at
+        balance = self._drives.counterbalance(q)
+        outer = list(
+            map(sub, map(add, torque.tolist(), balance), arm.inverse_dynamics(q, self._now, self._rest))
+        )
         if self.disturbance is not None:
-            outer = [t + d for t, d in zip(outer, self.disturbance.tolist(), strict=True)]
+            outer = list(map(add, outer, self.disturbance.tolist()))
+        links = arm.inverse_dynamics(q, self._lagging, self._accelerations(outer))
+        self._load = list(map(sub, links, balance))
+        self._advance(links)
+
+    def _accelerations(self, outer: Sequence[float]) -> list[float]:
+        """qdd (n,) of a step in which this torque (n,) acts, and friction at the speed in its middle."""
+        gears, lagging, speed, half = self._gears, self._lagging, self._now, 0.5 * self._dt
+        rows = self._arm.mass_matrix(self._at)
+        self._inertia[:] = rows
+        own = [row[j] + rotor for j, row, rotor in zip(self._axes, rows, self._rotor, strict=True)]
         dry = gears.dry(speed, self._load)
         friction, slope = gears.friction(speed, dry)
         for k in range(_ITERATIONS):  # the state's speed lags half a step: qd is the speed at its position
-            stiff = inertia.copy()
-            stiff.ravel()[self._diagonal] += [half * s for s in slope]
+            self._diagonal[:] = [m + half * s for m, s in zip(own, slope, strict=True)]
             rest = zip(outer, friction, slope, speed, lagging, strict=True)
-            qdd = dposv(stiff, [t - f + s * (v - w) for t, f, s, v, w in rest])[1].tolist()
+            left = [t - f + s * (v - w) for t, f, s, v, w in rest]
+            qdd: list[float] = dposv(self._inertia, left)[1].tolist()
             before, speed = speed, [w + half * a for w, a in zip(lagging, qdd, strict=True)]
             linear = zip(friction, slope, speed, before, strict=True)
             expected = [f + s * (v - u) for f, s, v, u in linear]
             friction, slope = gears.friction(speed, dry, chord=k >= _NEWTON)
-            if all(abs(f - e) < _FRICTION for f, e in zip(friction, expected, strict=True)):
+            if max(map(abs, map(sub, friction, expected))) < _FRICTION:
                 break
         gears.heat(friction, speed)
-        links = self._arm.inverse_dynamics(q, lagging, qdd)
-        self._load = [t - c for t, c in zip(links, balance, strict=True)]
-        self._advance(links)
+        return qdd
 
     def _advance(self, links: Sequence[float]) -> None:
         """Make a step with these torques (n,) on the links."""
-        before = self._speed
-        q, speed = self._arm.advance(links)
-        self.q, self._speed = np.array(q), np.array(speed)
-        half = 0.5 * (self._speed - before)
-        self.qd = self._speed + half
-        self._speeds.append(before + half)
+        before = self._lagging
+        self._at, self._lagging = self._arm.advance(links)
+        self.q = np.array(self._at)
+        self._now = [1.5 * v - 0.5 * u for u, v in zip(before, self._lagging, strict=True)]
+        self._speeds.append([0.5 * (u + v) for u, v in zip(before, self._lagging, strict=True)])
         self._torques.append(self.torque)
         if len(self._speeds) > _CHUNK:  # nobody reads the work: keep the memory bounded
             del self._speeds[:_CHUNK], self._torques[:_CHUNK]
 
     def _write(self) -> None:
         self._stale = False
-        self._arm.write(self.q.tolist(), self._speed.tolist())
+        self._arm.write(self._at, self._lagging)
