@@ -42,7 +42,7 @@ COMMON = Rights(
 )
 PLANNER = Rights(
     publish=(names.CELL, names.PLANNED_TRAJECTORY, names.PROGRAM_SAVINGS, names.PLANNER_MARKERS),
-    subscribe=(names.JOINT_STATES, names.CARRIED_LOAD, names.CONTROLLER_TIMERS),
+    subscribe=(names.JOINT_STATES, names.CARRIED_LOAD, names.CONTROLLER_TIMERS, names.MACHINE_STATES),
     reply=(
         *(names.SET_CELL, names.GET_CELL, names.SET_EQUIPMENT, names.CHECK_STATE),
         names.CHECK_STATES,

@@ -147,10 +147,12 @@ def test_the_drivers_timers_count_while_there_is_a_driver(
         published = client.next_message(names.CONTROLLER_TIMERS, ControllerTimers)
         assert published.brakes_after == 7.0
         wait_for(lambda: planner_node.planner.heard.timers is not None, what="the timers are heard")
+        wait_for(lambda: planner_node.planner.heard.machines is not None, what="the machines are heard")
         answer = client.ask(names.PLAN_STANDBY, PlanStandby.Request(pause=60.0))
         assert (answer.timers, answer.controller_timer) == ("driver", 7.0)
         assert answer.alternatives[1].regular_time_to_operate == 1.25
     wait_for(lambda: planner_node.planner.heard.timers is None, what="the driver is forgotten")
+    wait_for(lambda: planner_node.planner.heard.machines is None, what="its machines are forgotten")
     assert client.ask(names.PLAN_STANDBY, PlanStandby.Request(pause=60.0)).timers == "data"
 
 

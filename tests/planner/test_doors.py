@@ -11,8 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import ProgramStep, Signal, load_cell, load_power_data
+from ir_msgs_py.contact import MachineState
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
+from ir_msgs_py.transitions import TransitionTimes
+from ir_planner import Planner
+from ir_planner.heard import Heard
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.doors import doors_along
 from ir_planner.request import Work
@@ -31,22 +35,32 @@ steps = st.builds(
 )
 
 
-@given(st.lists(steps, max_size=8), st.lists(st.floats(0.0, 3.0), min_size=8, max_size=8), st.booleans())
+@given(
+    st.lists(steps, max_size=8),
+    st.lists(st.floats(0.0, 3.0), min_size=8, max_size=8),
+    st.booleans(),
+    st.booleans(),
+)
 @settings(deadline=None)
-def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_take(program, seconds, shut):
-    state = "door_closed" if shut else "door_open"
-    cell = DEMO.with_equipment("lathe", state=state)
+def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_take(
+    program, seconds, shut, shut_in_the_file
+):
+    state, written = ("door_closed" if each else "door_open" for each in (shut, shut_in_the_file))
+    cell, file = (DEMO.with_equipment("lathe", state=each) for each in (state, written))
+    heard = Heard(TransitionTimes)
+    heard.machines = Machines(cell).states(0.0)
+    along = doors_along(file, program, heard.doors(file))
     machines, lathe, now = Machines(cell), cell.machine("lathe"), 0.0
     delay = next(signal.delay for signal in cell.signals if signal.name == IS_OPEN)
     due: tuple[float, bool] = (-1.0, not shut)  # when the answer comes, and which
-    for step, (before, after), moving in zip(program, doors_along(cell, program), seconds, strict=False):
+    for step, (before, after), moving in zip(program, along, seconds, strict=False):
         for signal in step.wait_for:
             if signal.value != due[1]:
                 return  # it waits forever
             now = max(now, due[0])
         machines.step(now)
         for doors, wait in ((before, moving), (after, step.dwell)):
-            planned = dict(doors).get("lathe", (state,))
+            planned = dict(doors).get("lathe", (written,))
             if doors is after:
                 for signal in step.set_signals:
                     machines.hear(OPEN, signal.value, now)
@@ -58,6 +72,35 @@ def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_ta
                 assert set(machines.present(lathe)) <= set(planned)
                 now += wait
                 machines.step(now)
+
+
+@pytest.mark.parametrize(
+    ("said", "sentence"),
+    [
+        (
+            MachineState("lathe", "door_closed"),
+            f"lathe is door_closed, as signal {OPEN} has it; {OPEN} turns it",
+        ),
+        (MachineState("lathe", "door_closed", "door_open", 0.7), f"to door_open: wait for signal {IS_OPEN}"),
+    ],
+)
+def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the_signal(said, sentence):
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "demo")
+    start = np.array(planner.cell.machine_home)
+    planner.heard.machines = (said, MachineState("a machine of another cell", "open"))
+    plan = planner.plan_program(("lathe_work",), 0.0, PlanOptions(), start)
+    assert plan.status.code in (StatusCode.GOAL_IN_COLLISION, StatusCode.PLANNING_FAILED)
+    assert sentence in plan.status.message
+    assert [
+        "at the start, as the driver says: lathe door_closed" in each.note for each in plan.info.stages
+    ].count(True) == 1
+    planner.heard.machines = (MachineState("lathe", "door_open"),)
+    again = planner.plan_program(("lathe_work",), 0.0, PlanOptions(), start)
+    planner.heard.machines = None
+    as_the_cell_has_it = planner.plan_program(("lathe_work",), 0.0, PlanOptions(), start)
+    assert again.status.ok
+    assert again.program_id == as_the_cell_has_it.program_id
 
 
 def planned(*program: ProgramStep) -> ProgramPlan:

@@ -262,14 +262,13 @@ class Planner:
         savings: bool = False,
         front_points: int = 0,
     ) -> ProgramPlan:
-        """The cell's program, or a visit of stations, from start (n,). savings: held against the common
-        program; front_points: with programs from the shortest cycle time to twice the free one.
-        """
+        """The cell's program, or a visit of stations, from start (n,); its `ProgramRequest` says the rest."""
         options, note = self._checked(options)
         start = within_limits(start, cell := self.cell, "start", StatusCode.START_STATE_INVALID)
         cycle = bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s")
         data, settings = self._current.power(cell), replace(self.settings, transitions=self.heard.transitions)
-        request = ProgramRequest(cell, data, stations, start, options, cycle, settings, savings, front_points)
+        asked = stations, start, options, cycle, settings, savings, front_points, self.heard.doors(cell)
+        request = ProgramRequest(cell, data, *asked)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._work(options, cancelled, stops), progress)
         plan = program_in(plan, self._current.hash_of(cell), self.heard.source, Spreads(request))

@@ -17,7 +17,11 @@ from ir_description.files import power_from_yaml
 from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import carried_load_from_msg, controller_timers_from_msg
+from ir_msgs_py.ros.conversions import (
+    carried_load_from_msg,
+    controller_timers_from_msg,
+    machine_states_from_msg,
+)
 from ir_msgs_py.ros.types import interface_type
 from ir_msgs_py.settings import changed, tree
 from ir_planner import Planner, PlannerSettings
@@ -93,7 +97,11 @@ class RecordedPlanner:
             Change(_nanoseconds(message.header.stamp), _set_cell(message.cell_yaml))
             for _, message in self._cells[1:]
         ]
-        for name, learn in ((names.CONTROLLER_TIMERS, _hear_timers), (names.CARRIED_LOAD, _hear_load)):
+        for name, learn in (
+            (names.CONTROLLER_TIMERS, _hear_timers),
+            (names.CARRIED_LOAD, _hear_load),
+            (names.MACHINE_STATES, _hear_machines),
+        ):
             for number, (time, message) in enumerate(self._heard(name)):
                 found.append(Change(time if number else _ALWAYS, learn(message)))
         for time, event in self._heard(names.PARAMETER_EVENTS):
@@ -187,6 +195,13 @@ def _hear_timers(message: Any) -> Callable[[Planner], None]:
 def _hear_load(message: Any) -> Callable[[Planner], None]:
     def learn(planner: Planner) -> None:
         planner.heard.load = carried_load_from_msg(message)
+
+    return _unless_refused(learn)
+
+
+def _hear_machines(message: Any) -> Callable[[Planner], None]:
+    def learn(planner: Planner) -> None:
+        planner.heard.machines = machine_states_from_msg(message)
 
     return _unless_refused(learn)
 

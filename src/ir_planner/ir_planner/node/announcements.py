@@ -1,4 +1,4 @@
-"""What planner and driver announce to each other: the cell out, timers and load in; latched topics."""
+"""What planner and driver announce to each other: cell out; timers, load and machines in; latched."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -10,6 +10,7 @@ from ir_description import Cell, cell_to_yaml
 from ir_msgs.msg import CarriedLoad as CarriedLoadMsg
 from ir_msgs.msg import CellState as CellStateMsg
 from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
+from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announced import CellState
 from ir_msgs_py.errors import MsgsError
@@ -17,6 +18,7 @@ from ir_msgs_py.ros.conversions import (
     carried_load_from_msg,
     cell_state_to_msg,
     controller_timers_from_msg,
+    machine_states_from_msg,
 )
 from ir_msgs_py.ros.quality import LATCHED
 from ir_planner.planner import Planner
@@ -33,6 +35,7 @@ class Announcements:
         for kind, topic, hear in (
             (ControllerTimersMsg, names.CONTROLLER_TIMERS, self._hear_timers),
             (CarriedLoadMsg, names.CARRIED_LOAD, self._hear_load),
+            (MachineStatesMsg, names.MACHINE_STATES, self._hear_machines),
         ):
             node.create_subscription(kind, topic, hear, LATCHED, callback_group=group)
 
@@ -49,6 +52,8 @@ class Announcements:
             heard.timers = None
         if heard.load is not None and not publishers(names.CARRIED_LOAD):
             heard.load = None
+        if heard.machines is not None and not publishers(names.MACHINE_STATES):
+            heard.machines = None
 
     def _hear_timers(self, message: Any) -> None:
         heard = self._planner.heard
@@ -58,6 +63,11 @@ class Announcements:
     def _hear_load(self, message: Any) -> None:
         heard = self._planner.heard
         heard.load = self._understood(carried_load_from_msg, message, names.CARRIED_LOAD) or heard.load
+
+    def _hear_machines(self, message: Any) -> None:
+        heard = self._planner.heard
+        states = self._understood(machine_states_from_msg, message, names.MACHINE_STATES)
+        heard.machines = heard.machines if states is None else states
 
     def _understood(self, convert: Callable[[Any], _T], message: Any, topic: str) -> _T | None:
         try:

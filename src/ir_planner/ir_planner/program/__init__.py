@@ -1,7 +1,7 @@
 """Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
 
 from ir_planner.program.charge import Charge
-from ir_planner.program.doors import doors_along
+from ir_planner.program.doors import Doors, doors_along
 from ir_planner.program.pause_lengths import Lengths, lengths_of
 from ir_planner.program.pauses import AUTO, Pause, pause_by_itself
 from ir_planner.program.program import plan_program
@@ -14,6 +14,7 @@ from ir_planner.program.waiting import Trip, best_posture
 __all__ = [
     "AUTO",
     "Charge",
+    "Doors",
     "Lengths",
     "Pause",
     "PlacedStep",

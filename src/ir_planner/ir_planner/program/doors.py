@@ -1,8 +1,9 @@
 """Which states the machines with a switch are in along a program, as its own signals move them.
 
-They begin as the cell has them. A machine whose signal is set changes from then on, until a step waits for
-the signal that follows, or dwells as long as the change takes: meanwhile it is in both states, and what
-sweeps between them is there too. Movements are planned among what may be there.
+They begin as the cell has them, or as a driver says that they are. A machine whose signal is set changes
+from then on, until a step waits for the signal that follows, or dwells as long as the change takes: meanwhile
+it is in both states, and what sweeps between them is there too. Movements are planned among what may be
+there.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,9 +14,10 @@ Doors = tuple[tuple[str, tuple[str, ...]], ...]
 """Machines that are not as the cell has them, with their state, or the two between which they change."""
 
 
-def doors_along(cell: Cell, steps: Sequence[ProgramStep]) -> Iterator[tuple[Doors, Doors]]:
-    """Before each step moves, and after it."""
+def doors_along(cell: Cell, steps: Sequence[ProgramStep], begin: Doors = ()) -> Iterator[tuple[Doors, Doors]]:
+    """Before each step moves, and after it. begin: machines that are not as the cell has them now."""
     states: dict[str, tuple[str, ...]] = {machine.name: (machine.state,) for machine in _switched(cell)}
+    states |= {name: now for name, now in begin if name in states}
     for step in steps:
         for machine in _switched(cell):
             states[machine.name] = _awaited(cell, machine, step, states[machine.name])
@@ -23,6 +25,12 @@ def doors_along(cell: Cell, steps: Sequence[ProgramStep]) -> Iterator[tuple[Door
         for machine in _switched(cell):
             states[machine.name] = _set(machine, step, states[machine.name])
         yield before, _unlike(cell, states)
+
+
+def doors_text(doors: Doors) -> str:
+    """How they stand at the start of a program, "" where all are as the cell has them."""
+    said = (f"{name} {' changing to '.join(states)}" for name, states in doors)
+    return f"at the start, as the driver says: {', '.join(said)}" if doors else ""
 
 
 def advice(cell: Cell, target: str, doors: Doors) -> str:
@@ -69,7 +77,8 @@ def _advice(cell: Cell, machine: Equipment, target: str, states: tuple[str, ...]
     assert switch is not None
     there = f"when {target} is next, {machine.name}"
     if len(states) == 1:
-        return f"{there} is {states[0]}, as signal {switch.signal} has it"
+        level = "" if states[0] == switch.off else "=0"
+        return f"{there} is {states[0]}, as signal {switch.signal} has it; {switch.signal}{level} turns it"
     level = "" if states[1] == switch.on else "=0"
     wait = "".join(f"wait for signal {name}{level}, or " for name in _answers(cell, machine)[:1])
     return f"{there} changes from {states[0]} to {states[1]}: {wait}dwell {switch.time:g} s before"

@@ -18,14 +18,14 @@ from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
 from ir_planner.program.choice import Steps
 from ir_planner.program.comparison import held_against_common
-from ir_planner.program.doors import advice
+from ir_planner.program.doors import advice, doors_text
 from ir_planner.program.front import front_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
 from ir_planner.program.route import Route
 from ir_planner.program.savings import named
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
-from ir_planner.request import Context, Journal, Work
+from ir_planner.request import Context, Journal, Work, noted
 from ir_planner.timing import at_the_mains
 
 _SENTENCES = 4  # of a failure
@@ -106,14 +106,15 @@ def _planned(steps: Steps) -> ProgramPlan:
 
 def _info(request: ProgramRequest, context: Context) -> PlanningInfo:
     context.journal.planner_id = "station graph"
-    return context.journal.info(request.start, context.joint_names)
+    info = context.journal.info(request.start, context.joint_names)
+    return noted(info, doors_text(request.doors), "doors")
 
 
 def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]:
     """The route of a request and what its stages need to know. Raises RequestError for one without sense."""
     request.check()
     cell = request.cell
-    steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start())
+    steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start(), request.doors)
     settings, bare = request.settings, request.options.load == NO_LOAD
     scenes = Scenes(cell, request.power, settings.drives, bare)
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)

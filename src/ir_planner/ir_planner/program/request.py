@@ -11,6 +11,7 @@ from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
+from ir_planner.program.doors import Doors
 from ir_planner.request import bounded
 from ir_planner.settings import PlannerSettings
 
@@ -44,7 +45,7 @@ class ProgramPlan:
 class ProgramRequest:
     """What to plan: the cell, its stations to visit (empty: its program), from `start` (n,), in
     `cycle_time` s (0: free). savings: hold it against the common program; front_points: programs from the
-    shortest cycle time to twice the free one.
+    shortest cycle time to twice the free one. doors: machines that are not as the cell has them at the start.
     """
 
     cell: Cell
@@ -56,6 +57,7 @@ class ProgramRequest:
     settings: PlannerSettings = field(default_factory=PlannerSettings)
     savings: bool = False
     front_points: int = 0
+    doors: Doors = ()
 
     def check(self) -> None:
         """Raise RequestError for options that a program doesn't take."""

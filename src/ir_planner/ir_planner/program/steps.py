@@ -78,10 +78,14 @@ def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
     return tuple(ProgramStep("STATION" if name in known else "POSTURE", name) for name in stations)
 
 
-def placed_steps(cell: Cell, steps: tuple[ProgramStep, ...], places: PartPlaces) -> tuple[PlacedStep, ...]:
-    """The steps with the parts before and after each. Raises RequestError for a step that can't be done."""
+def placed_steps(
+    cell: Cell, steps: tuple[ProgramStep, ...], places: PartPlaces, begin: Doors = ()
+) -> tuple[PlacedStep, ...]:
+    """The steps with the parts before and after each; begin: doors that are not as the cell has them. Raises
+    RequestError for a step that can't be done.
+    """
     result = []
-    for k, (step, doors) in enumerate(zip(steps, doors_along(cell, steps), strict=True)):
+    for k, (step, doors) in enumerate(zip(steps, doors_along(cell, steps, begin), strict=True)):
         try:
             after = places.after(step)
         except (InvalidValueError, DescriptionNameError) as error:

@@ -63,6 +63,6 @@ class Journal:
         )
 
 
-def noted(info: PlanningInfo, note: str) -> PlanningInfo:
-    """The record with a remark on the options ("": none)."""
-    return replace(info, stages=(*info.stages, PlanningStage("options", 0.0, note))) if note else info
+def noted(info: PlanningInfo, note: str, about: str = "options") -> PlanningInfo:
+    """The record with a remark on the options, or about something else ("": none)."""
+    return replace(info, stages=(*info.stages, PlanningStage(about, 0.0, note))) if note else info
