@@ -22,10 +22,11 @@ from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.format.definition import definitions_of
+from ir_recorder.read.around import contacts, machine_states
 from ir_recorder.read.cdr import Columns
 from ir_recorder.read.cells import chosen_namespace
 from ir_recorder.read.chunks import ReadLimits
-from ir_recorder.read.decoded import contact_sentence, movement_from, savings_from
+from ir_recorder.read.decoded import movement_from, savings_from
 from ir_recorder.read.planned import planned_steps
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
@@ -95,9 +96,11 @@ class _Reader:
             events=tuple(self._events()),
             loads=tuple(self._loads()),
             signals=tuple(self._signals()),
+            machines=tuple(machine_states(self._messages(names.MACHINE_STATES))),
+            contacts=tuple(contacts(self._messages(names.CONTACTS))),
             warnings=tuple(self._warnings()),
             goals=tuple(self._goals()),
-            savings=tuple(self._savings()),
+            savings=tuple(SavingsEvent(t, savings_from(m)) for t, m in self._messages(names.PROGRAM_SAVINGS)),
             hardware=self._hardware(),
             cell_yaml=self._attached(contents.CELL),
             urdf=self._attached(contents.URDF) or self._text(names.ROBOT_DESCRIPTION),
@@ -230,8 +233,8 @@ class _Reader:
         for time, message in self._messages(names.ROSOUT):
             if message.level >= _WARN and owns_logger(self._namespace, message.name):
                 yield TextEvent(time, message.name, message.msg)
-        for time, message in self._messages(names.CONTACTS):
-            yield TextEvent(time, names.SIM_DRIVER, contact_sentence(message))
+        for contact in contacts(self._messages(names.CONTACTS)):
+            yield TextEvent(contact.time, names.SIM_DRIVER, contact.text)
 
     def _goals(self) -> Iterator[GoalEnd]:
         """How every goal of planner and runner ended, by the status of their actions."""
@@ -242,10 +245,6 @@ class _Reader:
                     last[bytes(goal.goal_info.goal_id.uuid)] = int(goal.status)
             for status in last.values():
                 yield GoalEnd(action, status, _OUTCOMES.get(status, f"status {status}"))
-
-    def _savings(self) -> Iterator[SavingsEvent]:
-        for time, message in self._messages(names.PROGRAM_SAVINGS):
-            yield SavingsEvent(time, savings_from(message))
 
     def _hardware(self) -> str:
         for _, message in self._messages(names.DIAGNOSTICS):

@@ -142,7 +142,8 @@ class Recording:
     start_ns: node clock of time 0. hardware: the driver's name of its plant ("..., simulated"). cell_yaml and
     urdf are "" where none is attached, so are power_yaml (data of the controller) and plant_yaml (the
     simulated plant with its figures). facts: texts by key. planned: steps of the last planned program, where
-    nothing was driven.
+    nothing was driven. machines: their states by name, "closed>open" while they change; contacts: what the
+    robot touched, by body.
     """
 
     path: Path
@@ -168,6 +169,8 @@ class Recording:
     power_yaml: str = ""
     plant_yaml: str = ""
     planned: tuple[PlannedMovement, ...] = ()
+    machines: tuple[TextEvent, ...] = ()
+    contacts: tuple[TextEvent, ...] = ()
 
     @property
     def only_planned(self) -> bool:

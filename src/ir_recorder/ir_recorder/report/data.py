@@ -13,6 +13,7 @@ from ir_recorder.analysis.shares import mode_name
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import BitSeries
 from ir_recorder.report.axes import axis_curves
+from ir_recorder.report.machine_lanes import machine_lanes
 from ir_recorder.report.scene import scene
 from ir_recorder.report.series import Json, envelope, floats
 from ir_recorder.report.words import mode_words
@@ -64,6 +65,7 @@ def _lanes(analysis: Analysis) -> Iterator[dict[str, Json]]:
         yield {"label": "mode", "spans": list(_mode_spans(analysis))}
     if analysis.loads.observations:
         yield {"label": "load", "spans": list(_load_spans(analysis))}
+    yield from machine_lanes(recording)
     for series, side, names in (
         (recording.plc_inputs, "in", ("ab", "hib", "emergency_stop")),
         (recording.plc_outputs, "out", ("bbs", "ab", "drives_ready")),

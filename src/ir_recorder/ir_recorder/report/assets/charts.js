@@ -49,7 +49,7 @@ const MODE_STYLE = /^m-/;
 function spanColour(style) {
   if (MODE_STYLE.test(style)) return css(`--${style}`) || css("--m-transition");
   const colours = { pause: "--m-transition", regional: "--a1", service_entry: "--a2", service_exit: "--a5", load: "--part",
-    none: "--line", bit: "--accent" };
+    none: "--line", bit: "--accent", moving: "--m-transition", contact: "--m-EMERGENCY_STOP" };
   return css(colours[style] || "--a1");
 }
 
@@ -253,7 +253,7 @@ class PowerChart extends TimeChart {
     let shown = label;
     while (shown.length > 1 && g.measureText(shown).width > wide - 8) shown = shown.slice(0, -1);
     if (shown !== label) shown = shown.length > 3 ? `${shown.slice(0, -1)}…` : "";
-    g.fillStyle = style === "none" || style === "pause" ? css("--ink") : "#fff";
+    g.fillStyle = ["none", "pause", "moving"].includes(style) ? css("--ink") : "#fff";
     g.textAlign = "left";
     g.fillText(shown, x + 4, y);
   }
