@@ -17,29 +17,39 @@ def judge_of(
     steps: Sequence[PlannedMovement], cell: Cell, power: PowerData, drives: Drives, margin: float
 ) -> Judge:
     """A judge of these steps, S_m `margin` m."""
-    scenes: dict[int, PlanningScene] = {}
-    places = cell.parts_at_start()
+    found = zip(steps, scenes_of(steps, cell, power, drives), strict=True)
+    scenes = {id(step): scene for step, scene in found}
+
+    def judge(trajectory: JointTrajectory, step: PlannedMovement) -> Evaluation:
+        return evaluate_trajectory(trajectory, scenes[id(step)], margin, contacts_at(step))
+
+    return judge
+
+
+def contacts_at(step: PlannedMovement) -> str:
+    """The station whose allowed contacts hold in a step, "" for none."""
+    at = {MovementKind.SERVICE_EXIT: step.from_station, MovementKind.SERVICE_ENTRY: step.to_station}
+    return at.get(MovementKind(step.kind), "")
+
+
+def scenes_of(
+    steps: Sequence[PlannedMovement], cell: Cell, power: PowerData, drives: Drives
+) -> list[PlanningScene]:
+    """The scene of each step: what is held, where the parts lie, how the doors stand or sweep."""
+    scenes, places = [], cell.parts_at_start()
     doors = [dict(before) for before, _ in doors_along(cell, [_signalling(step) for step in steps])]
-    for step, standing_doors in zip(steps, doors, strict=True):
-        standing = cell_in(with_parts(cell, places), standing_doors)
+    for step, moved in zip(steps, doors, strict=True):
+        standing = cell_in(with_parts(cell, places), moved)
         for text in step.states:  # of machines that no signal moves: those that the step was planned with
             machine, _, state = text.partition("=")
-            if machine not in standing_doors:
+            if machine not in moved:
                 standing = standing.with_equipment(machine, state=state)
-        scenes[id(step)] = PlanningScene(standing, cell.loads(places.held), power, drives)
+        scenes.append(PlanningScene(standing, cell.loads(places.held), power, drives))
         if step.attach or step.detach:
             places = places.after(
                 ProgramStep("STATION", step.to_station, attach=step.attach, detach=step.detach)
             )
-
-    def judge(trajectory: JointTrajectory, step: PlannedMovement) -> Evaluation:
-        at = {
-            MovementKind.SERVICE_EXIT: step.from_station,
-            MovementKind.SERVICE_ENTRY: step.to_station,
-        }.get(MovementKind(step.kind), "")
-        return evaluate_trajectory(trajectory, scenes[id(step)], margin, at)
-
-    return judge
+    return scenes
 
 
 def _signalling(step: PlannedMovement) -> ProgramStep:

@@ -1,0 +1,127 @@
+"""Three programs of today against the planner's: PTP at 100 %, an old program with detours, a trace."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from _results import Claim, at_least, line_of
+
+from ir_cli.offline.today_trace import today_of_trace
+from ir_krl import follow, parse
+from ir_msgs_py.before_after import BeforeAfter
+from ir_planner import (
+    Planner,
+    before_after,
+    before_after_common,
+    evaluate_krl,
+    today_of_krl,
+    tool_in_flange,
+)
+
+TRACES = Path(__file__).resolve().parents[1] / "examples" / "traces"
+LINE = 1.2  # times today's cycle time: what the line needs
+VISIT = ("home", "infeed_pick", "gauge_measure", "home")
+OLD = """DEF OLD( )
+PTP XHOME
+PTP {A1 10,A2 -80,A3 80,A4 0,A5 40,A6 0}
+PTP {A1 35,A2 -95,A3 75,A4 0,A5 60,A6 0}
+WAIT SEC 5
+PTP {A1 0,A2 -110,A3 110,A4 0,A5 30,A6 0}
+PTP {A1 -60,A2 -95,A3 80,A4 0,A5 60,A6 0}
+$OUT[3]=TRUE
+WAIT SEC 40
+PTP XHOME
+END
+"""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A side of a comparison: seconds, joules and what is saved, with the ends of its 90 % interval."""
+
+    baseline: str
+    side: str
+    seconds: float
+    joules: float
+    joules_low: float
+    joules_high: float
+    saved_percent: float
+    saved_low: float
+    saved_high: float
+    peak_w: float
+    certified: bool
+    process_s: float
+
+
+def baselines() -> tuple[list[dict[str, Any]], list[Claim]]:
+    """Rows of all sides, and what is claimed of them."""
+    rows = [row for name, run in RUNS.items() for row in _rows(name, run)]
+    for row in rows:
+        print(line_of(asdict(row)), flush=True)
+    planned = [row for row in rows if row.side != "today"]
+    same = [row for row in planned if row.side == "same cycle time"]
+    claims = [
+        at_least(
+            "planned programs certified", sum(row.certified for row in planned) / len(planned), "share", 1.0
+        ),
+        at_least(
+            "saved at the same cycle time, least of three", min(r.saved_percent for r in same), "%", 5.0
+        ),
+        at_least("lower end of that interval, least of three", min(r.saved_low for r in same), "J", 0.0),
+    ]
+    return [asdict(row) for row in rows], claims
+
+
+def _rows(name: str, run: Any) -> list[Row]:
+    began = time.process_time()
+    seconds = run(0.0).today.report.duration
+    found: BeforeAfter = run(LINE * seconds)
+    took = time.process_time() - began
+    return [
+        Row(
+            name,
+            side.name,
+            side.report.duration,
+            side.report.energy,
+            side.report.energy_low,
+            side.report.energy_high,
+            100.0 * side.saving.share,
+            side.saving.saved_low,
+            side.saving.saved_high,
+            side.report.peak_power,
+            side.certified,
+            took,
+        )
+        for side in (found.today, *found.sides)
+    ]
+
+
+def _planner(cell: str) -> Planner:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", cell)
+    return planner
+
+
+def _common(cycle_time: float) -> BeforeAfter:
+    planner = _planner("demo")
+    return before_after_common(planner, VISIT, planner.cell.machine_home, cycle_time)
+
+
+def _old(cycle_time: float) -> BeforeAfter:
+    planner = _planner("open")
+    cell = planner.cell
+    program = follow([parse(OLD, "old.src")], cell.machine_home, tool_in_flange(cell.tcp))
+    return before_after(planner, today_of_krl(evaluate_krl(planner, program)), cycle_time)
+
+
+def _trace(cycle_time: float) -> BeforeAfter:
+    planner = _planner("open")
+    options = argparse.Namespace(mapping=TRACES / "rsi_log.yaml", load="", bandwidth=0.0)
+    return before_after(planner, today_of_trace(options, planner, TRACES / "rsi_log.csv"), cycle_time)
+
+
+RUNS = {"PTP at 100 %": _common, "an old program": _old, "a trace": _trace}
