@@ -59,7 +59,8 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
         [sys.executable, "-c", code, json.dumps(lines)], capture_output=True, text=True, check=False
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert {line[0] for line in lines} | {"completion", "energy", "krl", "report"} == set(WITHOUT_ROS)
+    others = {"arena", "completion", "energy", "fleet", "krl", "path", "report"}
+    assert {line[0] for line in lines} | others == set(WITHOUT_ROS)
 
 
 def test_the_totals_of_a_program_are_the_sums_of_its_steps(capsys: pytest.CaptureFixture[str]) -> None:

@@ -51,7 +51,7 @@ HELP = {
     "send_goal": "send a goal: send_goal /ir_planner/plan '{}'; Ctrl-C cancels",
     "cancel": "cancel all goals of an action: cancel /ir_planner/plan",
     "front": "energy over cycle time: front home infeed_pick park",
-    "live": "watch the running cell in a browser of this machine",
+    "live": "watch the running cell in a browser, until Ctrl-C",
     "report": "write the HTML report of a recording, or compare several",
     "fleet": "recordings of many robots and shifts on one page, summed up",
     "replan": "plan a recording's requests again and compare the ids",
