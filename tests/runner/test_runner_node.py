@@ -526,3 +526,9 @@ def test_a_clock_that_jumps_back_ends_the_program(simulated):
     assert "step 1 of 1 (pause BUS_POWER_OFF): the clock jumped back by" in result.status.message
     assert float(result.status.message.split()[-2]) > 500.0
     assert cell.driver.log[-2:] == ["ab=1", "ab=0"]
+
+
+def test_a_goal_that_has_ended_is_not_kept_with_its_result(cell):
+    cell.run(program_id="x" * 1000)
+    (kept,) = cell.runner._server._goal_handles.values()
+    assert kept.request.program_id == ""

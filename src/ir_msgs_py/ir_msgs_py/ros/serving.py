@@ -138,6 +138,7 @@ class RecordedActionServer(ActionServer):
             answered = self._calls.taken(self._full_name, self._type_text, goal.request)
             result = await await_or_execute(execute_callback, goal)
             answered(result)
+            goal._goal_request = type(goal.request)()  # rclpy keeps the goal as long as its result
             return result
 
         await super()._execute_goal(execute, goal_handle)
