@@ -1,7 +1,7 @@
 # `make help` lists the targets. Everything runs in .venv, which the first target makes; results go to out/.
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-long check sanitize bench bench-long compare docs clean
+.PHONY: help setup setup-tests demo test test-long check sanitize bench bench-long compare docs clean
 # A sourced ROS 2 would put its own packages, of another Python, in front of the environment's.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 
@@ -19,28 +19,33 @@ help:             ## this list
 	@echo "make TARGET [ARGS='...'], with TARGET one of"
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-12s %s\n", $$1, $$2}'
 
+SET_UP := python=$$(PYTHON='$(PYTHON)' tools/find_python.sh) && "$$python" tools/set_up.py
+
 setup:            ## make or complete .venv: ROS 2 Jazzy, interfaces, compiled core, packages
-	@python=$$(PYTHON='$(PYTHON)' tools/find_python.sh) && "$$python" tools/set_up.py
+	@$(SET_UP)
+
+setup-tests:      ## the same, and what checks, tests and benchmarks need
+	@$(SET_UP) --tests
 
 demo: setup       ## plan, drive, record and explain the demonstration cell
 	@$(BIN)/ir demo $(ARGS)
 
 # Exit code 5 is pytest's "no test collected": ARGS may choose tests of one part only.
-test: setup       ## every test that takes seconds to a few minutes
+test: setup-tests ## every test that takes seconds to a few minutes
 	@$(PYTEST) --ignore tests/system -m 'not long' $(ARGS) || [ $$? -eq 5 ]
 	@$(SYSTEM_TESTS) -m 'not long' $(ARGS) || [ $$? -eq 5 ]
 
-test-long: setup  ## every test, also those that run for minutes; then with the oldest versions
+test-long: setup-tests ## every test, also those that run for minutes; then with the oldest versions
 	@$(PYTEST) --ignore tests/system $(ARGS) || [ $$? -eq 5 ]
 	@$(SYSTEM_TESTS) $(ARGS) || [ $$? -eq 5 ]
 	@[ -n '$(ARGS)' ] || $(BIN)/python tools/oldest_versions.py
 
-check: setup      ## ruff and mypy --strict
+check: setup-tests ## ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 
-sanitize: setup   ## the compiled core under the address and undefined-behaviour sanitizers
+sanitize: setup-tests ## the compiled core under the address and undefined-behaviour sanitizers
 	@PYTHON=$(CURDIR)/$(BIN)/python src/ir_kernels/sanitize.sh $(ARGS)
 
 # compare.py needs another checkout: it has a target of its own.
@@ -52,16 +57,16 @@ define run_benchmarks
 	done
 endef
 
-bench: setup      ## every benchmark in at most 2 minutes each, its claims at the end; JSON in out/bench
+bench: setup-tests ## every benchmark in at most 2 minutes each, its claims at the end; JSON in out/bench
 	$(call run_benchmarks,--quick)
 
-bench-long: setup ## every benchmark in full: what claims quote; JSON in out/bench
+bench-long: setup-tests ## every benchmark in full: what claims quote; JSON in out/bench
 	$(call run_benchmarks,)
 
-compare: setup    ## the same answers, and as fast? This checkout against BEFORE=CHECKOUT
+compare: setup-tests ## the same answers, and as fast? This checkout against BEFORE=CHECKOUT
 	@$(BIN)/python benchmarks/compare.py --before "$(BEFORE)" --json out/bench/compare.json $(ARGS)
 
-docs: setup       ## the pages that are written from code: interfaces, parameters, rooms
+docs: setup-tests ## the pages that are written from code: interfaces, parameters, rooms
 	@$(BIN)/python tools/interface_reference.py
 	@$(BIN)/python tools/parameter_reference.py
 	@$(BIN)/python tools/security_policy.py

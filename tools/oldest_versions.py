@@ -2,7 +2,7 @@
 
 The copy lies in out/oldest: its requirements are those of requirements/, with the versions of `[oldest]` in
 requirements/supported.toml, and its set-up is the usual one. Only what has changed is copied and built again.
-Of the compiled core the portable variant alone is built: half the work, and no other run tests it as a whole.
+The tests run on the portable variant of the compiled core: no other run tests it as a whole.
 
     python tools/oldest_versions.py [--python VERSION] [--newest] [what pytest takes]
 
@@ -138,8 +138,9 @@ def main() -> int:
     )
     if found.returncode:
         return found.returncode
-    environment["IR_KERNELS_PORTABLE"] = "1"
-    made = subprocess.run([found.stdout.strip(), "tools/set_up.py"], cwd=copy, env=environment).returncode
+    made = subprocess.run(
+        [found.stdout.strip(), "tools/set_up.py", "--tests"], cwd=copy, env=environment
+    ).returncode
     if made:
         return made
     chosen = [*pytest, *(word for name in OTHERWISE for word in ("--deselect", name))]
@@ -147,7 +148,7 @@ def main() -> int:
     command = [
         ".venv/bin/python", "-m", "pytest", *side_by_side, "-m", "not long", *tests(copy), *chosen,
     ]  # fmt: skip
-    return subprocess.run(command, cwd=copy, env=environment).returncode
+    return subprocess.run(command, cwd=copy, env={**environment, "IR_KERNELS": "baseline"}).returncode
 
 
 if __name__ == "__main__":

@@ -1,4 +1,8 @@
-"""Builds the compiled core twice: for this machine, and for any x86-64; or not at all, and says so."""
+"""Builds the compiled core twice: for this machine, and for any x86-64; or not at all, and says so.
+
+IR_KERNELS_VARIANTS names the variants to build, with commas: native,baseline (both where it isn't set), one
+of them, or none (empty: what lies here already is installed).
+"""
 
 import copy
 import os
@@ -13,6 +17,7 @@ from setuptools import Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
 
 PACKAGE = "ir_kernels"
+PROCESSOR = "cpp/processor.cpp"  # a module of its own: which processor is this?
 X86 = platform.machine().lower() in ("x86_64", "amd64")
 # GCC 12 takes the deliberately undefined values of its own AVX-512 header for a mistake.
 WARNINGS = ["-Wall", "-Wextra", "-Wno-psabi", "-Wno-uninitialized", "-Wno-maybe-uninitialized"]
@@ -44,18 +49,26 @@ def extensions() -> list[Extension]:
         include = [pybind11.get_include()]
     except ImportError:
         include = []  # the distribution's pybind11-dev, found by the compiler on its own
-    variants = ("_baseline",) if os.environ.get("IR_KERNELS_PORTABLE") else ("_baseline", "_native")
+    variants = [name for name in os.environ.get("IR_KERNELS_VARIANTS", "native,baseline").split(",") if name]
+    if unknown := set(variants) - {"native", "baseline"}:
+        raise SystemExit(
+            f"IR_KERNELS_VARIANTS names {', '.join(sorted(unknown))}: known are native, baseline"
+        )
+    core = sorted(set(glob("cpp/*.cpp")) - {PROCESSOR})
+    sources = {f"_{name}": core for name in variants} | (
+        {"_processor": [PROCESSOR]} if "native" in variants else {}
+    )
     return [
         Extension(
             f"{PACKAGE}.{name}",
-            sorted(glob("cpp/*.cpp")),
+            files,
             include_dirs=[*include, "cpp"],
             depends=[*glob("cpp/*.hpp"), "setup.py"],
             define_macros=[("IR_MODULE", name)],
             language="c++",
             optional=True,
         )
-        for name in variants
+        for name, files in sources.items()
     ]
 
 
@@ -67,7 +80,7 @@ def native_features(compiler: str) -> list[str]:
     return [feature for macro, feature in FEATURES.items() if macro in defined]
 
 
-class BuildBothVariants(build_ext):
+class BuildVariants(build_ext):
     """The variants are built side by side; a compiler that is missing or fails leaves the NumPy reference."""
 
     def finalize_options(self):
@@ -76,7 +89,9 @@ class BuildBothVariants(build_ext):
 
     def run(self):
         super().run()
-        if not any(os.path.exists(self.get_ext_fullpath(e.name)) for e in self.extensions):
+        if self.extensions and not any(
+            os.path.exists(self.get_ext_fullpath(e.name)) for e in self.extensions
+        ):
             print(
                 f"{PACKAGE}: no C++ compiler with pybind11 was found: nothing compiled, the (slow) NumPy "
                 "reference will be used. Install g++ and pybind11 and install again.",
@@ -119,7 +134,7 @@ class BuildBothVariants(build_ext):
         own.build_temp = os.path.join(self.build_temp, ext.name)
         own.compiler = copy.copy(self.compiler)
         own.compiler.compile = self.compile_files_side_by_side
-        super(BuildBothVariants, own).build_extension(ext)
+        super(BuildVariants, own).build_extension(ext)
 
 
 if __name__ == "__main__":  # pip and colcon run it under that name too
@@ -133,7 +148,7 @@ if __name__ == "__main__":  # pip and colcon run it under that name too
             (f"share/{PACKAGE}", ["package.xml"]),
         ],
         ext_modules=extensions(),
-        cmdclass={"build_ext": BuildBothVariants},
+        cmdclass={"build_ext": BuildVariants},
         install_requires=["numpy"],
         python_requires=">=3.10",
         zip_safe=False,

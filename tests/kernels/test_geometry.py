@@ -137,12 +137,24 @@ def test_without_a_compiled_core_one_warning_says_so(monkeypatch: pytest.MonkeyP
     assert len(warned) == 1
 
 
-def test_native_is_not_loaded_where_its_instructions_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    modules = {"_baseline": SimpleNamespace(native_runs_here=lambda: False)}
-    monkeypatch.setattr(compiled, "_import", lambda name: modules[name])
-    assert compiled.load()[0] == "baseline"
-    modules = {"_baseline": SimpleNamespace(native_runs_here=lambda: True), "_native": SimpleNamespace()}
-    assert compiled.load()[0] == "native"
+@pytest.mark.parametrize(
+    ("runs", "there", "loaded"),
+    [
+        (True, ("_native", "_baseline"), "native"),
+        (True, ("_native",), "native"),
+        (True, ("_baseline",), "baseline"),
+        (False, ("_native", "_baseline"), "baseline"),
+        (None, ("_native", "_baseline"), "baseline"),  # nothing says what the native build needs
+    ],
+)
+def test_native_is_loaded_where_its_instructions_are_there(
+    runs: bool | None, there: tuple[str, ...], loaded: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    modules = {name: SimpleNamespace(name=name) for name in there}
+    if runs is not None:
+        modules["_processor"] = SimpleNamespace(native_runs_here=lambda: runs)
+    monkeypatch.setattr(compiled, "_import", modules.get)
+    assert compiled.load() == (loaded, modules[f"_{loaded}"])
 
 
 def test_baseline_and_native_agree() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
 import os
 import re
@@ -20,13 +20,18 @@ SHIM = "#!/bin/sh\necho 'command not found in this version manager' >&2\nexit 12
 
 @pytest.fixture(scope="module")
 def set_up() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("set_up", ROOT / "tools" / "set_up.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["set_up"] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+    sys.path.append(str(ROOT / "tools"))  # as it is when the script runs
+    return importlib.import_module("set_up")
+
+
+@pytest.fixture(scope="module")
+def distributions(set_up: ModuleType) -> ModuleType:
+    return importlib.import_module("_distributions")
+
+
+@pytest.fixture(scope="module")
+def stages(set_up: ModuleType) -> ModuleType:
+    return importlib.import_module("_stages")
 
 
 def executable(path: Path, text: str) -> Path:
@@ -116,17 +121,17 @@ def test_another_machine_is_sent_to_the_container(
 
 
 def test_only_names_and_contents_make_the_fingerprint(
-    set_up: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    stages: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(set_up, "ROOT", tmp_path)
+    monkeypatch.setattr(stages, "ROOT", tmp_path)
     file = tmp_path / "Status.msg"
     file.write_text("int32 code\n")
-    before = set_up.fingerprint([file])
+    before = stages.fingerprint([file])
     os.utime(file, (0, 0))
-    assert set_up.fingerprint([file]) == before
+    assert stages.fingerprint([file]) == before
     file.write_text("int64 code\n")
-    assert set_up.fingerprint([file]) != before
-    assert set_up.fingerprint([file.rename(tmp_path / "Code.msg")]) != set_up.fingerprint([])
+    assert stages.fingerprint([file]) != before
+    assert stages.fingerprint([file.rename(tmp_path / "Code.msg")]) != stages.fingerprint([])
 
 
 def distribution(site: Path, name: str, version: str, url: str = "") -> Path:
@@ -138,42 +143,80 @@ def distribution(site: Path, name: str, version: str, url: str = "") -> Path:
 
 
 def test_a_wheel_that_is_gone_or_of_another_version_is_noticed(
-    set_up: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    distributions: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "requirements").mkdir()
-    (tmp_path / "requirements" / "constraints.txt").write_text(
-        "# pins\nnumpy==2.0\nRuamel.yaml==0.1\nempy==4.2\nelsewhere==1.0\n"
-    )
-    run = tmp_path / "requirements" / "run.txt"
+    constraints, run = tmp_path / "constraints.txt", tmp_path / "run.txt"
+    constraints.write_text("# pins\nnumpy==2.0\nRuamel.yaml==0.1\nempy==4.2\nelsewhere==1.0\n")
     run.write_text("-c constraints.txt\nnumpy\nruamel-yaml[extra]\n")
-    monkeypatch.setattr(set_up, "ROOT", tmp_path)
-    monkeypatch.setattr(set_up, "REQUIREMENTS", (run,))
-    monkeypatch.setattr(set_up, "CAME", tmp_path / "came")
+    monkeypatch.setattr(distributions, "CONSTRAINTS", constraints)
+    monkeypatch.setattr(distributions, "STAMPS", tmp_path)
     site = tmp_path / "site"
     numpy = distribution(site, "numpy", "2.0")
     distribution(site, "ruamel_yaml", "0.1")
+    before = distributions.installed(site)
     distribution(site, "empy", "3.3")
-    assert set_up.missing_wheels(site) == []  # nobody asks for empy and elsewhere
-    (tmp_path / "came").write_text("empy\nnumpy")
-    assert set_up.missing_wheels(site) == ["empy"]
+    assert distributions.missing_wheels(site, run) == []  # nobody asks for empy and elsewhere
+    distributions.note_what_came(site, run, before)
+    assert distributions.missing_wheels(site, run) == ["empy"]
     numpy.rename(site / "numpy-1.9.dist-info")
-    assert set_up.missing_wheels(site) == ["empy", "numpy"]
+    assert distributions.missing_wheels(site, run) == ["empy", "numpy"]
 
 
-def test_a_package_that_is_not_installed_from_here_is_noticed(set_up: ModuleType, tmp_path: Path) -> None:
+def test_a_package_that_is_not_installed_from_here_is_noticed(
+    distributions: ModuleType, tmp_path: Path
+) -> None:
     here, away, gone = (tmp_path / "src" / name for name in ("ir_here", "ir_away", "ir_gone"))
     site = tmp_path / "site"
     distribution(site, "ir_here", "0.1.0", here.as_uri())
     distribution(site, "ir_away", "0.1.0", (tmp_path / "other" / "ir_away").as_uri())
-    assert set_up.missing_editable(site, (here, away, gone)) == ["ir_away", "ir_gone"]
-    assert set_up.said(["ir_away", "ir_gone"]) == " (missing: ir_away, ir_gone)"
+    assert distributions.missing_editable(site, (here, away, gone)) == ["ir_away", "ir_gone"]
+    assert distributions.said(["ir_away", "ir_gone"]) == " (missing: ir_away, ir_gone)"
 
 
-def test_what_is_installed_here_is_complete(set_up: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stages_of_a_wave_run_side_by_side_and_install_one_after_another(
+    set_up: ModuleType, stages: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stages, "LOGS", tmp_path)
+    monkeypatch.setattr(stages, "STAMPS", tmp_path)
+    meets = "import pathlib, time\nme, other = map(pathlib.Path, ('{0}', '{1}'))\nme.touch()\n" + (
+        "for _ in range(3000):\n    if other.exists(): break\n    time.sleep(0.01)\nelse: exit(1)\n"
+    )
+    alone = "import pathlib\nme = pathlib.Path('lock')\nme.touch(exist_ok=False)\nme.unlink()\n"
+    wave = [
+        stages.Stage(
+            name, name, "now", list, builds=(sys.executable, "-c", meets.format(name, other)),
+            installs=(sys.executable, "-c", alone), folder=tmp_path,
+        )
+        for name, other in (("a", "b"), ("b", "a"))
+    ]  # fmt: skip
+    done = {stage.name for stage, _ in set_up.side_by_side(wave, tmp_path)}
+    assert done == {"a", "b"}
+    assert not any(set_up.needed(stage) for stage in wave)
+
+
+def test_a_stage_that_fails_says_why_after_the_others_have_ended(
+    set_up: ModuleType, stages: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stages, "LOGS", tmp_path)
+    monkeypatch.setattr(stages, "STAMPS", tmp_path)
+    bad = stages.Stage(
+        "bad", "bad", "now", list, installs=(sys.executable, "-c", "raise SystemExit('no disk')")
+    )
+    good = stages.Stage("good", "good", "now", list, builds=(sys.executable, "-c", ""))
+    with pytest.raises(set_up.SetupError, match="no disk"):
+        list(set_up.side_by_side([bad, good], tmp_path))
+    assert set_up.needed(bad)
+    assert not set_up.needed(good)
+
+
+def test_what_is_installed_here_is_complete(
+    distributions: ModuleType, stages: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every wheel that this interpreter was given is there in its pinned version."""
     site = Path(pytest.__file__).parents[1]
-    monkeypatch.setattr(set_up, "CAME", site.parents[2] / ".setup" / "wheels.installed")
-    assert set_up.missing_wheels(site) == []
+    monkeypatch.setattr(distributions, "STAMPS", site.parents[2] / ".setup")
+    for requirements in (stages.BUILD, stages.RUN, stages.TESTS):
+        assert distributions.missing_wheels(site, requirements) == []
 
 
 def test_every_requirement_is_pinned_in_one_version() -> None:

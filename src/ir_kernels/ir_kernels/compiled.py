@@ -1,8 +1,8 @@
 """Which build of the compiled core this process uses: native, baseline, or none (the NumPy reference).
 
 `_native` was compiled for the processor of the machine that built it and may hold instructions that another
-one lacks; `_baseline` runs on any x86-64 and knows what `_native` needs. The environment variable IR_KERNELS
-forces one of "native", "baseline", "reference".
+one lacks; `_processor` knows what it needs; `_baseline` runs on any x86-64. The environment variable
+IR_KERNELS forces one of "native", "baseline", "reference".
 """
 
 import importlib
@@ -33,11 +33,12 @@ def load(choice: str = "") -> tuple[str, Core]:
         raise ImportError(f"IR_KERNELS is {choice!r}: known are {', '.join(CHOICES)}")
     if choice == "reference":
         return "reference", None
-    baseline = _import("_baseline")
-    native = _import("_native") if choice != "baseline" and baseline and baseline.native_runs_here() else None
+    processor = _import("_processor") if choice != "baseline" else None
+    native = _import("_native") if processor is not None and processor.native_runs_here() else None
     if native is not None:
         return "native", native
-    if baseline is not None and choice != "native":
+    baseline = _import("_baseline") if choice != "native" else None
+    if baseline is not None:
         return "baseline", baseline
     if choice:
         raise ImportError(
