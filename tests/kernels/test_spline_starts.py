@@ -12,7 +12,7 @@ from ir_kernels.spline import SplineCost
 from ir_msgs_py.arrays import FloatArray
 
 STARTS = SplineStarts(spacing=0.1, slower=1.3, fewest=8, most=12)
-EVALUATIONS = 12
+EVALUATIONS = 6
 
 
 def detours(seed: int, count: int) -> list[FloatArray]:
