@@ -179,7 +179,7 @@ class Refinement:
         return None
 
     def staged(self, solution: Solution, stage: Stage, path: FloatArray) -> Solution:
-        """The descent of a stage, on a spline as fine as it asks for."""
+        """The descent of a stage along a path (N, n), on a spline as fine as it asks for."""
         spline = solution.spline
         for _ in range(stage.level - solution.stage.level):
             spline = spline.subdivided() if spline.interval > _FINE else spline
