@@ -511,7 +511,7 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         "unknown planner",
         PlanRegionalMovement,
         "plan_regional_movement",
-        {"start": state(HOME), "goal": "park", "options": PlanOptions(planner_id="prm")},
+        {"start": state(HOME), "goal": "park", "options": PlanOptions(planner_id="fastest")},
         -16,
         "detours",
     ),

@@ -18,7 +18,7 @@ def program():
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
     home = np.array(planner.cell.machine_home)
-    options = PlanOptions(max_iterations=2000, safety_distance=MARGIN)
+    options = PlanOptions(max_iterations=4000, safety_distance=MARGIN)
     plan = planner.plan_program((), 0.0, options, home)
     assert plan.status.ok, plan.status
     planner.set_equipment("lathe", None, True, "door_closed")
