@@ -27,7 +27,7 @@ from ir_msgs_py.ros.command_line import CommandLineError, answer_before_start, i
 from ir_msgs_py.ros.network import apply_network
 
 N = TypeVar("N", bound=Node)
-_POLL = 0.1  # s
+LOOK = 0.1  # s between two looks whether a node goes on
 FAILURES_MAX, FAILURES_WITHIN = 50, 60.0
 """So many callbacks may fail within so many seconds: a node that fails more often does nothing useful."""
 
@@ -39,14 +39,15 @@ class Spinning:
         self._ended = threading.Event()
         self._executor: Executor | None = None
 
-    def run(self, executor: Executor, goes_on: Callable[[], bool] | None = None) -> None:
-        """Return after `end`, when the executor's context has ended, or soon after goes_on() is False.
+    def run(self, executor: Executor, goes_on: Callable[[], bool] | None = None, look: float = LOOK) -> None:
+        """Return after `end`, when the executor's context has ended, or at most `look` [s] after goes_on() is
+        False.
 
         Raises what a callback raises; `run` may be called again then.
         """
         self._executor = executor
         context = executor.context
-        period = None if goes_on is None else _POLL
+        period = None if goes_on is None else look
         try:
             while not self._ended.is_set() and context.ok() and (goes_on is None or goes_on()):
                 executor.spin_once(timeout_sec=period)
@@ -74,9 +75,11 @@ def run_node(
     executor: Callable[[], Executor] = SingleThreadedExecutor,
     refusals: tuple[type[Exception], ...] = (),
     goes_on: Callable[[N], bool] | None = None,
+    look: float = LOOK,
     about: str = "",
 ) -> int:
-    """Make the node and spin it until a signal comes, or soon after goes_on(node) is False; the exit code.
+    """Make the node and spin it until a signal comes, or at most `look` [s] after goes_on(node) is False; the
+    exit code. Each look wakes the executor, which then holds the interpreter for about a millisecond.
 
     about: what the node does, for --help; "" where somebody else has read the node's own words. refusals:
     what `make` or the clean-up raises for reasons that a sentence on stderr explains (exit code 1). Call it
@@ -96,7 +99,7 @@ def run_node(
         try:
             spins = executor()
             spins.add_node(node)
-            spin(spinning, spins, node, None if goes_on is None else lambda: goes_on(node))
+            spin(spinning, spins, node, None if goes_on is None else lambda: goes_on(node), look)
             spins.remove_node(node)
         finally:
             node.destroy_node()
@@ -108,12 +111,18 @@ def run_node(
     return 0
 
 
-def spin(spinning: Spinning, executor: Executor, node: Node, goes_on: Callable[[], bool] | None) -> None:
+def spin(
+    spinning: Spinning,
+    executor: Executor,
+    node: Node,
+    goes_on: Callable[[], bool] | None,
+    look: float = LOOK,
+) -> None:
     """Spin to the end; what a callback raises is logged, and ends the node only when it comes too often."""
     failures: deque[float] = deque(maxlen=FAILURES_MAX)
     while True:
         try:
-            return spinning.run(executor, goes_on)
+            return spinning.run(executor, goes_on, look)
         except Exception as error:  # one callback must not end the node for all others
             now = time.monotonic()
             if len(failures) == FAILURES_MAX and now - failures[0] < FAILURES_WITHIN:

@@ -56,6 +56,7 @@ _LINES_MAX = 20  # of the log per second: who toggles a bit all day must not fil
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
 REFUSALS = (DriverError, DescriptionError, MsgsError)
+_LOOK = 1.0  # s between two looks whether the plant runs: each delays its thread
 _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
 
 
@@ -271,4 +272,6 @@ def main() -> int:
         return node
 
     about = "Simulates a KR210 with its drives, power modes, PLC bits and mains meter; executes trajectories."
-    return run_node(names.SIM_DRIVER, make, goes_on=SimDriver.goes_on, refusals=REFUSALS, about=about)
+    return run_node(
+        names.SIM_DRIVER, make, goes_on=SimDriver.goes_on, look=_LOOK, refusals=REFUSALS, about=about
+    )
