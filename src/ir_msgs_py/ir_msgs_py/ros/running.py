@@ -79,15 +79,14 @@ def run_node(
     about: str = "",
 ) -> int:
     """Make the node and spin it until a signal comes, or at most `look` [s] after goes_on(node) is False; the
-    exit code. Each look wakes the executor, which then holds the interpreter for about a millisecond.
+    exit code. Each look wakes the executor and holds the interpreter for about a millisecond.
 
     about: what the node does, for --help; "" where somebody else has read the node's own words. refusals:
     what `make` or the clean-up raises for reasons that a sentence on stderr explains (exit code 1). Call it
     in the main thread, as the last thing of a process: its signals stay taken.
     """
     words = sys.argv[1:] if arguments is None else arguments
-    answer = answer_before_start(name, words, about) if about else None
-    if answer is not None:
+    if about and (answer := answer_before_start(name, words, about)) is not None:
         return answer
     expected: tuple[type[Exception], ...] = (CommandLineError, ParameterError, *refusals)
     spinning = Spinning()
