@@ -78,12 +78,11 @@ def run_node(
     look: float = LOOK,
     about: str = "",
 ) -> int:
-    """Make the node and spin it until a signal comes, or at most `look` [s] after goes_on(node) is False; the
-    exit code. Each look wakes the executor and holds the interpreter for about a millisecond.
+    """Make a node, spin it until a signal or until `look` [s] after goes_on(node) is False; the exit code.
 
-    about: what the node does, for --help; "" where somebody else has read the node's own words. refusals:
-    what `make` or the clean-up raises for reasons that a sentence on stderr explains (exit code 1). Call it
-    in the main thread, as the last thing of a process: its signals stay taken.
+    Each look holds the interpreter for about a millisecond. about: what the node does, for --help; "" where
+    its own words were read before. refusals: what `make` or the clean-up raises for reasons that a sentence
+    on stderr explains (exit code 1). Call it in the main thread, last of all: its signals stay taken.
     """
     words = sys.argv[1:] if arguments is None else arguments
     if about and (answer := answer_before_start(name, words, about)) is not None:
