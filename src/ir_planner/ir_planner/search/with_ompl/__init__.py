@@ -6,6 +6,7 @@ from ir_planner.search.with_ompl.bkpiece import Bkpiece
 from ir_planner.search.with_ompl.host import missing
 from ir_planner.search.with_ompl.kpiece import Kpiece
 from ir_planner.search.with_ompl.lbkpiece import Lbkpiece
+from ir_planner.search.with_ompl.ompl_search import OmplSearch
 from ir_planner.search.with_ompl.prm import Prm
 from ir_planner.search.with_ompl.rrt import Rrt
 from ir_planner.search.with_ompl.rrt_connect import RrtConnect
@@ -25,4 +26,4 @@ __all__ = [
 
 def needs_ompl(search: Search) -> bool:
     """Whether a search is one of OMPL's planners."""
-    return isinstance(search, Aorrtc | Bkpiece | Kpiece | Lbkpiece | Prm | Rrt | RrtConnect)
+    return isinstance(search, OmplSearch)

@@ -4,18 +4,18 @@ Wilson et al., "AORRTC: almost-surely asymptotically optimal planning with RRT-C
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from ir_msgs_py.settings import check_settings, setting
-from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
-from ir_planner.search.port import Ends, Found
-from ir_planner.search.with_ompl.adapter import found_by
-from ir_planner.search.with_ompl.problem import Parameters
+from ir_msgs_py.settings import setting
+from ir_planner.search.with_ompl.ompl_search import OmplSearch
 
 
 @dataclass(frozen=True)
-class Aorrtc:
+class Aorrtc(OmplSearch):
     """RRT-Connect again and again for paths that must be shorter (AORRTC)."""
+
+    planner_id: ClassVar[str] = "aorrtc"
+    planner: ClassVar[str] = "AORRTC"
 
     range: float = setting(
         1.0, "Longest motion that is added at once.", unit="rad", minimum=0.01, maximum=50.0
@@ -27,10 +27,6 @@ class Aorrtc:
         maximum=100_000_000,
     )
 
-    def __post_init__(self) -> None:
-        check_settings(self)
-
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
-        """One path, or none."""
-        parameters = Parameters("AORRTC", {"Range": self.range})
-        return found_by("aorrtc", parameters, self.edges, ends, space, seed, work)
+    def parameters(self) -> dict[str, float]:
+        """OMPL's parameters by the names of their set... methods."""
+        return {"Range": self.range}

@@ -4,51 +4,23 @@ OMPL's bidirectional variant of KPIECE.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from ir_msgs_py.settings import check_settings, setting
-from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
-from ir_planner.search.port import Ends, Found
-from ir_planner.search.with_ompl.adapter import found_by
-from ir_planner.search.with_ompl.problem import Parameters
+from ir_msgs_py.settings import setting
+from ir_planner.search.with_ompl.ompl_search import OverCells
 
 
 @dataclass(frozen=True)
-class Bkpiece:
+class Bkpiece(OverCells):
     """Two trees of KPIECE, from the start and from the goals (BKPIECE)."""
 
-    range: float = setting(
-        0.5, "Longest motion that is added at once.", unit="rad", minimum=0.01, maximum=50.0
-    )
-    border_fraction: float = setting(
-        0.9, "Share of the motions that start in cells at the border.", minimum=0.01, maximum=1.0
-    )
+    planner_id: ClassVar[str] = "bkpiece"
+    planner: ClassVar[str] = "BKPIECE1"
+
     failed_score: float = setting(
         0.5, "What the score of a cell is multiplied by where a motion failed.", minimum=0.01, maximum=1.0
     )
-    cell: float = setting(
-        0.3,
-        "Size of the cells over the first three joints; 0: OMPL's own projection.",
-        unit="rad",
-        minimum=0.0,
-        maximum=10.0,
-    )
-    edges: int = setting(
-        100_000_000, "Checks in certified edges before it is given up.", minimum=1, maximum=100_000_000
-    )
 
-    def __post_init__(self) -> None:
-        check_settings(self)
-
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
-        """One path, or none."""
-        parameters = Parameters(
-            "BKPIECE1",
-            {
-                "Range": self.range,
-                "BorderFraction": self.border_fraction,
-                "FailedExpansionCellScoreFactor": self.failed_score,
-            },
-            self.cell,
-        )
-        return found_by("bkpiece", parameters, self.edges, ends, space, seed, work)
+    def parameters(self) -> dict[str, float]:
+        """OMPL's parameters by the names of their set... methods."""
+        return {**super().parameters(), "FailedExpansionCellScoreFactor": self.failed_score}
