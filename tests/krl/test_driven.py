@@ -35,7 +35,7 @@ def steps_of(program: Followed, planner: Planner) -> list[np.ndarray]:
 
 
 @given(st.integers(0, 10**9))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_status_and_turn_find_the_taught_configuration_again(planner: Planner, seed: int) -> None:
     """Law: S and T of a configuration, with its pose, mean this configuration and no other."""
     robot = planner.cell.robot
@@ -130,7 +130,7 @@ def test_an_output_ends_an_approximation(planner: Planner, followed: Follow) -> 
 
 
 @given(st.integers(0, 10**9))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_what_is_driven_keeps_the_limits(planner: Planner, seed: int) -> None:
     """Law: what is driven keeps speed, acceleration, jerk and torque of every axis, blends included."""
     rng = np.random.default_rng(seed)
