@@ -74,3 +74,9 @@ class Driven:
         while mains.meter.reading().capacitor_energy > 0.0 and self.simulation.time < begun + LONGEST_REST:
             self.simulation.run(REST)
             mains.settle()
+
+
+def plant_by_cell(every: Sequence[Predicted], plant: str | Plant) -> dict[str, Driven]:
+    """The plant in each cell of these movements: a physics server each, tens of megabytes."""
+    cells = {each.movement.cell.name: each.movement.cell for each in every}
+    return {name: Driven(cell, plant) for name, cell in cells.items()}

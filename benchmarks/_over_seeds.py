@@ -5,20 +5,22 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 _work: Callable[[int], Any] | None = None  # what the processes inherit: it need not be pickled
 
 
 def over_seeds(work: Callable[[int], Any], seeds: Sequence[int]) -> list[Any]:
-    """Results in the order of the seeds; a process for each core, forked with all that is planned by then."""
+    """Results in the order of the seeds; a process for each core, forked with all that is planned by then.
+
+    Raises BrokenProcessPool where one of them is killed, as for want of memory.
+    """
     global _work
     _work = work
-    with multiprocessing.get_context("fork").Pool(os.cpu_count()) as pool:
-        found = pool.map(_one, seeds, chunksize=1)
-        pool.close()
-        pool.join()  # so that their processor time counts
-    return found
+    fork = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=fork) as pool:  # waits: their processor time counts
+        return list(pool.map(_one, seeds))
 
 
 def _one(seed: int) -> Any:

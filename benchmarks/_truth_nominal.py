@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from _driven_movements import Driven, all_predicted
+from _driven_movements import all_predicted, plant_by_cell
 from _results import at_most
 from _truth_section import Asked, Found
 
@@ -16,10 +16,11 @@ QUICK = ("open",)
 def measured(asked: Asked) -> Found:
     """Predicted and simulated energy of every movement."""
     rows: list[dict[str, Any]] = []
-    plants: dict[str, Driven] = {}
-    for each in all_predicted(QUICK if asked.quick else asked.cells):
+    every = all_predicted(QUICK if asked.quick else asked.cells)
+    plants = plant_by_cell(every, "nominal")
+    for each in every:
         movement = each.movement
-        plant = plants.setdefault(movement.cell.name, Driven(movement.cell, "nominal"))
+        plant = plants[movement.cell.name]
         outcome = plant.drive(movement)
         off = outcome.energy - each.energy
         rows.append(

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from _driven_movements import Driven, all_predicted
+from _driven_movements import all_predicted, plant_by_cell
 from _over_seeds import over_seeds
 from _results import at_least, at_most
 from _truth_section import Asked, Found
@@ -37,11 +37,11 @@ def measured(asked: Asked) -> Found:
 
 def _driven(every: Sequence[Any], objective: str, seed: int) -> dict[str, Any]:
     """What a plant makes of all movements; energies of those that ended successful."""
-    plants: dict[str, Driven] = {}
+    plants = plant_by_cell(every, f"typical:{seed}")
     off, tool, error, settling, failed = [], [0.0], [0.0], [0.0], 0
     for each in every:
         movement = each.movement
-        plant = plants.setdefault(movement.cell.name, Driven(movement.cell, f"typical:{seed}"))
+        plant = plants[movement.cell.name]
         outcome = plant.drive(movement)
         tool.append(outcome.max_tool_deviation)
         error.append(max(outcome.max_tracking_error))
