@@ -79,13 +79,15 @@ RUNNER = Rights(
     execute=(names.RUN_PROGRAM,),
     call=(names.EXECUTE_TRAJECTORY,),
 )
+STUDIES = Rights(execute=(names.RUN_STUDY,))
 ACTIONS = (*PLANNER.execute, *DRIVER.execute, *RUNNER.execute)
 COMMANDS = (names.COMMANDED_TRAJECTORY, names.PLC_INPUTS, names.SPEED_SCALING, names.SIGNALS)
 NODES = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER, names.RECORDER)
-CALLS = tuple(f"{node}/{names.CALLS}" for node in NODES)
+ANSWERING = (*NODES, names.STUDIES)
+CALLS = tuple(f"{node}/{names.CALLS}" for node in ANSWERING)
 REPORTS = (*PLANNER.publish, *DRIVER.publish, *RUNNER.publish, *COMMON.publish, *CALLS)
 RECORDER = Rights(
-    subscribe=(*REPORTS, *COMMANDS, *(f"{action}/_action/status" for action in ACTIONS)),
+    subscribe=(*REPORTS, *COMMANDS, *(f"{action}/_action/status" for action in (*ACTIONS, names.RUN_STUDY))),
     reply=(names.START_RECORDING, names.STOP_RECORDING),
     request=(
         names.GET_CELL,
@@ -106,18 +108,18 @@ PEOPLE = Rights(
     subscribe=(*REPORTS, *COMMANDS),
     request=(
         *(service for rights in CELL.values() for service in rights.reply),
-        *(f"{node}/{service}" for node in NODES for service in PARAMETER_SERVICES),
+        *(f"{node}/{service}" for node in ANSWERING for service in PARAMETER_SERVICES),
     ),
-    call=ACTIONS,
+    call=(*ACTIONS, names.RUN_STUDY),
 )
 
 
 def rights() -> dict[str, Rights]:
     """Rights of every node, the common ones and its own parameters included."""
     found = {}
-    for node, own in {**CELL, names.LIVE: LIVE, OPERATOR: PEOPLE}.items():
+    for node, own in {**CELL, names.STUDIES: STUDIES, names.LIVE: LIVE, OPERATOR: PEOPLE}.items():
         found[node] = Rights(
-            _sorted(own.publish, COMMON.publish, (f"{node}/{names.CALLS}",) if node in NODES else ()),
+            _sorted(own.publish, COMMON.publish, (f"{node}/{names.CALLS}",) if node in ANSWERING else ()),
             _sorted(own.subscribe, COMMON.subscribe),
             _sorted(own.reply, tuple(f"{node}/{service}" for service in PARAMETER_SERVICES)),
             _sorted(own.request),

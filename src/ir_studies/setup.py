@@ -1,4 +1,4 @@
-"""Compares planners over cells, tasks and seeds, and shows what follows."""
+"""Many plans of a cell, and what follows: planners compared, where things should stand."""
 
 from setuptools import find_packages, setup
 
@@ -8,7 +8,7 @@ setup(
     name=PACKAGE,
     version="0.1.0",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed", "arena/*.html"]},
+    package_data={PACKAGE: ["py.typed", "arena/*.html", "layout/*.html"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
@@ -17,6 +17,8 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="Compares planners over cells, tasks and seeds, and shows what follows",
+    description="Many plans of a cell, and what follows: planners compared, where things should stand",
     license="Apache-2.0",
+    extras_require={"cluster": ["dask", "distributed"]},
+    entry_points={"console_scripts": ["ir_studies = ir_studies.node:main"]},
 )

@@ -11,6 +11,7 @@ MODULES = {
     "ir_planner": "ir_planner.node",
     "ir_sim_driver": "ir_sim_driver.node",
     "ir_program_runner": "ir_program_runner.node",
+    "ir_studies": "ir_studies.node",
     "ir-record": "ir_recorder.node",
     "ir-play": "ir_recorder.play.node",
 }

@@ -21,6 +21,7 @@ from ir_recorder.listen.topics import TopicSelection
 from ir_recorder.live.node import LiveNode
 from ir_recorder.node import RecorderNode
 from ir_sim_driver.node import SimDriver
+from ir_studies.node import StudiesNode
 
 ROOT = Path(__file__).resolve().parents[2]
 # elements of a policy 0.2.0 with their attributes and children, from the schema of ros2/sros2
@@ -92,6 +93,7 @@ def nodes(ros_context: Any, ros_executor: Any) -> dict[str, Any]:
         "ir_sim_driver": made(SimDriver, cell="open", backend="ideal", wake_port=0),
         "ir_program_runner": made(ProgramRunnerNode),
         "ir_recorder": made(RecorderNode),
+        "ir_studies": made(StudiesNode),
         "ir_live": made(LiveNode),
     }
 

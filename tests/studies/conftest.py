@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from ir_studies import Means
 from ir_studies.arena import ArenaSettings, Finished, run_arena
+from ir_studies.work.means import Progress, nobody
 
 WORKER = Path(__file__).with_name("fake_worker.py")
 Fought = Callable[..., Finished]
@@ -25,10 +27,10 @@ def command(tmp_path: Path) -> tuple[str, ...]:
 def fought(tmp_path: Path, command: tuple[str, ...]) -> Fought:
     """Runs an arena of these planners in a folder."""
 
-    def run(*planners: str, folder: str = "out", seeds: int = 2, **more: object) -> Finished:
+    def run(*planners: str, folder: str = "out", seeds: int = 2, progress: Progress = nobody) -> Finished:
         settings = ArenaSettings(
             cells=("open",), planners=planners, tasks=("home->p1",), seeds=seeds, seconds=0.01, hang_after=2.0
         )
-        return run_arena(settings, tmp_path / folder, 2, command=command, **more)  # type: ignore[arg-type]
+        return run_arena(settings, tmp_path / folder, Means(2, progress=progress, command=command))
 
     return run

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from ir_studies import Means
 from ir_studies.arena import ArenaSettings, Finished, run_arena
-from ir_studies.arena.entries import Entry
-from ir_studies.arena.results import NAME
 from ir_studies.errors import FolderError, WorkerError
+from ir_studies.work.results import NAME
 
 Fought = Callable[..., Finished]
 
@@ -43,8 +43,8 @@ def test_what_hangs_is_cut_and_what_dies_is_tried_once_more(fought: Fought) -> N
 def test_interrupted_and_resumed_it_gives_the_same_table(fought: Fought, tmp_path: Path) -> None:
     made: list[str] = []
 
-    def interrupt(done: int, of: int, entry: Entry) -> None:
-        made.append(entry.key)
+    def interrupt(phase: str, done: int, of: int, best: str) -> None:
+        made.append(phase)
         if len(made) == 3:
             raise KeyboardInterrupt
 
@@ -53,7 +53,7 @@ def test_interrupted_and_resumed_it_gives_the_same_table(fought: Fought, tmp_pat
     with (tmp_path / "out" / NAME).open("ab") as file:  # as a line that power loss cut
         file.write(b'{"key": "sbl|open|home->p1|3||sync')
     again: list[str] = []
-    resumed = fought("sbl", "genetic", seeds=4, progress=lambda done, of, entry: again.append(entry.key))
+    resumed = fought("sbl", "genetic", seeds=4, progress=lambda phase, done, of, best: again.append(phase))
     assert len(again) == len(set(again)) == 8 - 3
     assert set(made).isdisjoint(again)
     whole = fought("sbl", "genetic", seeds=4, folder="other")
@@ -63,7 +63,7 @@ def test_interrupted_and_resumed_it_gives_the_same_table(fought: Fought, tmp_pat
 def test_more_seeds_and_planners_are_added_to_a_folder(fought: Fought) -> None:
     fought("sbl", seeds=1)
     again: list[str] = []
-    finished = fought("sbl", "genetic", progress=lambda done, of, entry: again.append(entry.key))
+    finished = fought("sbl", "genetic", progress=lambda phase, done, of, best: again.append(phase))
     assert len(again) == 3
     assert len(finished.runs) == 4
 
@@ -78,13 +78,13 @@ def test_a_folder_of_other_settings_is_refused(fought: Fought, tmp_path: Path) -
 def test_two_arenas_in_one_folder_are_one_too_many(fought: Fought) -> None:
     refused: list[str] = []
 
-    def second(done: int, of: int, entry: Entry) -> None:
+    def second(phase: str, done: int, of: int, best: str) -> None:
         with pytest.raises(FolderError) as error:
             fought("sbl")
         refused.append(str(error.value))
 
     fought("sbl", seeds=1, progress=second)
-    assert "is in use by another arena" in refused[0]
+    assert "is in use by another study" in refused[0]
 
 
 @pytest.mark.parametrize("content", [b"\x00\xff", b"hello\n", b"[]\n", b'{"format": "ir_cell/1"}\n'])
@@ -106,11 +106,11 @@ def test_a_folder_that_cannot_be_written_is_named(fought: Fought, tmp_path: Path
 def test_workers_that_never_start_end_the_arena(tmp_path: Path) -> None:
     settings = ArenaSettings(cells=("open",), tasks=("home->p1",), seeds=5)
     with pytest.raises(WorkerError, match="a worker died before it could start"):
-        run_arena(settings, tmp_path, 2, command=("false",))
+        run_arena(settings, tmp_path, Means(2, command=("false",)))
 
 
 def test_no_worker_outlives_the_arena(fought: Fought, tmp_path: Path) -> None:
-    def stop(done: int, of: int, entry: Entry) -> None:
+    def stop(phase: str, done: int, of: int, best: str) -> None:
         assert running(str(tmp_path))
         raise KeyboardInterrupt
 

@@ -1,4 +1,4 @@
-"""The settings classes of the four nodes, each with the prefix of its parameters' names."""
+"""The settings classes of the nodes, each with the prefix of its parameters' names."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from ir_sim_driver import (
 )
 from ir_sim_driver.controller import SupervisionSettings
 from ir_sim_driver.node.parameters import NodeSettings
+from ir_studies.settings import StudiesSettings
 
 FIXED = "fixed: "  # the node takes these at its start only
 NODES: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {
@@ -39,6 +40,7 @@ NODES: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {
     ),
     "ir_program_runner": (("", ProgramSettings), (PREFIX, TransitionTimes), ("", LinkSettings)),
     "ir_recorder": (("", RecorderSettings),),
+    "ir_studies": (("", StudiesSettings),),
 }
 
 

@@ -19,6 +19,7 @@ PROGRAM_RUNNER: Final = "ir_program_runner"
 RECORDER: Final = "ir_recorder"
 PLAY: Final = "ir_play"
 LIVE: Final = "ir_live"
+STUDIES: Final = "ir_studies"
 CALLS: Final = "calls"  # topic of every node that answers: its requests and answers, for recordings
 
 # of nobody in particular
@@ -92,6 +93,9 @@ STOP_RECORDING: Final = f"{RECORDER}/stop"
 
 # ir_play: service
 CONTROL_PLAYBACK: Final = f"{PLAY}/control"
+
+# ir_studies: action
+RUN_STUDY: Final = f"{STUDIES}/run_study"
 
 # load texts: names of the cell's loads joined by LOAD_SEPARATOR, or nothing attached
 LOAD_SEPARATOR: Final = "+"

@@ -1,20 +1,31 @@
 """Studies: many plans of many cells, and what follows from them.
 
-    settings = read_settings("arena.yaml")
-    finished = run_arena(settings, "out/arena")
+    study = read_study("layout.yaml")
+    answer = study.run("out/layout", Means(workers=2))
+    print(answer.summary)
 
-Each study is a room; they share nothing but the errors.
+Each study is a room; they share the work (processes, results, settings) and the errors.
 """
 
 from ir_studies.arena import ArenaSettings, read_settings, run_arena
-from ir_studies.errors import FolderError, SettingsError, StudyError, WorkerError
+from ir_studies.errors import FolderError, SettingsError, StoppedError, StudyError, WorkerError
+from ir_studies.studies import KINDS, Answer, Kind, Study, read_study, study_of
+from ir_studies.work import Means
 
 __all__ = [
+    "KINDS",
+    "Answer",
     "ArenaSettings",
     "FolderError",
+    "Kind",
+    "Means",
     "SettingsError",
+    "StoppedError",
+    "Study",
     "StudyError",
     "WorkerError",
     "read_settings",
+    "read_study",
     "run_arena",
+    "study_of",
 ]

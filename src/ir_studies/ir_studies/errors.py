@@ -3,7 +3,8 @@
 StudyError
 ├── SettingsError  a settings file makes no sense: the key, its value, and what it may be
 ├── FolderError    the folder of the results holds others, or is in use
-└── WorkerError    the processes that plan can't be started
+├── WorkerError    the processes that plan can't be started, or Dask is missing or not reached
+└── StoppedError   somebody asked to stop; what was made is kept
 """
 
 
@@ -23,3 +24,7 @@ class FolderError(StudyError):
 
 class WorkerError(StudyError):
     """Processes that can't be started."""
+
+
+class StoppedError(StudyError):
+    """Stopped by whoever started it."""

@@ -11,6 +11,7 @@ from ir_description import Cell, load_cell
 from ir_msgs_py.arrays import FloatArray
 from ir_studies.arena.settings import MOST_RUNS, ArenaSettings
 from ir_studies.errors import SettingsError
+from ir_studies.work import Job
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class Entry:
     def key(self) -> str:
         """What it is known by in the results."""
         return "|".join(str(value) for value in asdict(self).values())
+
+    @property
+    def job(self) -> Job:
+        """What a worker is given of it."""
+        return Job(self.key, asdict(self))
 
     @property
     def question(self) -> tuple[str, str, str, str]:

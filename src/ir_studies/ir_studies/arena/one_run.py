@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
 
 import numpy as np
 
@@ -19,9 +18,8 @@ from ir_planner import Goal, MovementPlan, Planner
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 from ir_studies.arena.entries import Entry, tasks_of
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
+from ir_studies.work import Row
 
-Value: TypeAlias = "str | float | int | bool | list[list[float]]"
-Row: TypeAlias = dict[str, Value]
 SEEDS = 100_000  # between the first requests of two seeds
 _SHARE_OF_ENDS = 0.8  # of the clearance at start and goal, where that is smaller than the safety distance
 _FIRST = "first feasible"  # how the note of the stage begins that knew the first free path

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from ir_description import DescriptionError, load_cell, load_power_data
 from ir_msgs_py.options import TIMINGS
@@ -17,12 +14,12 @@ from ir_planner.scene import scene_with
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import missing, needs_ompl
 from ir_studies.errors import SettingsError
+from ir_studies.work import Placed, beside, checked_number, read_text, settings_values
 
 FORMAT = "ir_arena/1"
 PORTFOLIO = "portfolio"
 """The name of an empty planner_id."""
 MOST_RUNS = 1_000_000
-_MOST_CHARACTERS = 1_000_000  # of a settings file
 
 EXAMPLE = """\
 format: ir_arena/1
@@ -64,9 +61,9 @@ class ArenaSettings:
         _check_known("planners", self.planners, (PORTFOLIO, *SEARCHES))
         _check_known("timings", self.timings, TIMINGS)
         for name, low, high in _WHOLE:
-            _check(name, getattr(self, name), low, high, whole=True)
+            checked_number(name, getattr(self, name), low, high, whole=True)
         for name, least, most in _REAL:
-            _check(name, getattr(self, name), least, most, whole=False)
+            checked_number(name, getattr(self, name), least, most)
         wanted = [name for name in self.planners if name in SEARCHES and needs_ompl(SEARCHES[name])]
         if wanted and missing():
             raise SettingsError(f"planners: {', '.join(wanted)}: {missing()}")
@@ -104,44 +101,20 @@ _REAL = (
 
 def read_settings(path: str | Path) -> ArenaSettings:
     """The settings of a YAML file; cell files count from its folder. SettingsError names the key."""
-    file = Path(path)
     try:
-        if file.stat().st_size > _MOST_CHARACTERS:
-            raise SettingsError(f"{path} is larger than {_MOST_CHARACTERS} bytes: it is no settings file")
-        read = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SettingsError(f"{path} can't be read: {error.strerror}") from error
-    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        said = " ".join(str(error).split())
-        raise SettingsError(f"{path} is no YAML: {said}") from error
-    try:
-        return _settings_of(read, file.parent)
+        return arena_settings(read_text(path), beside(path))
     except SettingsError as error:
         raise SettingsError(f"{path}: {error}") from error
 
 
-def _settings_of(read: Any, folder: Path) -> ArenaSettings:
-    if not isinstance(read, dict) or read.get("format") != FORMAT:
-        raise SettingsError(f"expected keys and values with format: {FORMAT}")
-    known = {field.name: field for field in fields(ArenaSettings)}
-    values: dict[str, Any] = {}
-    for key, value in read.items():
-        if key == "format":
-            continue
-        if key not in known:
-            raise SettingsError(f"{key} is unknown: known are {', '.join(known)}")
-        values[key] = tuple(value) if isinstance(value, list) else value
+def arena_settings(content: str, placed: Placed) -> ArenaSettings:
+    """The settings of a text. placed: where cells are."""
+    values = settings_values(content, FORMAT, [field.name for field in fields(ArenaSettings)])
     if "cells" not in values:
         raise SettingsError("cells are missing: names of bundled cells, or files")
     if isinstance(values["cells"], tuple):
-        values["cells"] = tuple(_placed(name, folder) for name in values["cells"])
+        values["cells"] = tuple(placed(n) if isinstance(n, str) else n for n in values["cells"])
     return ArenaSettings(**values)
-
-
-def _placed(name: Any, folder: Path) -> Any:
-    """A cell file beside the settings by its path; a bundled name, and what is no name, as it is."""
-    is_file = isinstance(name, str) and name.endswith((".yaml", ".yml"))
-    return str(folder / name) if is_file else name
 
 
 def _check_names(key: str, names: Any, *, may_be_empty: bool) -> None:
@@ -165,12 +138,3 @@ def _reverse(name: str) -> str:
     """The task that leads back."""
     first, _, last = name.partition("->")
     return f"{last}->{first}" if last else name
-
-
-def _check(key: str, value: Any, low: float, high: float, *, whole: bool) -> None:
-    kind: Callable[[Any], bool] = (
-        (lambda v: isinstance(v, int)) if whole else (lambda v: isinstance(v, int | float))
-    )
-    if isinstance(value, bool) or not kind(value) or not math.isfinite(value) or not low <= value <= high:
-        number = "a whole number" if whole else "a number"
-        raise SettingsError(f"{key} is {value!r:.60}: it must be {number} in {low:g} .. {high:g}")

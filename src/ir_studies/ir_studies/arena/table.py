@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 from ir_studies.arena.entries import Entry
-from ir_studies.arena.one_run import Row
+from ir_studies.work import Row
 
 NUMBERS = (
     "first_path_s", "first_s", "final_s", "duration_s", "energy_j", "drives_j", "cost_j", "movement_cost",

@@ -1,12 +1,9 @@
-"""The process that makes runs: settings and entries in as lines of JSON, one row out for each."""
+"""What makes the runs of an arena: cells, models and OMPL are loaded before the first of them is timed."""
 
 from __future__ import annotations
 
-import json
-import os
-import signal
-import sys
 import time
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
 from typing import Any
@@ -18,31 +15,19 @@ from ir_planner import Goal, Planner, PlannerError
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import needs_ompl
 from ir_studies.arena.entries import Entry, tasks_of
-from ir_studies.arena.one_run import Row, one_run
+from ir_studies.arena.one_run import one_run
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
-
-READY = {"ready": True}
-
-
-def main() -> None:
-    """Serve until the input ends. What libraries print goes to stderr."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it, who closes the input
-    answers = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)
-    with suppress(BrokenPipeError):
-        settings = _settings(json.loads(sys.stdin.readline()))
-        warm_up(settings)
-        answers.write(json.dumps(READY) + "\n")
-        for line in sys.stdin:
-            answers.write(json.dumps(row_of(Entry(**json.loads(line)), settings)) + "\n")
+from ir_studies.work import Row
 
 
-def _settings(read: dict[str, Any]) -> ArenaSettings:
-    """From JSON, which knows no tuples."""
-    values: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in read.items()
+def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
+    """Rows of entries, with everything loaded that is loaded once."""
+    read: dict[str, Any] = {  # JSON knows no tuples
+        key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()
     }
-    return ArenaSettings(**values)
+    arena = ArenaSettings(**read)
+    warm_up(arena)
+    return lambda words: row_of(Entry(**words), arena)
 
 
 def row_of(entry: Entry, settings: ArenaSettings) -> Row:
@@ -73,7 +58,3 @@ def planner_of(cell: str) -> Planner:
     planner = Planner(time.monotonic)
     planner.set_cell("", cell)
     return planner
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,80 @@
+"""All kinds of studies under one face, for the command `ir study` and the node.
+
+study = read_study("layout.yaml")           # its format says which kind it is
+answer = study.run("out/layout", Means(workers=2))
+print(answer.summary)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ir_studies import arena
+from ir_studies.arena.settings import arena_settings
+from ir_studies.errors import SettingsError
+from ir_studies.work import Means, Placed, beside, read_text
+from ir_studies.work.settings_file import kind_of
+
+
+@dataclass(frozen=True)
+class Answer:
+    """summary: what follows from a study, in a few sentences; files that were written; table: CSV with a
+    header, its best or summed up rows.
+    """
+
+    summary: str
+    files: tuple[Path, ...]
+    table: str
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of study: what it answers, a settings file with all its keys, how settings are read from a
+    text, and how it is run in a folder.
+    """
+
+    about: str
+    example: str
+    read: Callable[[str, Placed], Any]
+    run: Callable[[Any, Path, Means], Answer]
+
+
+@dataclass(frozen=True)
+class Study:
+    """Settings that were read, of a kind."""
+
+    kind: str
+    settings: Any
+
+    def run(self, folder: str | Path, means: Means | None = None) -> Answer:
+        """Make what the folder doesn't have yet. Raises StudyError."""
+        return KINDS[self.kind].run(self.settings, Path(folder), means or Means())
+
+
+def _run_arena(settings: arena.ArenaSettings, folder: Path, means: Means) -> Answer:
+    finished = arena.run_arena(settings, folder, means)
+    return Answer(finished.summary, finished.files, finished.summed_up)
+
+
+KINDS = {
+    "arena": Kind("planners against each other", arena.EXAMPLE, arena_settings, _run_arena),
+}
+
+
+def read_study(path: str | Path) -> Study:
+    """The study that a YAML file asks for; cell files count from its folder. SettingsError names the key."""
+    try:
+        return study_of(read_text(path), placed=beside(path))
+    except SettingsError as error:
+        raise SettingsError(f"{path}: {error}") from error
+
+
+def study_of(content: str, kind: str = "", placed: Placed = str) -> Study:
+    """The study that a text asks for. kind: which it must be, "": what its format says."""
+    kind = kind or kind_of(content)
+    if kind not in KINDS:
+        raise SettingsError(f"kind {kind!r:.60} is unknown: known are {', '.join(KINDS)}")
+    return Study(kind, KINDS[kind].read(content, placed))

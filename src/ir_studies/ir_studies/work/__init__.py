@@ -1,0 +1,20 @@
+"""What all studies share: jobs made by worker processes, results in a growing file, settings files."""
+
+from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.means import MOST_WORKERS, Means
+from ir_studies.work.results import Results
+from ir_studies.work.settings_file import Placed, beside, checked_number, read_text, settings_values
+
+__all__ = [
+    "MOST_WORKERS",
+    "Job",
+    "Means",
+    "Placed",
+    "Results",
+    "Row",
+    "Task",
+    "beside",
+    "checked_number",
+    "read_text",
+    "settings_values",
+]

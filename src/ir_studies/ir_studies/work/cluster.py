@@ -1,0 +1,155 @@
+"""Jobs made by a Dask cluster: it hands them out, and each of its threads has a worker process of this project.
+
+So what hangs there is cut and what dies is tried once more by the same code as on one machine; a worker of
+the cluster that dies is Dask's own business, which gives its job to another.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict
+from importlib import import_module
+from itertools import islice
+from types import ModuleType, TracebackType
+from typing import Any
+
+import numpy as np
+import scipy
+
+from ir_kernels import compiled
+from ir_studies.errors import StoppedError, StudyError, WorkerError
+from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.pool import Pool
+
+_CONNECT_S = 20.0
+_LOOK_S = 0.2  # between two looks whether somebody asks to stop
+_AHEAD = 4  # jobs that each thread has waiting: none waits for the next one to come over the network
+_MISSING = 'a Dask cluster needs Dask: pip install "ir_studies[cluster]", or pip install dask distributed'
+
+
+def _distributed() -> ModuleType:
+    try:
+        return import_module("distributed")
+    except ImportError as error:
+        raise WorkerError(_MISSING) from error
+
+
+class Cluster:
+    """Makes jobs by the workers of a scheduler; `stopped` as in Pool."""
+
+    def __init__(self, task: Task, address: str, stopped: Callable[[], bool] | None = None) -> None:
+        """Connect. WorkerError where Dask is missing, nobody answers, or no worker is there."""
+        self._dask, self._stopped = _distributed(), stopped
+        self._task = json.dumps(asdict(task))
+        try:
+            self._client = self._dask.Client(address, timeout=_CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise WorkerError(f"no Dask scheduler answers at {address!r:.80}: {error!s:.200}") from error
+        try:
+            self._client.wait_for_workers(1, timeout=_CONNECT_S)
+        except TimeoutError as error:
+            self._client.close()
+            raise WorkerError(
+                f"the scheduler at {address} has no worker: start dask worker {address}"
+            ) from error
+
+    def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
+        """Each job with its row, as they are made."""
+        left, running = iter(jobs), dict[Any, Job]()
+        build = computed_with()
+        try:
+            while True:
+                for job in islice(left, self._free(len(running))):
+                    # not by its content: what is asked again is made again
+                    submitted = self._client.submit(made, self._task, dict(job.words), build, pure=False)
+                    running[submitted] = job
+                if not running:
+                    return
+                for future in self._done(running):
+                    yield running.pop(future), self._row(future)
+        finally:
+            self._client.cancel(list(running))
+
+    def _free(self, running: int) -> int:
+        threads = sum(self._client.nthreads().values())
+        return max(_AHEAD * max(threads, 1) - running, 0)
+
+    def _done(self, running: Mapping[Any, Job]) -> Iterable[Any]:
+        if self._stopped is not None and self._stopped():
+            raise StoppedError("stopped")
+        try:
+            found = self._dask.wait(list(running), timeout=_LOOK_S, return_when="FIRST_COMPLETED")
+        except TimeoutError:
+            return ()
+        done: Iterable[Any] = found.done
+        return done
+
+    def _row(self, future: Any) -> Row:
+        """What a job gave; a row of its own where its workers died again and again."""
+        try:
+            row: Row = future.result()
+        except self._dask.KilledWorker as error:
+            return {"outcome": "died", "solved": False, "message": f"workers died with it: {error!s:.200}"}
+        except StudyError:
+            raise
+        except (self._dask.CancelledError, OSError) as error:
+            raise WorkerError("the scheduler is gone: the same command goes on when it is back") from error
+        return row
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if self._client.status == "running":
+                self._client.run(end_pools, on_error="ignore")
+        finally:
+            self._client.close(timeout=_CONNECT_S)
+
+
+def computed_with() -> str:
+    """What the bits of a result depend on beside its job."""
+    versions = f"python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
+    return f"{versions}, kernels {compiled.NAME}, {platform.machine()}"
+
+
+_pools: dict[int, tuple[str, Pool]] = {}  # by thread of a worker of the cluster
+_lock = threading.Lock()
+
+
+def made(task: str, words: Mapping[str, Any], build: str) -> Row:
+    """In a worker of the cluster: the row of a job. WorkerError where it would compute other bits."""
+    if computed_with() != build:
+        raise WorkerError(f"a worker of the cluster computes with {computed_with()}, not with {build}")
+    for _, row in _pool(task).rows([Job("", words)]):
+        return row
+    raise WorkerError("a job had no row")
+
+
+def _pool(task: str) -> Pool:
+    """The pool of this thread: one process, kept from job to job of the same task."""
+    own = threading.get_ident()
+    with _lock:
+        known = _pools.get(own)
+    if known is not None and known[0] == task:
+        return known[1]
+    if known is not None:
+        known[1].close()
+    pool = Pool(Task(**json.loads(task)), 1)
+    with _lock:
+        _pools[own] = (task, pool)
+    return pool
+
+
+def end_pools() -> None:
+    """In a worker of the cluster: end the processes of a study that has ended."""
+    with _lock:
+        known = list(_pools.values())
+        _pools.clear()
+    for _, pool in known:
+        pool.close()

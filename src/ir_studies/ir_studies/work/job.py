@@ -1,0 +1,31 @@
+"""A job: the smallest piece of a study, made in one process; its row is all that is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+Row: TypeAlias = "dict[str, Any]"
+"""What JSON can hold: texts, numbers (NaN is one), booleans, lists and mappings of them."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What every job of a study has in common.
+
+    kind: which module of MAKERS (worker.py) makes the jobs; settings: what it is given before the first, as
+    JSON; limit: seconds after which a job is cut.
+    """
+
+    kind: str
+    settings: Mapping[str, Any]
+    limit: float
+
+
+@dataclass(frozen=True)
+class Job:
+    """key: what its row is known by in the results; words: what the worker is given, as JSON."""
+
+    key: str
+    words: Mapping[str, Any] = field(default_factory=dict)

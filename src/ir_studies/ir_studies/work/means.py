@@ -1,0 +1,54 @@
+"""What a study is made with: worker processes of this machine, or those of a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Protocol
+
+from ir_studies.errors import StudyError
+from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.pool import COMMAND, Pool
+
+MOST_WORKERS = 64
+Progress = Callable[[str, int, int, str], None]
+
+
+def nobody(phase: str, done: int, of: int, best: str) -> None:
+    """Progress that nobody asks for."""
+
+
+class Makers(Protocol):
+    """Whoever makes jobs."""
+
+    def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
+        """Each job with its row, in any order; may be called again."""
+
+
+@dataclass(frozen=True)
+class Means:
+    """workers: processes of this machine, 0: one per core. scheduler: address of a Dask scheduler instead.
+    progress: called with a phase, jobs made, that of all, and the best so far in words. stopped: asked
+    several times a second; True ends the study with StoppedError. command: what a worker process is.
+    """
+
+    workers: int = 0
+    scheduler: str = ""
+    progress: Progress = nobody
+    stopped: Callable[[], bool] | None = None
+    command: Sequence[str] = COMMAND
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.workers <= MOST_WORKERS:
+            raise StudyError(f"workers is {self.workers}: it must be in 1 .. {MOST_WORKERS}, or 0: as cores")
+
+    def makers(self, task: Task) -> AbstractContextManager[Makers]:
+        """Processes that make the jobs of a task; they end with the context."""
+        if self.scheduler:
+            from ir_studies.work.cluster import Cluster  # Dask is an extra
+
+            return Cluster(task, self.scheduler, self.stopped)
+        count = self.workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)
+        return Pool(task, count, self.command, self.stopped)

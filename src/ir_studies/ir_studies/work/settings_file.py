@@ -1,0 +1,92 @@
+"""Settings of a study from YAML: known keys, values in their ranges, or a sentence that says which not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ir_studies.errors import SettingsError
+
+MOST_CHARACTERS = 1_000_000  # of a settings file
+Placed = Callable[[str], str]
+"""From the name of a cell as the settings have it to what load_cell takes: a bundled name, or a path."""
+
+
+def read_text(path: str | Path) -> str:
+    """The text of a settings file. SettingsError where it can't be read."""
+    file = Path(path)
+    try:
+        if file.stat().st_size > MOST_CHARACTERS:
+            raise SettingsError(f"{path} is larger than {MOST_CHARACTERS} bytes: it is no settings file")
+        return file.read_text(encoding="utf-8")
+    except OSError as error:
+        raise SettingsError(f"{path} can't be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{path} is no YAML: {error}") from error
+
+
+def beside(path: str | Path) -> Placed:
+    """Cell files by their place beside a settings file."""
+    folder = Path(path).parent
+    return lambda name: str(folder / name) if name.endswith((".yaml", ".yml")) else name
+
+
+def settings_values(content: str, format_name: str, known: Collection[str]) -> dict[str, Any]:
+    """Keys and values of a text, without its format; lists as tuples. SettingsError for unknown keys."""
+    read = _mapping(content)
+    if read is None or read.get("format") != format_name:
+        raise SettingsError(f"expected keys and values with format: {format_name}")
+    values: dict[str, Any] = {}
+    for key, value in read.items():
+        if key == "format":
+            continue
+        if key not in known:
+            raise SettingsError(f"{key!s:.60} is unknown: known are {', '.join(known)}")
+        values[key] = tuple(value) if isinstance(value, list) else value
+    return values
+
+
+def kind_of(content: str) -> str:
+    """The kind of study that the format of a text names; SettingsError where it names none."""
+    found = str((_mapping(content) or {}).get("format", ""))
+    if not (found.startswith("ir_") and found.endswith("/1")):
+        raise SettingsError(f"format is {found!r:.60}: a study's is like ir_layout/1")
+    return found.removeprefix("ir_").removesuffix("/1")
+
+
+def _mapping(content: str) -> dict[Any, Any] | None:
+    """What a text holds; None where it is no mapping."""
+    if len(content) > MOST_CHARACTERS:
+        raise SettingsError(f"settings have {len(content)} characters: at most {MOST_CHARACTERS}")
+    try:
+        read = yaml.load(content, Loader=_PlainLoader)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:  # ValueError: 2026-99-99 as a date
+        said = " ".join(str(error).split())
+        raise SettingsError(f"this is no YAML: {said:.300}") from error
+    return read if isinstance(read, dict) else None
+
+
+def checked_number(key: str, value: Any, low: float, high: float, *, whole: bool = False) -> None:
+    """SettingsError where a value is no number of the range."""
+    kinds = int if whole else int | float
+    if isinstance(value, bool) or not isinstance(value, kinds) or not _within(value, low, high):
+        number = "a whole number" if whole else "a number"
+        raise SettingsError(f"{key} is {value!r:.60}: it must be {number} in {low:g} .. {high:g}")
+
+
+def _within(value: float, low: float, high: float) -> bool:
+    return low <= value <= high if isinstance(value, int) else math.isfinite(value) and low <= value <= high
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Without aliases: a few lines of them could stand for gigabytes."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(problem="aliases are not read", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)

@@ -1,0 +1,48 @@
+"""The process that makes jobs: what they have in common in, then a line of JSON for each, one row out."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from importlib import import_module
+from typing import Any
+
+from ir_studies.work.job import Row
+from ir_studies.work.lifeline import tie
+
+READY = {"ready": True}
+MAKERS = {
+    "arena": "ir_studies.arena.maker",
+    "layout": "ir_studies.layout.maker",
+}
+"""Modules by kind of study; each has `maker(settings)`, which loads what is loaded once and returns what
+makes a row from the words of a job."""
+Maker = Callable[[Mapping[str, Any]], Row]
+
+
+def maker_of(kind: str, settings: Mapping[str, Any]) -> Maker:
+    """What makes the jobs of a study."""
+    make: Maker = import_module(MAKERS[kind]).maker(settings)
+    return make
+
+
+def main() -> None:
+    """Serve until the input ends. What libraries print goes to stderr."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it, who closes the input
+    tie()
+    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+    with suppress(BrokenPipeError):
+        task = json.loads(sys.stdin.readline())
+        make = maker_of(task["kind"], task["settings"])
+        answers.write(json.dumps(READY) + "\n")
+        for line in sys.stdin:
+            answers.write(json.dumps(make(json.loads(line))) + "\n")
+
+
+if __name__ == "__main__":
+    main()
