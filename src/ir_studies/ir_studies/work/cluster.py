@@ -1,4 +1,4 @@
-"""Jobs made by a Dask cluster: it hands them out, and each of its threads has a worker process of this project.
+"""Jobs made by a Dask cluster: each of its threads has a worker process of this project.
 
 So what hangs there is cut and what dies is tried once more by the same code as on one machine; a worker of
 the cluster that dies is Dask's own business, which gives its job to another.
@@ -74,7 +74,7 @@ class Cluster:
             self._client.cancel(list(running))
 
     def _free(self, running: int) -> int:
-        threads = sum(self._client.nthreads().values())
+        threads = sum(int(count) for count in self._client.nthreads().values())
         return max(_AHEAD * max(threads, 1) - running, 0)
 
     def _done(self, running: Mapping[Any, Job]) -> Iterable[Any]:
