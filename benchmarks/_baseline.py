@@ -13,7 +13,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene import PlanningScene
 
-TORQUE_SHARE = 0.98  # the planner's
+TORQUE_SHARE = 0.98  # the planner's, of what its reserve leaves
 _SLOWER = 1.002  # step of the uniform slow-down
 _CHECK_S = 2e-3
 
@@ -57,7 +57,7 @@ def fastest_baseline(q0: FloatArray, q1: FloatArray, scene: PlanningScene, drive
         trajectory = s_curve(q0, q1, scene, factor)
         at = trajectory.sample(np.arange(0.0, trajectory.duration, _CHECK_S))
         use = np.abs(drives.torque(at.q, at.qd, at.qdd)) / drives.envelope(at.qd)
-        if use.max() <= TORQUE_SHARE:
+        if use.max() <= TORQUE_SHARE * (1.0 - scene.limits.torque_reserve):
             return trajectory.duration
         factor *= _SLOWER
 

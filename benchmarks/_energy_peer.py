@@ -21,7 +21,9 @@ from ir_planner.scene import PlanningScene
 
 MESH = 60  # intervals
 SMOOTHING = 0.01  # rad/s
-TORQUE_SHARE = 0.975  # of the envelope at the points of the mesh: between them it may be a little more
+# of the envelope that the planner's reserve of torque leaves, at the points of the mesh: between them it may
+# be a little more
+TORQUE_SHARE = 0.975
 ITERATIONS = 250
 SPREAD = 0.35  # rad: standard deviation of the bump that makes one start differ from another
 _GAUSS = (0.5 - np.sqrt(3.0) / 6.0, 0.5 + np.sqrt(3.0) / 6.0)  # two points per interval
@@ -138,7 +140,8 @@ class EnergyPeer:
             "f": energy + _JERK_WEIGHT * smooth,
             "g": ca.vertcat(equal, uses),
         }
-        zeros, share = np.zeros(int(equal.numel())), np.full(int(uses.numel()), TORQUE_SHARE)
+        left = TORQUE_SHARE * (1.0 - self._scene.limits.torque_reserve)
+        zeros, share = np.zeros(int(equal.numel())), np.full(int(uses.numel()), left)
         bounds = {"lbg": np.concatenate([zeros, -np.inf * share]), "ubg": np.concatenate([zeros, share])}
         return ca.nlpsol("peer", "ipopt", problem, _OPTIONS), self._box() | bounds
 
