@@ -21,6 +21,7 @@ from ir_description.files import (
     read_regular_file,
     read_robot,
     robot_from_yaml,
+    subject_line,
 )
 from ir_description.robot import DATA_SHEET, PowerData, PowerParameters, RobotModel, prior
 from ir_msgs_py.cartesian import CartesianPath
@@ -149,6 +150,17 @@ def cell_file_errors(path: str | Path) -> tuple[CellFileError, ...]:
     except CellFileError as error:
         return (error,)
     return cell_errors(text, str(path), load_robot, Path(path).parent)
+
+
+def cell_file_line(path: str | Path, subject: str) -> int:
+    """Return the line of a cell file on which a machine, a station, a signal, "step 3", "home", .. stands; 0:
+    it is not there.
+    """
+    try:
+        text = _decoded(read_regular_file(Path(path), CELL_BYTES_MAX), str(path))
+    except (InvalidValueError, CellFileError):
+        return 0
+    return subject_line(text, subject)
 
 
 def cell_from_yaml(text: str, source: str = "<text>") -> Cell:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import asdict
+from pathlib import Path
 from textwrap import indent
 from typing import TYPE_CHECKING
 
 from ir_description import (
     Cell,
     DescriptionFileError,
+    Finding,
     UnknownNameError,
     bundled_cells,
     cell_file_errors,
+    cell_file_line,
     check_cell,
     is_path,
     load_cell,
@@ -25,7 +28,7 @@ from ..terminal import table
 from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
 
 if TYPE_CHECKING:
-    from .deep import Suggestion
+    from ..deep.mended import Suggestion
 
 STATIONS: Columns = {
     "station": ("station", text),
@@ -45,16 +48,22 @@ CELLS: Columns = {
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add cell check and cell list."""
-    cell = commands.add_parser("cell", help="check cell files, list the bundled cells")
+    """Add cell new, cell check and cell list."""
+    cell = commands.add_parser("cell", help="begin and check cell files, list the bundled cells")
     verbs = cell.add_subparsers(dest="verb", required=True)
     check = verbs.add_parser("check", help="everything that is wrong with a cell file, and its stations")
     check.add_argument("file", metavar="CELL", help="a path, or the name of a bundled cell")
     check.add_argument(
-        "--deep", action="store_true", help="also contacts, exits and the program, with lines to paste"
+        "--deep",
+        action="store_true",
+        help="also every configuration, lines in and out, and the program, with lines to paste",
     )
     add_formats(check, comma=False)
     check.set_defaults(run=run_check)
+    new = verbs.add_parser("new", help="begin a cell file: a robot, two tables and a program that plans")
+    new.add_argument("file", metavar="FILE", help="the file to write: my_cell.yaml")
+    new.add_argument("--robot", default="kr210_r2700_extra", metavar="ROBOT", help="ir robot list, or a file")
+    new.set_defaults(run=run_new)
     listing = verbs.add_parser("list", help="the bundled cells")
     add_formats(listing)
     listing.set_defaults(run=run_list)
@@ -65,26 +74,35 @@ def run_check(arguments: argparse.Namespace) -> int:
     cell = _readable(arguments.file)
     if cell is None:
         return 1
-    from .stations import stations_of  # a planner, only for a cell that can be read
+    from ..deep.stations import stations_of  # a planner, only for a cell that can be read
 
-    findings, stations = check_cell(cell), stations_of(cell)
-    suggestions = _suggestions(cell) if arguments.deep else []
+    stations = stations_of(cell)
+    suggestions, configurations = _deep(cell) if arguments.deep else ([], [])
+    findings: list[Finding | Suggestion] = [*check_cell(cell), *suggestions]
     if arguments.json:
-        listed = {"findings": [asdict(f) for f in findings], "suggestions": [asdict(s) for s in suggestions]}
-        print_json({"cell": cell.name, "stations": stations, **listed})
+        listed = {"findings": [asdict(f) for f in findings if isinstance(f, Finding)]}
+        listed["suggestions"] = [asdict(s) for s in suggestions]
+        print_json({"cell": cell.name, "stations": stations, "configurations": configurations, **listed})
     else:
         _print_cell(cell)
         if stations:
             print_table(stations, STATIONS)
+        if configurations:
+            from ..deep.table import CONFIGURATIONS
+
+            print_table(configurations, CONFIGURATIONS)
         for finding in findings:
-            sys.stdout.write(f"{finding.severity}: {finding.subject}: {finding.sentence}\n")
-        for suggestion in suggestions:
-            sys.stdout.write(f"{suggestion.severity}: {suggestion.subject}: {suggestion.sentence}\n")
-            if suggestion.yaml:
-                sys.stdout.write(indent(suggestion.yaml, "    ") + "\n")
+            _print_finding(finding, arguments.file)
     unreached = any(not row["free"] for row in stations)
-    severities = [*(each.severity for each in findings), *(each.severity for each in suggestions)]
-    return 1 if unreached or "error" in severities else 0
+    return 1 if unreached or any(each.severity == "error" for each in findings) else 0
+
+
+def run_new(arguments: argparse.Namespace) -> int:
+    """Write a cell file to begin with."""
+    from .cell_new import write_cell
+
+    write_cell(Path(arguments.file), arguments.robot)
+    return 0
 
 
 def run_list(arguments: argparse.Namespace) -> int:
@@ -135,9 +153,19 @@ def _print_cell(cell: Cell) -> None:
         sys.stdout.write(table(["equipment", "zone", "bodies", "state"], rows) + "\n")
 
 
-def _suggestions(cell: Cell) -> list[Suggestion]:
-    from .deep import suggestions_of
+def _print_finding(finding: Finding | Suggestion, file: str) -> None:
+    """One line, with the place in the file, and what to paste there."""
+    line = cell_file_line(file, finding.subject) if is_path(file) else 0
+    place = f"{file}:{line}: " if line else ""
+    sys.stdout.write(f"{place}{finding.severity}: {finding.subject}: {finding.sentence}\n")
+    if pasted := getattr(finding, "yaml", ""):
+        sys.stdout.write(indent(pasted, "    ") + "\n")
+
+
+def _deep(cell: Cell) -> tuple[list[Suggestion], list[Row]]:
+    from ..deep.check import suggestions_of
+    from ..deep.table import configurations_of
 
     with ProgressLine() as line:
         line.show("deep check", 0, len(cell.stations), 0.0)
-        return list(suggestions_of(cell))
+        return list(suggestions_of(cell)), configurations_of(cell)

@@ -11,6 +11,7 @@ from ir_description.files.places import is_path
 from ir_description.files.power_file import power_from_yaml
 from ir_description.files.power_parameters_file import power_parameters_from_yaml, power_parameters_to_yaml
 from ir_description.files.robot_file import read_robot, robot_errors, robot_file_errors, robot_from_yaml
+from ir_description.files.subject_lines import subject_line
 from ir_description.files.urdf import robot_urdf
 
 __all__ = [
@@ -32,4 +33,5 @@ __all__ = [
     "robot_file_errors",
     "robot_from_yaml",
     "robot_urdf",
+    "subject_line",
 ]

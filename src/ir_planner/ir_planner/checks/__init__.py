@@ -10,7 +10,14 @@ from ir_planner.checks.intervals import ROBOTS, Interval, interval, movement_spr
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.peak_power import peak_power
 from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
-from ir_planner.checks.states import StateCheck, end_in_collision, state_check, too_near, too_near_sentence
+from ir_planner.checks.states import (
+    StateCheck,
+    end_in_collision,
+    first_too_near,
+    state_check,
+    too_near,
+    too_near_sentence,
+)
 from ir_planner.checks.verification import TorqueProof, Verification, torque_proof, verified
 
 __all__ = [
@@ -36,6 +43,7 @@ __all__ = [
     "end_in_collision",
     "energy_and_slope",
     "evaluate_trajectory",
+    "first_too_near",
     "holding_slope",
     "holding_watts",
     "interval",

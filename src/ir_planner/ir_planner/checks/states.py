@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
@@ -58,6 +59,24 @@ def too_near(q: FloatArray, space: FreeSpace, what: str, safety_distance: float)
         return f"{what} is not free"
     kept = min(safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2)  # a contact has its own
     return f"{what}: {too_near_sentence(pair_value(space.scene, q, z), kept)}"
+
+
+def first_too_near(path: FloatArray, space: FreeSpace) -> str:
+    """The first pair along a path (M, n) that is nearer than it may be, as counts of what was rejected name
+    it.
+    """
+    near = space.scene.collision.min_distance(path, space.threshold)
+    for distance, z in zip(near.distance, near.pair, strict=True):
+        if z >= 0 and distance <= space.threshold[z]:
+            return _named(space.scene, int(z))
+    found = space.scene.collision.certify_edges(path[:-1], path[1:], space.threshold)
+    for z in found.pair[found.verdict != FREE]:
+        return _named(space.scene, int(z))
+    return "no work is left to prove it free"
+
+
+def _named(scene: PlanningScene, pair: int) -> str:
+    return f"{scene.collision.pairs[pair].body_a} too near {scene.collision.pairs[pair].body_b}"
 
 
 def too_near_sentence(pair: DistancePair, kept: float) -> str:

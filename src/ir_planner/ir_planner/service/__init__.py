@@ -4,7 +4,13 @@ from ir_planner.service.candidate_shapes import service_shapes
 from ir_planner.service.exit import Exit
 from ir_planner.service.exit_search import ExitSearch, ExitsFound
 from ir_planner.service.modified_ga import ModifiedGa
-from ir_planner.service.service_lines import ServiceLine, lines_free, service_lines, timed_service
+from ir_planner.service.service_lines import (
+    ServiceLine,
+    line_poses,
+    lines_free,
+    service_lines,
+    timed_service,
+)
 from ir_planner.service.service_movement import ServicePlan, plan_service
 from ir_planner.service.withdrawals import EXIT_SEARCHES, exit_searches, known_method, withdrawal
 from ir_planner.service.work_area import WorkArea
@@ -23,6 +29,7 @@ __all__ = [
     "checked_request",
     "exit_searches",
     "known_method",
+    "line_poses",
     "lines_free",
     "plan_service",
     "service_lines",

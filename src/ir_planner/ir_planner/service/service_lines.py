@@ -13,7 +13,7 @@ import numpy as np
 from ir_description import Station
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import FreeSpace
+from ir_planner.checks import FreeSpace, first_too_near
 from ir_planner.errors import TimingError
 from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled
 from ir_planner.request import Context
@@ -102,12 +102,18 @@ def service_lines(interaction: FloatArray, context: Context, rejected: Counter[s
 def lines_free(lines: list[ServiceLine], context: Context, rejected: Counter[str]) -> list[bool]:
     """Which lines are free: inside with the station's allowed contacts, at the outer end without."""
     scene, margin, work = context.scene, context.safety_distance, context.work
-    inside = FreeSpace.of(scene, margin, work, context.station).paths_free([line.points for line in lines])
     if not lines:
         return []
-    ends = FreeSpace.of(scene, margin, work).states_free(np.array([line.outside for line in lines]))
-    rejected[f"line out of {context.station} collides"] += int((~inside).sum())
-    rejected[f"outer end at {context.station} is not free"] += int((inside & ~ends).sum())
+    allowed, plain = FreeSpace.of(scene, margin, work, context.station), FreeSpace.of(scene, margin, work)
+    inside = allowed.paths_free([line.points for line in lines])
+    ends = plain.states_free(np.array([line.outside for line in lines]))
+    for line, free, out in zip(lines, inside, ends, strict=True):
+        if not free:
+            pair = first_too_near(line.points, allowed)
+            rejected[f"line out of {context.station}: {pair}"] += 1
+        elif not out:
+            pair = first_too_near(line.points[-1:], plain)
+            rejected[f"outer end at {context.station}: {pair}"] += 1
     return [bool(free) for free in inside & ends]
 
 

@@ -1,0 +1,127 @@
+"""The straight line out of a station, judged by distances: what comes near on it, and whether contacts or a
+larger zone would make it free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ir_description import AllowedContact, Station
+from ir_msgs_py.arrays import FloatArray
+from ir_planner.scene import PlanningScene, tcp_inside
+from ir_planner.service import line_poses
+
+from .stations import MARGIN, Visit, reaching
+
+HAND = 5  # links from here on, tool and part may touch what they work at
+_SHARE = 0.5  # of the distance on the line: how near a contact may come
+_GRID = 1e-4  # m, to which it is rounded down
+_JUMP = 0.35  # rad between points of a line: more is another branch
+
+
+@dataclass(frozen=True)
+class Near:
+    """A pair that is nearer than it may be: the distance [m] (negative: the depth), and how far out [m]."""
+
+    body_a: str
+    body_b: str
+    distance: float
+    out: float
+
+    @property
+    def sentence(self) -> str:
+        """As a table shows it."""
+        where = f" after {1e3 * self.out:.0f} mm" if self.out > 0.0 else ""
+        if self.distance <= 0.0:
+            return f"{self.body_a} is {-1e3 * self.distance:.1f} mm inside {self.body_b}{where}"
+        return f"{self.body_a} is {1e3 * self.distance:.1f} mm from {self.body_b}{where}"
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """The line out of a station in one configuration q (n,); reach [m]: how far it can be followed.
+
+    near: pairs too near with what the station allows, the nearest first. mendable: contacts and a zone would
+    make it free: these contacts, and a zone that holds the places (P, 3) [m] of the tcp in `within`.
+    """
+
+    q: FloatArray
+    reach: float
+    whole: bool
+    near: tuple[Near, ...]
+    mendable: bool
+    contacts: tuple[AllowedContact, ...]
+    within: FloatArray
+
+    @property
+    def free(self) -> bool:
+        """Whether it can be driven as the cell is."""
+        return self.whole and not self.near
+
+    @property
+    def sentence(self) -> str:
+        """What is in the path."""
+        if self.near:
+            return self.near[0].sentence
+        return "" if self.whole else f"the joint limits end it after {1e3 * self.reach:.0f} mm"
+
+
+def lines_of(visit: Visit, approach: float) -> list[Line]:
+    """The line of every configuration that reaches the station, with an approach distance [m]."""
+    station, scene = replace(visit.station, approach_distance=approach), visit.scene
+    poses = line_poses(station)
+    solved = scene.inverse_kinematics.solve(poses[1:]) if len(poses) > 1 else None
+    nexts = [] if solved is None else [solved.of_pose(k) for k in range(len(poses) - 1)]
+    return [_judged(_followed(q, nexts), len(poses), station, scene) for q in reaching(visit)]
+
+
+def _followed(q: FloatArray, nexts: Sequence[FloatArray]) -> FloatArray:
+    points = [q]
+    for candidates in nexts:
+        if not len(candidates):
+            break
+        jump = np.abs(candidates - points[-1]).max(axis=1)
+        if jump.min() > _JUMP:
+            break
+        points.append(candidates[int(np.argmin(jump))])
+    return np.array(points)
+
+
+def _judged(points: FloatArray, count: int, station: Station, scene: PlanningScene) -> Line:
+    """A line (L, n): contacts count where the tcp is in the zone, and never at the outer end."""
+    distance, tcp = scene.collision.distances(points), scene.chain.tcp_poses(points)[:, :3, 3]
+    out, whole = np.linalg.norm(tcp - tcp[0], axis=1), len(points) == count
+    kept = scene.thresholds(MARGIN, station.name)
+    last = np.arange(len(points)) == (count - 1 if count > 1 else -1)
+    plain = last | ~tcp_inside(points, scene, station.name, MARGIN)
+    violated = distance <= np.where(plain[:, None], MARGIN, kept)
+    pairs = np.flatnonzero(violated.any(axis=0))
+    found = []
+    for z in pairs:
+        k = int(np.flatnonzero(violated[:, z])[np.argmin(distance[violated[:, z], z])])
+        a, b = scene.collision.pairs[z].body_a, scene.collision.pairs[z].body_b
+        found.append(Near(a, b, float(distance[k, z]), float(out[k])))
+    least = distance.min(axis=0, initial=np.inf)
+    at_end = (distance[last] <= MARGIN).any(axis=0)
+    mendable = whole and all(least[z] > 0.0 and not at_end[z] and _by_hand(int(z), scene) for z in pairs)
+    contacts = tuple(_contact(int(z), float(least[z]), scene) for z in pairs if least[z] <= kept[z])
+    within = tcp[(distance <= MARGIN).any(axis=1) & ~last]
+    near = tuple(sorted(found, key=lambda each: each.distance))
+    return Line(points[0], float(out[-1]), whole, near, mendable, contacts, within)
+
+
+def _by_hand(z: int, scene: PlanningScene) -> bool:
+    """Whether a pair is one of the hand, or of what it holds, with a body."""
+    capsules = (*scene.cell.robot.capsules, *(c for load in scene.loads for c in load.capsules))
+    hand = {capsule.name for capsule in capsules if capsule.link >= HAND}
+    pair = scene.collision.pairs[z]
+    return pair.kind != "SELF" and pair.body_a in hand
+
+
+def _contact(z: int, distance: float, scene: PlanningScene) -> AllowedContact:
+    """What allows a pair to come to a distance [m]."""
+    pair, least = scene.collision.pairs[z], float(np.floor(_SHARE * distance / _GRID) * _GRID)
+    return AllowedContact(pair.body_a, pair.body_b, round(max(least, 0.0), 6))
