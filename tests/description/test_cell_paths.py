@@ -63,3 +63,50 @@ def test_what_is_wrong_is_named_with_its_line(wrong: str, right: str, sentence: 
     with pytest.raises(CellFileError, match=r":\d+: ") as refused:
         cell_from_yaml(text.replace(wrong, right))
     assert sentence in str(refused.value)
+
+
+BENCH = """equipment:
+  - name: bench
+    pose: {xyz: [2, 0, 0]}
+    zone: OPEN
+    bodies: [{name: bench_top, kind: box, size: [0.5, 0.5, 0.5], xyz: [0, 0, 0.25]}]
+    stations: [{name: place, pose: {xyz: [0, 0, 1]}}]
+"""
+TOUCHING = SEAM.replace(
+    "name: seam",
+    "name: seam\n    equipment: bench\n    allowed_contacts:\n"
+    "      - {between: [l6, bench_top], safety_distance: 0.002}",
+)
+
+
+def test_a_path_of_a_machine_moves_with_it_and_keeps_what_it_allows() -> None:
+    cell = cell_from_yaml(HEAD + BENCH + TOUCHING + "program: [{path: seam, dwell: 1}]\n")
+    again = cell_from_yaml(cell_to_yaml(cell))
+    assert again.contacts_at("seam") == cell.contacts_at("seam")
+    assert [(step.kind, step.target, step.dwell) for step in again.program] == [("PATH", "seam", 1.0)]
+    turned = np.array([[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.0], [0, 0, 0, 1.0]])
+    moved = cell.with_equipment("bench", turned)
+    before, after = cell.path("seam"), moved.path("seam")
+    for old, new in ((before.start, after.start), (before.segments[1].poses[0], after.segments[1].poses[0])):
+        seen = np.linalg.inv(cell.machine("bench").pose) @ old
+        np.testing.assert_allclose(new, turned @ seen, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "sentence"),
+    [
+        ("equipment: bench", "equipment: desk", "desk"),
+        ("    equipment: bench\n", "", "names no equipment"),
+        ("[l6, bench_top]", "[l6, desk_top]", "desk_top"),
+        ("name: seam", "name: place", "station or path place is there twice"),
+        ("name: seam", "name: home", "station or path home is there twice"),
+        ("path: seam", "path: bead", "bead"),
+    ],
+)
+def test_what_a_path_names_is_there(wrong: str, right: str, sentence: str) -> None:
+    program = "program: [{path: seam}]\n" if wrong.startswith("path") else ""
+    text = HEAD + BENCH + TOUCHING + program
+    assert wrong in text
+    with pytest.raises(CellFileError) as refused:
+        cell_from_yaml(text.replace(wrong, right))
+    assert sentence in str(refused.value)

@@ -248,7 +248,7 @@ BROKEN = {
     "two kinds of step": (
         "{posture: home}",
         "{posture: home, pause: 1}",
-        "exactly one of station, posture, pause",
+        "exactly one of station, posture, path, pause",
     ),
     "negative dwell": ("dwell: 1}", "dwell: -1}", "dwell is -1 s, must be in [0, 604800] s"),
 }

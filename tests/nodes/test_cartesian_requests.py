@@ -12,8 +12,9 @@ from geometry_msgs.msg import Pose
 from sensor_msgs.msg import JointState
 
 from ir_description import cell_to_yaml, load_cell
-from ir_msgs.msg import CartesianSegment
-from ir_msgs.srv import PlanCartesianMovement
+from ir_msgs.msg import CartesianSegment, PlannedMovement
+from ir_msgs.srv import PlanCartesianMovement, PlanProgram
+from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.node.inputs import LastState
 from ir_planner.node.requests import Requests
@@ -118,3 +119,25 @@ def test_t1_keeps_250_mm_per_second(requests: Requests) -> None:
     response = answer(requests, asked(LINE, tool_speed=2.0, t1=True))
     assert response.status.code == StatusCode.SUCCESS
     assert response.report.duration > 0.6 / 0.25
+
+
+def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "kr6_bench")
+    own = Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
+    found = answer(own, PlanCartesianMovement.Request(path="bead"))
+    assert found.status.code == StatusCode.SUCCESS, found.status.message
+    assert [pair.body_b for pair in found.report.contacts] == ["tray_out_top"]
+    refused = planner.plan_cartesian(planner.cell.path("bead"), PlanOptions())
+    assert "gripper_body and tray_out_top" in refused.status.message
+
+
+def test_a_program_drives_a_path_that_is_named_as_a_stop() -> None:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "kr6_bench")
+    own = Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
+    request = PlanProgram.Request(stations=["bead"])
+    found = own.guarded(own.plan_program)(request, PlanProgram.Response())
+    assert found.status.code == StatusCode.SUCCESS, found.status.message
+    assert [step.kind for step in found.movements] == ["regional", PlannedMovement.CARTESIAN]
+    assert [(step.from_station, step.to_station) for step in found.movements][1] == ("bead", "bead")

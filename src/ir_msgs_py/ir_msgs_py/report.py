@@ -28,6 +28,7 @@ class MovementKind(StrEnum):
     SERVICE_ENTRY = "service_entry"
     REGIONAL = "regional"
     PAUSE = "pause"
+    CARTESIAN = "cartesian"
 
 
 _INTERVAL = ("energy_low", "energy_high")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from ir_description import Cell, PowerData
+from ir_description import Cell, CellPath, PowerData
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import PlanOptions
@@ -71,6 +71,7 @@ from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 from ir_planner.trips import standby_at
 
+AnyPath = CartesianPath | CellPath  # a cell's own comes with what it allows to touch
 Cancelled = Callable[[], bool]
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 
@@ -161,8 +162,7 @@ class Planner:
         """Everything that is known about a trajectory, with the first violation."""
         safety_distance(margin)
         scene = self.scene(load)
-        if station:
-            scene.station(station)
+        scene.allowed(station)  # one that nobody has is refused here
         found = evaluate_trajectory(examinable(trajectory), scene, margin, station)
         return replace(found, report=in_scene(scene)(found.report, trajectory))
 
@@ -225,12 +225,13 @@ class Planner:
         return self._kept(plan, scene, note)
 
     def plan_cartesian(
-        self, path: CartesianPath, options: PlanOptions, start: FloatArray | None = None, *, t1: bool = False
+        self, path: AnyPath, options: PlanOptions, start: FloatArray | None = None, *, t1: bool = False
     ) -> CartesianPlan:
         """The tool along a path from `start` (n,), None: from the best. t1: at most 250 mm/s."""
         options, note = checked_path_options(options)
         scene = self.scene(options.load)
-        context = Context.of(scene, options, self._work(options, _NEVER))
+        name, path = (path.name, path.path) if isinstance(path, CellPath) else ("", path)
+        context = Context.of(scene, options, self._work(options, _NEVER), name)
         return self._kept(plan_path(path, start, t1, context), scene, note)
 
     def optimize_trajectory(

@@ -59,8 +59,11 @@ def check_program(movements: Sequence[PlannedMovement]) -> None:
 
 
 def station_of(movement: PlannedMovement) -> str:
-    """The station whose allowed contacts count in a movement: into it and out of it; "" elsewhere."""
-    service = movement.kind in (MovementKind.SERVICE_EXIT, MovementKind.SERVICE_ENTRY)
+    """The station or path whose allowed contacts count in a movement: into it, out of it, along it; ""
+    elsewhere.
+    """
+    kinds = (MovementKind.SERVICE_EXIT, MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN)
+    service = movement.kind in kinds
     return movement.to_station if service else ""
 
 

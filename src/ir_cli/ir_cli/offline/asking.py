@@ -56,8 +56,8 @@ def goal_of(text: str, planner: Planner) -> Goal:
 
 
 def check_stations(names: Iterable[str], planner: Planner) -> None:
-    """Raise InputError for a name that is neither a station nor a posture, with the one that was meant."""
-    known = _places(planner)
+    """Raise InputError for a name that is no station, posture or path, with the one that was meant."""
+    known = [*_places(planner), *(path.name for path in planner.cell.paths)]
     for name in names:
         if name not in known:
             listing = f"ir cell check {planner.cell.name}"

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from ir_description import UnknownNameError, is_path, load_path
+from ir_description import CellPath, UnknownNameError, is_path, load_path
 from ir_msgs_py.cartesian import CartesianPath
 from ir_planner import CartesianPlan, Planner
 
@@ -69,13 +69,13 @@ def run_path(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _path(text: str, planner: Planner) -> CartesianPath:
+def _path(text: str, planner: Planner) -> CartesianPath | CellPath:
     if is_path(text):
         return load_path(text)
     if not planner.cell.paths:
         raise InputError(f"cell {planner.cell.name} has no paths: give a file, as seam.yaml")
     try:
-        return planner.cell.path(text)
+        return planner.cell.own_path(text)
     except UnknownNameError as error:
         listing = f"ir cell check {planner.cell.name}"
         raise InputError(unknown_name("path", text[:80], error.known, listing)) from error

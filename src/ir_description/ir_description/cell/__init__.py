@@ -8,6 +8,7 @@ from ir_description.cell.checks import (
     check_contact,
     check_follows,
     check_part_mass,
+    check_path,
     check_step,
     check_switch,
     shape_register,
@@ -36,6 +37,7 @@ from ir_description.cell.program import (
     CellSignal,
     PartPlaces,
     ProgramStep,
+    StepKind,
 )
 from ir_description.cell.tool_path import CellPath
 
@@ -61,6 +63,7 @@ __all__ = [
     "ProgramStep",
     "StateSwitch",
     "Station",
+    "StepKind",
     "Task",
     "Zone",
     "cell_in",
@@ -68,6 +71,7 @@ __all__ = [
     "check_contact",
     "check_follows",
     "check_part_mass",
+    "check_path",
     "check_posture",
     "check_step",
     "check_switch",

@@ -19,11 +19,12 @@ from ir_description.cell.checks import (
     check_program,
     check_single_places,
 )
-from ir_description.cell.equipment import Equipment, Station, station_at
+from ir_description.cell.equipment import AllowedContact, Equipment, Station, Zone, station_at
 from ir_description.cell.part import Part
 from ir_description.cell.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.cell.tool_path import CellPath
 from ir_description.errors import UnknownNameError
+from ir_description.poses import composed, inverse
 from ir_description.robot import Load, RobotModel
 from ir_description.shapes import Body, Capsule, floor_body
 from ir_msgs_py.arrays import FloatArray
@@ -109,7 +110,24 @@ class Cell:
 
     def path(self, name: str) -> CartesianPath:
         """Return the path of the tool of that name."""
-        return _named(self.paths, "path", name).path
+        return self.own_path(name).path
+
+    def own_path(self, name: str) -> CellPath:
+        """Return the same with what it allows to touch."""
+        return _named(self.paths, "path", name)
+
+    def contacts_at(self, stop: str) -> tuple[AllowedContact, ...]:
+        """Return the pairs that may touch at the station or along the path of that name."""
+        return self._stop(stop).allowed_contacts
+
+    def zone_at(self, stop: str) -> Zone | None:
+        """Return the zone of its machine, in which they may; None for a path that belongs to none."""
+        machine = self._stop(stop).equipment
+        return self.machine(machine).zone if machine else None
+
+    def _stop(self, name: str) -> Station | CellPath:
+        stops: tuple[Station | CellPath, ...] = (*self.stations, *self.paths)
+        return _named(stops, "station", name)
 
     def posture(self, name: str) -> FloatArray:
         """Return the joint values (n,) [rad] of "home" or "park"."""
@@ -177,6 +195,7 @@ class Cell:
             self,
             equipment=tuple(new if machine is old else machine for machine in self.equipment),
             stations=tuple(_moved(station, new) for station in self.stations),
+            paths=tuple(_moved_path(path, old, new) for path in self.paths),
         )
 
 
@@ -197,6 +216,12 @@ def _moved(station: Station, machine: Equipment) -> Station:
     return station_at(
         machine, station.name, station.pose_in_equipment, station.allowed_contacts, station.approach_distance
     )
+
+
+def _moved_path(path: CellPath, old: Equipment, new: Equipment) -> CellPath:
+    if path.equipment != new.name or np.array_equal(old.pose, new.pose):
+        return path
+    return path.moved(composed(new.pose, inverse(old.pose)))
 
 
 def _named(items: Iterable[_T], what: str, name: str) -> _T:

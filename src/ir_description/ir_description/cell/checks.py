@@ -10,7 +10,8 @@ from typing import Protocol
 
 from ir_description.cell.equipment import AllowedContact, Equipment, Station
 from ir_description.cell.part import Part
-from ir_description.cell.program import CellSignal, PartPlaces, ProgramStep
+from ir_description.cell.program import POSTURES, CellSignal, PartPlaces, ProgramStep
+from ir_description.cell.tool_path import CellPath
 from ir_description.errors import UnknownNameError
 from ir_description.robot import Load, RobotModel, total_mass
 from ir_description.shapes import Body, Capsule
@@ -43,7 +44,7 @@ class _Cell(Protocol):
     @property
     def program(self) -> tuple[ProgramStep, ...]: ...
     @property
-    def paths(self) -> Sequence[_Named]: ...
+    def paths(self) -> Sequence[CellPath]: ...
 
     @property
     def tasks(self) -> Sequence[_Named]: ...
@@ -87,11 +88,17 @@ def check_contact(contact: AllowedContact, capsules: Collection[str], bodies: Co
 
 
 def check_step(
-    step: ProgramStep, before: PartPlaces, stations: Collection[str], signals: Collection[str]
+    step: ProgramStep,
+    before: PartPlaces,
+    stations: Collection[str],
+    signals: Collection[str],
+    paths: Collection[str] = (),
 ) -> PartPlaces:
     """Return where the parts are after a step; refuse unknown names and what can't be done."""
     if step.kind == "STATION" and step.target not in stations:
         raise UnknownNameError("station", step.target, stations)
+    if step.kind == "PATH" and step.target not in paths:
+        raise UnknownNameError("path", step.target, paths)
     for signal in (*step.wait_for, *step.set_signals):
         if signal.name not in signals:
             raise UnknownNameError("signal", signal.name, signals)
@@ -143,6 +150,9 @@ def check_names(cell: _Cell) -> None:
         for thing in things:
             register.add(thing.name)
     stations = dict.fromkeys(station.name for station in cell.stations)
+    stops = NameRegister("station or path", (*stations, *POSTURES) if cell.paths else ())
+    for path in cell.paths:
+        stops.add(path.name)
     machines = dict.fromkeys(machine.name for machine in cell.equipment)
     for part in cell.parts:
         if part.station and part.station not in stations:
@@ -172,8 +182,20 @@ def check_contacts(cell: _Cell) -> None:
     for station in cell.stations:
         for contact in station.allowed_contacts:
             check_contact(contact, capsules, bodies)
+    for path in cell.paths:
+        check_path(path, dict.fromkeys(machine.name for machine in cell.equipment), capsules, bodies)
     for capsule, body in cell.base_contacts:
         check_base_contact(cell.robot, capsule, body, bodies)
+
+
+def check_path(
+    path: CellPath, machines: Collection[str], capsules: Collection[str], bodies: Collection[str]
+) -> None:
+    """Refuse a path at a machine that nobody has, or with contacts of such names."""
+    if path.equipment and path.equipment not in machines:
+        raise UnknownNameError(f"equipment of path {path.name}", path.equipment, machines)
+    for contact in path.allowed_contacts:
+        check_contact(contact, capsules, bodies)
 
 
 def check_base_contact(robot: RobotModel, capsule: str, body: str, bodies: Collection[str]) -> None:
@@ -190,8 +212,9 @@ def check_program(cell: _Cell) -> None:
     state = cell.parts_at_start()
     stations = dict.fromkeys(station.name for station in cell.stations)
     signals = dict.fromkeys(signal.name for signal in cell.signals)
+    paths = dict.fromkeys(path.name for path in cell.paths)
     for step in cell.program:
-        state = check_step(step, state, stations, signals)
+        state = check_step(step, state, stations, signals, paths)
 
 
 def check_single_places(parts: Iterable[Part]) -> None:

@@ -1,4 +1,4 @@
-"""The program of a cell: stations, postures and pauses in order, with what happens at each.
+"""The program of a cell: stations, postures, paths and pauses in order, with what happens at each.
 
 One step runs in this order: wait for the signals, move, attach or detach, set the signals, dwell. A pause
 stays where the step before it ended.
@@ -16,7 +16,7 @@ from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.plc import Signal
 
-StepKind = Literal["STATION", "POSTURE", "PAUSE"]
+StepKind = Literal["STATION", "POSTURE", "PATH", "PAUSE"]
 POSTURES = ("home", "park")
 AUTO = "AUTO"
 PAUSE_POWER_MODES = (AUTO, *REST_MODES)
@@ -45,7 +45,8 @@ class CellSignal:
 
 @dataclass(frozen=True)
 class ProgramStep:
-    """One step. target: a station's name, a posture ("home", "park"), or "" for a pause.
+    """One step. target: a station's name, a posture ("home", "park"), a path's name, or "" for a
+    pause.
 
     dwell [s] after arrival, or the length of a pause. attach and detach name a part ("" for none).
     power_mode is one of PAUSE_POWER_MODES for a pause and "" otherwise; AUTO leaves the choice to whoever

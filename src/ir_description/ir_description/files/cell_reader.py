@@ -15,6 +15,7 @@ import numpy as np
 
 from ir_description.cell import (
     Cell,
+    CellPath,
     CellSignal,
     Equipment,
     NameRegister,
@@ -22,11 +23,11 @@ from ir_description.cell import (
     PartPlaces,
     ProgramStep,
     Station,
-    Task,
     check_base_contact,
     check_contact,
     check_follows,
     check_part_mass,
+    check_path,
     check_posture,
     check_step,
     check_switch,
@@ -42,6 +43,7 @@ from ir_description.files.path_reader import PATHS_MAX, read_paths
 from ir_description.files.places import inside, is_path
 from ir_description.files.program_reader import read_signal, read_step
 from ir_description.files.robot_file import read_robot, robot_of
+from ir_description.files.task_reader import read_tasks
 from ir_description.robot import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -131,7 +133,8 @@ class _CellReader:
         equipment, placed = self._equipment()
         stations = tuple(entry.station for entry in placed)
         self._check_part_stations(parts, stations)
-        self._check_contacts(placed, equipment, parts)
+        paths = read_paths(self._list("paths", PATHS_MAX))
+        self._check_contacts(placed, paths, equipment, parts)
         signals = self._signals()
         self._check_switches(equipment, signals)
         home = self._posture("home", robot.machine_home)
@@ -149,9 +152,9 @@ class _CellReader:
                 signals=signals,
                 park=self._posture("park", home),
                 machine_home=home,
-                program=self._program(stations, parts, signals),
-                tasks=self._tasks(),
-                paths=read_paths(self._list("paths", PATHS_MAX)),
+                program=self._program(stations, paths, parts, signals),
+                tasks=read_tasks(self._list("tasks", 10_000), self._robot),
+                paths=paths,
                 floor=table["floor"].boolean() if "floor" in table else True,
                 base_contacts=self._base_contacts(equipment, parts),
             )
@@ -206,9 +209,17 @@ class _CellReader:
                     taken.add(part.station)
 
     def _check_contacts(
-        self, placed: list[_Placed], equipment: tuple[Equipment, ...], parts: tuple[Part, ...]
+        self,
+        placed: list[_Placed],
+        paths: tuple[CellPath, ...],
+        equipment: tuple[Equipment, ...],
+        parts: tuple[Part, ...],
     ) -> None:
         capsules, bodies = set(self._capsules), _body_names(equipment, parts)
+        machines = [machine.name for machine in equipment]
+        for item, path in zip(self._list("paths", PATHS_MAX), paths, strict=True):
+            with item.blamed():
+                check_path(path, machines, capsules, bodies)
         for entry in placed:
             with entry.item.blamed():
                 for contact in entry.station.allowed_contacts:
@@ -256,32 +267,20 @@ class _CellReader:
             check_posture(self._robot, posture, name)
         return posture
 
-    def _tasks(self) -> tuple[Task, ...]:
-        names, tasks = NameRegister("task"), []
-        for item in self._list("tasks", 10_000):
-            row = item.table(("name", "start", "goal"))
-            with row["name"].blamed():
-                names.add(name := row["name"].text(64))
-            ends = []
-            for key in ("start", "goal"):
-                posture = row[key].numbers(self._robot.n, -70.0, 70.0, "rad")
-                with row[key].blamed():
-                    check_posture(self._robot, posture, f"{key} of {name}")
-                ends.append(posture)
-            tasks.append(Task(name, *ends))
-        return tuple(tasks)
-
     def _program(
-        self, stations: tuple[Station, ...], parts: tuple[Part, ...], signals: tuple[CellSignal, ...]
+        self,
+        stations: tuple[Station, ...],
+        paths: tuple[CellPath, ...],
+        parts: tuple[Part, ...],
+        signals: tuple[CellSignal, ...],
     ) -> tuple[ProgramStep, ...]:
-        station_names = dict.fromkeys(station.name for station in stations)
-        signal_names = dict.fromkeys(signal.name for signal in signals)
+        named = [dict.fromkeys(each.name for each in kind) for kind in (stations, signals, paths)]
         places = PartPlaces("", {part.name: part.station for part in parts})
         steps = []
         for item in self._list("program", 10_000):
             with item.blamed():
                 step = read_step(item)
-                places = check_step(step, places, station_names, signal_names)
+                places = check_step(step, places, *named)
             steps.append(step)
         return tuple(steps)
 

@@ -107,12 +107,13 @@ def _station(item: Item, machine: Equipment) -> Station:
         machine,
         table["name"].name(),
         read_pose(table["pose"]),
-        tuple(_contact(contact) for contact in contacts),
+        tuple(read_contact(contact) for contact in contacts),
         0.0 if approach is None else approach.number(0.0, APPROACH_MAX, "m"),
     )
 
 
-def _contact(item: Item) -> AllowedContact:
+def read_contact(item: Item) -> AllowedContact:
+    """A pair with the distance that it must keep at its station or along its path."""
     table = item.table(("between", "safety_distance"))
     first, second = table["between"].list(2, 2)
     with item.blamed():

@@ -9,6 +9,7 @@ from typing import Any
 from ir_description.cell import CellPath, NameRegister
 from ir_description.errors import CellFileError
 from ir_description.files.body_reader import read_pose
+from ir_description.files.equipment_reader import read_contact
 from ir_description.files.items import Item, Table, read_items
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import KINDS, LINE, ORIENTATIONS, POSES_MAX, CartesianPath, CartesianSegment
@@ -30,10 +31,12 @@ def read_paths(items: list[Item]) -> tuple[CellPath, ...]:
     """The named paths of a cell."""
     names, paths = NameRegister("path"), []
     for item in items:
-        table = item.table(("name", "start", "segments"), _NAMES)
+        table = item.table(("name", "start", "segments"), (*_NAMES, "equipment", "allowed_contacts"))
+        contacts = table["allowed_contacts"].list(0, 1000) if "allowed_contacts" in table else []
+        machine = table["equipment"].name() if "equipment" in table else ""
         with item.blamed():
             names.add(name := table["name"].name())
-            paths.append(CellPath(name, _path(table)))
+            paths.append(CellPath(name, _path(table), machine, tuple(map(read_contact, contacts))))
     return tuple(paths)
 
 
@@ -63,6 +66,13 @@ def path_lines(
     """The lines of a path in a cell file; `pose` writes the keys of a pose (4, 4), `number` a number."""
     path = named.path
     yield f"name: {named.name}"
+    if named.equipment:
+        yield f"equipment: {named.equipment}"
+    if named.allowed_contacts:
+        yield "allowed_contacts:"
+    for contact in named.allowed_contacts:
+        pair = f"[{contact.body_a}, {contact.body_b}]"
+        yield f"  - {{between: {pair}, safety_distance: {number(contact.safety_distance)}}}"
     for field in _SETTINGS:
         value = getattr(path, field.name)
         if value != field.default:

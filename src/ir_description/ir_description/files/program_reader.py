@@ -7,10 +7,11 @@ from ir_description.files.items import Item, Table
 from ir_msgs_py.plc import Signal
 
 _COMMON = ("wait_for", "set_signals")
-_STEP_KEYS = ("station", "posture", "pause", "dwell", "attach", "detach", "power_mode", *_COMMON)
+_STEP_KEYS = ("station", "posture", "path", "pause", "dwell", "attach", "detach", "power_mode", *_COMMON)
 _KEYS = {
     "station": ("station", "dwell", "attach", "detach", *_COMMON),
     "posture": ("posture", "dwell", *_COMMON),
+    "path": ("path", "dwell", *_COMMON),
     "pause": ("pause", "power_mode", *_COMMON),
 }
 
@@ -29,9 +30,9 @@ def read_signal(item: Item) -> CellSignal:
 
 
 def read_step(item: Item) -> ProgramStep:
-    """Return one step; exactly one of station, posture and pause says what it is."""
+    """Return one step; exactly one of station, posture, path and pause says what it is."""
     table = item.table((), _STEP_KEYS)
-    kind = table.one_of("station", "posture", "pause")
+    kind = table.one_of("station", "posture", "path", "pause")
     for key in _STEP_KEYS:
         if key in table and key not in _KEYS[kind]:
             table[key].fail(f"does not belong to a {kind} step; its keys are {', '.join(_KEYS[kind])}")
@@ -51,6 +52,9 @@ def read_step(item: Item) -> ProgramStep:
     if kind == "posture":
         posture = table["posture"].choice(POSTURES)
         return ProgramStep("POSTURE", posture, dwell, wait_for=wait_for, set_signals=set_signals)
+    if kind == "path":
+        path = table["path"].name()
+        return ProgramStep("PATH", path, dwell, wait_for=wait_for, set_signals=set_signals)
     return ProgramStep(
         kind="STATION",
         target=table["station"].name(),

@@ -55,6 +55,8 @@ class CostedHop(Costed):
     def title(self) -> str:
         """What it is called."""
         first, last = (name or "start" for name in self.ends)
+        if self.steps[0].kind == MovementKind.CARTESIAN:
+            return f"along {last}"
         return f"pause at {last}" if self.is_pause else f"{first} to {last}"
 
 
@@ -89,7 +91,9 @@ def side_of(name: str, cycle_time: float, program: Costed, request: ProgramReque
 
 
 def hops_of(program: Costed) -> list[CostedHop]:
-    """A hop ends at a pause, before a line out of a station, and where the stops of a movement change."""
+    """A hop ends at a pause, before a line out of a station, where the stops of a movement change, and at
+    both ends of a path.
+    """
     hops: list[CostedHop] = []
     for step, added in zip(program.steps, program.added, strict=True):
         ends = (step.from_station, step.to_station)
@@ -106,7 +110,8 @@ def hops_of(program: Costed) -> list[CostedHop]:
 def _begins(step: PlannedMovement, last: CostedHop) -> bool:
     """Whether a step is the first of a hop."""
     before = last.steps[-1]
-    if step.is_pause or last.is_pause or step.kind == MovementKind.SERVICE_EXIT:
+    alone = (MovementKind.PAUSE, MovementKind.CARTESIAN)
+    if step.kind in alone or before.kind in alone or step.kind == MovementKind.SERVICE_EXIT:
         return True
     if step.kind == MovementKind.SERVICE_ENTRY:
         return False

@@ -47,7 +47,7 @@ class Asked:
     def space(self) -> FreeSpace:
         """Where configurations may be."""
         context = self.context
-        return FreeSpace.of(context.scene, context.safety_distance, context.work)
+        return FreeSpace.of(context.scene, context.safety_distance, context.work, context.station)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
             raise reason or error_of_first
         with journal.stage("proof") as notes:
             for one in sorted(driven, key=lambda one: one.movement.coarse_cost):
-                one = _within_limits(asked, one)
+                one = within_limits(asked, one)
                 violation = one.movement.violation
                 if violation is None:
                     return one
@@ -102,20 +102,20 @@ def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRef
         if len(driven) == COMPARED or (driven and asked.context.work.exhausted):
             break
         try:
-            driven.append(_timed(asked, chain))
+            driven.append(timed(asked, chain))
         except PathRefusedError as error:
             asked.context.journal.reject(str(error))
             reason = reason or error
     return driven, reason
 
 
-def _within_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
+def within_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
     """The same with more distance from the limits where the interpolant between points exceeds one."""
     violation = one.movement.violation
     if violation is None or violation.what not in _LIMITS:
         return one
     try:
-        return _timed(asked, one.chain, _FARTHER)
+        return timed(asked, one.chain, _FARTHER)
     except PathRefusedError:
         return one
 
@@ -144,7 +144,7 @@ def _without(layers: Layers, one: DrivenPath) -> Layers:
     return replace(layers, free=layers.free & ~near)
 
 
-def _timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
+def timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
     """A chain with its time, within a share of the limits. Raises PathRefusedError."""
     path, whole, scene = asked.path, asked.whole, asked.context.scene
     angle, chain = angle_along(whole, chain, path.free_angle, asked.space, asked.fixed)
@@ -153,7 +153,7 @@ def _timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
     slower = _flange_share(asked, curves) if asked.t1 else 1.0
     made: list[DrivenPath] = []
 
-    def timed(limits: MotionLimits) -> Movement:
+    def within(limits: MotionLimits) -> Movement:
         limits = limits.scaled(share, share)
         strokes = tuple(
             timed_stroke(curve, _spans(whole, a, b, slower), path.speed_tolerance, limits, scene)
@@ -161,11 +161,11 @@ def _timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
         )
         _check_duration(sum(stroke.duration for stroke in strokes), asked)
         points = sent(strokes, limits, scene)
-        movement = Movement(chain.q, points.trajectory, asked.context)
+        movement = Movement(chain.q, points.trajectory, asked.context, fixed_time=True)
         made.append(DrivenPath(movement, points, angle, chain))
         return movement
 
-    within_torque(timed, asked.context)
+    within_torque(within, asked.context)
     return made[-1]
 
 

@@ -160,15 +160,21 @@ def nearest_sentence(q: FloatArray, space: FreeSpace) -> str:
     )
 
 
-def chains(layers: Layers, speed: float, space: FreeSpace, most: int) -> list[Chain]:
-    """The cheapest chains through all layers, at most `most`, each with another end (whole turns apart count
-    once), at the tool's speed [m/s]. Raises PathRefusedError where none leads through.
+def chains(
+    layers: Layers, speed: float, space: FreeSpace, most: int, *, by_start: bool = False
+) -> list[Chain]:
+    """The cheapest chains through all layers, at most `most`, each with another end, or start (whole turns
+    apart count once), at the tool's speed [m/s]. Raises PathRefusedError where none leads through.
     """
     nodes, scene = np.flatnonzero(layers.free), space.scene
     q, layer = layers.q[nodes], layers.layer[nodes]
     before, after = _neighbours(q, layer)
     joules = _edge_joules(q, layer, before, after, layers.s, speed, scene)
     apart = _SAME if len(np.unique(layers.angle)) == 1 else _APART
+    if by_start:  # the same edges from the end
+        before, after, layer = after, before, len(layers.s) - 1 - layer
+        order = np.lexsort((before, after, layer[after]))
+        before, after, joules = before[order], after[order], joules[order]
     cost, parent = _cheapest(layer, before, after, joules, len(layers.s))
     last = np.flatnonzero((layer == len(layers.s) - 1) & np.isfinite(cost))
     if len(last) == 0:
@@ -178,7 +184,7 @@ def chains(layers: Layers, speed: float, space: FreeSpace, most: int) -> list[Ch
         trace = [int(node)]
         while parent[trace[-1]] >= 0:
             trace.append(int(parent[trace[-1]]))
-        order = nodes[trace[::-1]]
+        order = nodes[trace if by_start else trace[::-1]]
         found.append(Chain(layers.s, layers.q[order], layers.angle[order], float(cost[node])))
     return found
 

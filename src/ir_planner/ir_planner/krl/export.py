@@ -22,7 +22,7 @@ from ir_krl import (
     written,
 )
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Evaluation, total_report
@@ -67,6 +67,12 @@ def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, ju
     if not moving:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
     check_name(name)
+    for step in moving:
+        if step.kind == MovementKind.CARTESIAN:
+            raise RequestError(
+                StatusCode.INVALID_MOTION_PLAN,
+                f"along {step.to_station}: a path of the tool at a given speed isn't written as KRL yet",
+            )
     fitted = {id(step): _fitted(step, scene, judge) for step in moving}
     parts = [part for step in steps for part in _parts(step, fitted)]
     start = _points_of(moving[0]).positions[0]

@@ -27,8 +27,12 @@ def judge_of(
 
 
 def contacts_at(step: PlannedMovement) -> str:
-    """The station whose allowed contacts hold in a step, "" for none."""
-    at = {MovementKind.SERVICE_EXIT: step.from_station, MovementKind.SERVICE_ENTRY: step.to_station}
+    """The station or path whose allowed contacts hold in a step, "" for none."""
+    at = {
+        MovementKind.SERVICE_EXIT: step.from_station,
+        MovementKind.SERVICE_ENTRY: step.to_station,
+        MovementKind.CARTESIAN: step.to_station,
+    }
     return at.get(MovementKind(step.kind), "")
 
 

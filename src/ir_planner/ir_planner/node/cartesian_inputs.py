@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_description import Cell
+from ir_description import Cell, CellPath
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import POSES_MAX, CartesianPath, CartesianSegment
 from ir_msgs_py.errors import InvalidValueError, PoseError
@@ -26,7 +26,7 @@ _FIELDS = (
 )
 
 
-def path_of(request: Any, cell: Cell) -> CartesianPath:
+def path_of(request: Any, cell: Cell) -> CartesianPath | CellPath:
     """The path of a request, by name or by its poses: settings of a named one are those of the cell file,
     but for those that the request changes from their defaults. Raises RequestError, PoseError.
     """
@@ -35,9 +35,9 @@ def path_of(request: Any, cell: Cell) -> CartesianPath:
         which = "both are" if given else "neither is"
         raise RequestError(_CODE, f"exactly one of path and start_pose with segments must be given, {which}")
     if request.path:
-        path = cell.path(request.path)
+        own = cell.own_path(request.path)
         changed = {name: getattr(request, name) for name in _FIELDS if _changed(request, name)}
-        return replace(path, **changed)
+        return replace(own, path=replace(own.path, **changed))
     start = stamped_pose_from_msg(request.start_pose, {BASE_FRAME: cell.base_pose})
     frame = cell.base_pose if request.start_pose.header.frame_id == BASE_FRAME else np.eye(4)
     total = sum(len(segment.poses) for segment in request.segments)

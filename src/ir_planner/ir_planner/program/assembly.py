@@ -19,6 +19,7 @@ _KINDS = {
     ACROSS: MovementKind.REGIONAL,
     ENTER: MovementKind.SERVICE_ENTRY,
 }
+_AT_STOPS = (MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +32,10 @@ class Leg:
     movements: tuple[tuple[MovementKind, Movement], ...]
 
     def station_of(self, kind: MovementKind) -> str:
-        """The station whose allowed contacts hold in a movement of this kind."""
-        return {MovementKind.SERVICE_EXIT: self.from_name, MovementKind.SERVICE_ENTRY: self.to_name}.get(
-            kind, ""
-        )
+        """The station or path whose allowed contacts hold in a movement of this kind."""
+        if kind == MovementKind.SERVICE_EXIT:
+            return self.from_name
+        return self.to_name if kind in _AT_STOPS else ""
 
 
 Legs = dict[int, Leg]  # by the step they belong to
@@ -48,10 +49,15 @@ def legs_of(route: Route, hops: list[list[Part]], movements: Mapping[Part, Movem
             route.name(hop - 1),
             route.name(hop),
             route.arriving(hop),
-            tuple((_KINDS[part.kind], movements[part]) for part in hops[hop]),
+            tuple((_kind_of(part, route), movements[part]) for part in hops[hop]),
         )
         for hop, step in enumerate(route.stops)
     }
+
+
+def _kind_of(part: Part, route: Route) -> MovementKind:
+    along = part.kind == ENTER and route.at(part.hop).step.kind == "PATH"
+    return MovementKind.CARTESIAN if along else _KINDS[part.kind]
 
 
 def assembled(  # long: what a step does, in its order

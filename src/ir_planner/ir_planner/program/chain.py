@@ -10,6 +10,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.program.edges import CostEdges, TravelEdges
 from ir_planner.program.movements import Movements
 from ir_planner.program.node import Node
+from ir_planner.program.path_stops import path_nodes
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Chain, Part, StationGraph
@@ -42,8 +43,10 @@ def layers_of(
             step, arriving = route.at(place).step, context.inside(route.arriving(place))
             if step.kind == "POSTURE":
                 found, status = posture_nodes(step.target, arriving)
+            elif step.kind == "PATH":
+                found, status = path_nodes(arriving.at(step.target), route.leaving(place))
             else:
-                near = layers[-1][0].outside
+                near = layers[-1][0].departure
                 at = arriving.at(step.target)
                 found, status = station_nodes(at, route.leaving(place), near, searches)
             if not status.ok:
@@ -98,9 +101,13 @@ def parts_of(chain: Chain, movements: Movements) -> list[list[Part]]:
         first, second = chain.chosen[hop], chain.chosen[hop + 1]
         a, b = movements.layers[hop][first], movements.layers[hop + 1][second]
         parts = [
-            (Part(hop, LEAVE, first, -1), len(a.line.points) > 1),
-            (Part(hop, ACROSS, first, second), not np.allclose(a.outside, b.outside, rtol=0.0, atol=1e-9)),
-            (Part(hop, ENTER, -1, second), len(b.line.points) > 1),
+            (Part(hop, LEAVE, first, -1), a.leaves),
+            (Part(hop, ACROSS, first, second), not _same(a.departure, b.arrival)),
+            (Part(hop, ENTER, -1, second), b.enters),
         ]
         result.append([part for part, moves in parts if moves])
     return result
+
+
+def _same(q: FloatArray, other: FloatArray) -> bool:
+    return np.allclose(q, other, rtol=0.0, atol=1e-9)

@@ -66,8 +66,8 @@ def nearest_chain(movements: Movements) -> Chain:
     chosen, total = [0], 0.0
     for hop in range(len(movements.route)):
         weights = movements.route.arriving(hop).weights
-        here = movements.layers[hop][chosen[-1]].outside
-        there = np.array([node.outside for node in movements.layers[hop + 1]])
+        here = movements.layers[hop][chosen[-1]].departure
+        there = np.array([node.arrival for node in movements.layers[hop + 1]])
         costs = movement_cost(weights, here, there)
         chosen.append(int(np.argmin(costs)))
         total += float(costs.min())

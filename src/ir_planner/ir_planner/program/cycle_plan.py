@@ -141,8 +141,10 @@ def task_of(choice: Choice, seconds: float, standing: float) -> Task:
 
 
 def _slower(movement: Movement, duration: float) -> Movement | None:
-    """The same movement in `duration` s, verified again; None where it isn't certified or lasts too long."""
-    if duration > DURATION_MAX:
+    """The same movement in `duration` s, verified again; None where it isn't certified, lasts too long, or
+    keeps a tool's speed.
+    """
+    if duration > DURATION_MAX or movement.fixed_time:
         return None
     factor = np.floor(1e6 * duration / movement.trajectory.duration) / 1e6
     slower = movement.stretched_by(max(float(factor), 1.0))

@@ -58,6 +58,11 @@ def shared_out(values: TimeValues, task: Task) -> Timed | None:
     return min(whole, key=lambda timed: timed.energy, default=None)
 
 
+def _to_slow(point: Point) -> tuple[bool, float]:
+    """The last to be slowed down is the longest movement, but none along a path at a tool's speed."""
+    return not point.movement.fixed_time, point.seconds
+
+
 def _filled(chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task) -> list[Timed]:
     """Programs of these points: one that waits at the end, and one in which a part takes the time left."""
     movements = {part: point.movement for part, point in chosen.items()}
@@ -66,7 +71,7 @@ def _filled(chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], 
     last = bool(open_steps) and left <= open_steps[0].seconds
     if not (last or not open_steps or left < SHORTEST_WAIT):
         return found  # a whole step fits: that program comes next
-    part = open_steps[0].part if open_steps else max(chosen, key=lambda part: chosen[part].seconds)
+    part = open_steps[0].part if open_steps else max(chosen, key=lambda part: _to_slow(chosen[part]))
     before = movements[part]
     after = task.slower(before, before.trajectory.duration + left)
     if after is not None:

@@ -41,18 +41,20 @@ class CostEdges:
 
     def _hop(self, hop: int, first: list[Node], second: list[Node]) -> Hop:
         context = self.movements.context.inside(self.movements.route.arriving(hop))
-        from_out, to_out = _outsides(first), _outsides(second)
-        across = least_cost(from_out, to_out, context.scene, context.limits, self.rates)
+        scene, limits = context.scene, context.limits
+        across = least_cost(_departures(first), _arrivals(second), scene, limits, self.rates)
 
         def lines(nodes: list[Node], *, entry: bool) -> FloatArray:
-            work, outside = np.array([node.interaction for node in nodes]), _outsides(nodes)
-            ends = (outside, work) if entry else (work, outside)
-            costs = least_cost(ends[0], ends[1], context.scene, context.limits, self.rates)
+            work = np.array([node.interaction for node in nodes])
+            ends = (_arrivals(nodes), work) if entry else (work, _departures(nodes))
+            costs = least_cost(ends[0], ends[1], scene, limits, self.rates)
             return np.asarray(np.diagonal(costs))
 
-        return _with_standing_parts(
-            Hop(lines(first, entry=False), across, lines(second, entry=True)), first, second
-        )
+        bounds = Hop(lines(first, entry=False), across, lines(second, entry=True))
+        paths = [Part(hop, ENTER, -1, k) for k, node in enumerate(second) if node.driven is not None]
+        for part, settled in zip(paths, self._planned(paths), strict=True):
+            bounds.take(part, settled)
+        return _with_standing_parts(bounds, first, second)
 
     def settle(self, parts: list[Part]) -> list[Settled]:
         """Coarse solutions of the parts that have none yet; where all have, the movements: those along
@@ -130,7 +132,7 @@ class TravelEdges:
         leave, enter = (
             np.array([path_cost(weights, node.line.points) for node in nodes]) for nodes in (first, second)
         )
-        across = movement_cost(weights, _outsides(first)[:, None], _outsides(second)[None])
+        across = movement_cost(weights, _departures(first)[:, None], _arrivals(second)[None])
         return _with_standing_parts(Hop(leave, across, enter), first, second)
 
     def settle(self, parts: list[Part]) -> list[Settled]:
@@ -144,12 +146,12 @@ class TravelEdges:
         return [straight.get(part) or found.get(part) or Settled(0.0, exact=False) for part in parts]
 
     def _straight(self, part: Part) -> Settled:
-        first, second = self.movements.nodes(part)
-        free = self._spaces[part.hop].edges_free(first.outside[None], second.outside[None])[0]
+        first, second = self.movements.ends(part)
+        free = self._spaces[part.hop].edges_free(first[None], second[None])[0]
         if not free:
             self._blocked.add(part)
         weights = self.movements.route.arriving(part.hop).weights
-        return Settled(float(movement_cost(weights, first.outside, second.outside)), exact=bool(free))
+        return Settled(float(movement_cost(weights, first, second)), exact=bool(free))
 
     def _planned(self, parts: list[Part]) -> list[Settled]:
         """W of the movements as they are sent: a path that was found is shortened by its descent."""
@@ -158,13 +160,18 @@ class TravelEdges:
         return [Settled(cost, exact=True) for cost in costs]
 
 
-def _outsides(nodes: list[Node]) -> FloatArray:
-    return np.array([node.outside for node in nodes])
+def _arrivals(nodes: list[Node]) -> FloatArray:
+    return np.array([node.arrival for node in nodes])
+
+
+def _departures(nodes: list[Node]) -> FloatArray:
+    return np.array([node.departure for node in nodes])
 
 
 def _with_standing_parts(hop: Hop, first: list[Node], second: list[Node]) -> Hop:
     """The hop, its parts in which nothing moves known to cost nothing."""
-    hop.nothing(ACROSS, np.abs(_outsides(first)[:, None] - _outsides(second)[None]).max(axis=2) <= STILL)
-    hop.nothing(LEAVE, np.array([len(node.line.points) == 1 for node in first])[:, None])
-    hop.nothing(ENTER, np.array([len(node.line.points) == 1 for node in second])[None, :])
+    away = np.abs(_departures(first)[:, None] - _arrivals(second)[None]).max(axis=2)
+    hop.nothing(ACROSS, away <= STILL)
+    hop.nothing(LEAVE, np.array([not node.leaves for node in first])[:, None])
+    hop.nothing(ENTER, np.array([not node.enters for node in second])[None, :])
     return hop

@@ -119,7 +119,7 @@ class Movements:
         first, second = self.nodes(part)
         names = self.route.name(part.hop - 1), self.route.name(part.hop)
         lines = first.line.points.tobytes(), second.line.points.tobytes()
-        ends = lines if part.kind != ACROSS else (first.outside.tobytes(), second.outside.tobytes())
+        ends = lines if part.kind != ACROSS else (first.departure.tobytes(), second.arrival.tobytes())
         return id(self.route.arriving(part.hop)), part.kind, names, ends
 
     def nodes(self, part: Part) -> tuple[Node, Node]:
@@ -133,9 +133,10 @@ class Movements:
         """Where a part starts and ends (n,)."""
         first, second = self.nodes(part)
         if part.kind == ACROSS:
-            return first.outside, second.outside
-        ends = first.interaction, first.outside
-        return ends if part.kind == LEAVE else ends[::-1]
+            return first.departure, second.arrival
+        if part.kind == LEAVE:
+            return first.interaction, first.departure
+        return first.arrival, first.interaction
 
     def _planned(self, part: Part, context: Context) -> Movement | Failure:
         inside = context.inside(self.route.arriving(part.hop))
@@ -154,6 +155,9 @@ class Movements:
     def _along_line(self, part: Part, context: Context) -> Movement | Failure:
         entry = part.kind == ENTER
         station = self.route.name(part.hop if entry else part.hop - 1)
+        driven = self.nodes(part)[0].driven
+        if entry and driven is not None:
+            return driven.asked_by(context)
         what, at = f"{'entering' if entry else 'leaving'} {station}", context.at(station)
         slower = slowed_near(_known(self._near.lines, part), at)
         if slower is not None:

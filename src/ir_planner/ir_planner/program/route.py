@@ -9,7 +9,7 @@ from ir_planner.scene import PlanningScene
 @dataclass(frozen=True, eq=False)
 class Route:
     """All steps, and `stops`: indices of those that go somewhere; a step at the place of the one before stays
-    there.
+    there, but a path is driven again.
     """
 
     steps: tuple[PlacedStep, ...]
@@ -21,9 +21,10 @@ class Route:
         """The route that visits the targets of the steps."""
         stops, here = [], ""
         for k, placed in enumerate(steps):
-            if placed.step.kind != "PAUSE" and placed.step.target != here:
+            kind, target = placed.step.kind, placed.step.target
+            if kind == "PATH" or (kind != "PAUSE" and target != here):
                 stops.append(k)
-                here = placed.step.target
+                here = target
         return Route(steps, scenes, tuple(stops))
 
     def __len__(self) -> int:

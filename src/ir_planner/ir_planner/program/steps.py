@@ -4,7 +4,16 @@ before and after it.
 
 from dataclasses import dataclass, field
 
-from ir_description import Cell, InvalidValueError, PartPlaces, PowerData, ProgramStep, Signal, cell_in
+from ir_description import (
+    Cell,
+    InvalidValueError,
+    PartPlaces,
+    PowerData,
+    ProgramStep,
+    Signal,
+    StepKind,
+    cell_in,
+)
 from ir_description import UnknownNameError as DescriptionNameError
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
@@ -55,9 +64,9 @@ class Scenes:
 
 
 def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
-    """The cell's program, or a visit of each of `stations` (stations and postures) in turn.
+    """The cell's program, or a visit of each of `stations` (stations, postures, paths) in turn.
 
-    Raises UnknownNameError for a station nobody has, RequestError where there is nothing to plan.
+    Raises UnknownNameError for a stop nobody has, RequestError where there is nothing to plan.
     """
     if not stations:
         if not cell.program:
@@ -71,11 +80,13 @@ def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"{len(stations)} stations are given: at most {STEPS_MAX} are planned",
         )
-    known = [station.name for station in cell.stations]
+    kinds: dict[str, StepKind] = dict.fromkeys(POSTURES, "POSTURE")
+    kinds |= dict.fromkeys((path.name for path in cell.paths), "PATH")
+    kinds |= dict.fromkeys((station.name for station in cell.stations), "STATION")
     for name in stations:
-        if name not in known and name not in POSTURES:
-            raise UnknownNameError("station", name, [*known, *POSTURES])
-    return tuple(ProgramStep("STATION" if name in known else "POSTURE", name) for name in stations)
+        if name not in kinds:
+            raise UnknownNameError("station", name, kinds)
+    return tuple(ProgramStep(kinds[name], name) for name in stations)
 
 
 def placed_steps(

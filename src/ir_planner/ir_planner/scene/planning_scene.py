@@ -169,11 +169,17 @@ class PlanningScene:
         return self._numbers.get((a, b), []) + self._numbers.get((b, a), [])
 
     def _contacts(self, station: str) -> tuple[AllowedContact, ...]:
-        return self.station(station).allowed_contacts if station else ()
+        if not station:
+            return ()
+        try:
+            return self.cell.contacts_at(station)
+        except LookupError:
+            known = [stop.name for stop in self.cell.stations] + [path.name for path in self.cell.paths]
+            raise UnknownNameError("station", station, known) from None
 
-    def zone_of(self, station: str) -> Zone:
-        """The forbidden zone of a station's machine, in the world."""
-        return self.cell.machine(self.station(station).equipment).zone
+    def zone_of(self, station: str) -> Zone | None:
+        """The forbidden zone of the machine of a station or a path, in the world; None: it has none."""
+        return self.cell.zone_at(station)
 
     def station(self, name: str) -> Station:
         """The station of that name; UnknownNameError lists the known."""

@@ -16,8 +16,12 @@ _PARTS, _ROUNDS = 32, 6  # 2^30 parts of the time between two samples
 
 
 def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float) -> BoolArray:
-    """Whether the tcp at q (N, n) is in the zone of the station's machine, or within `margin` m of it."""
+    """Whether the tcp at q (N, n) is in the zone of the station's machine, or within `margin` m of it; never
+    where a path belongs to no machine.
+    """
     zone = scene.zone_of(station)
+    if zone is None:
+        return np.zeros(len(q), dtype=bool)
     tcp = scene.chain.tcp_poses(q)[:, :3, 3]
     local = (tcp - zone.pose[:3, 3]) @ zone.pose[:3, :3]
     beyond = np.maximum(np.abs(local) - 0.5 * zone.size, 0.0)

@@ -29,6 +29,7 @@ from ir_planner.timing.objective import coarse_cost, coarse_energy_cost, request
 class Movement:
     """path (M, n): the waypoints that it passes or came from. context: what it must keep and is judged by.
     note: where it differs from what was asked. timing: "asynchronous" where joints have laws of their own.
+    fixed_time: its duration follows from a tool's speed along a path, and isn't to be changed.
     """
 
     path: FloatArray
@@ -36,6 +37,7 @@ class Movement:
     context: Context
     note: str = ""
     timing: str = "synchronous"
+    fixed_time: bool = False
 
     @cached_property
     def clearance(self) -> Violation | None:
@@ -96,6 +98,13 @@ class Movement:
         """The same trajectory with other waypoints (M, n); what is known about it stays known."""
         other = replace(self, path=path)
         other.__dict__.update({**self.__dict__, "path": path})
+        return other
+
+    def asked_by(self, context: Context) -> "Movement":
+        """The same for a request with another objective in the same scene; proofs and report stay known."""
+        other = replace(self, context=context.at(self.context.station))
+        known = ("clearance", "torque", "verification", "evaluation")
+        other.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
         return other
 
     def stretched_by(self, factor: float) -> "Movement":

@@ -32,7 +32,7 @@ def mode_shares(power: PowerSeries) -> tuple[Share, ...]:
 
 
 def station_uses(results: Sequence[StepResult]) -> tuple[StationUse, ...]:
-    """Every step belongs to one station: service movements and pauses to theirs, a regional movement to
+    """Every step belongs to one stop: service movements, paths and pauses to theirs, a regional movement to
     the one where it ends.
     """
     kinds: dict[str, dict[str, list[StepResult]]] = {}
@@ -42,7 +42,7 @@ def station_uses(results: Sequence[StepResult]) -> tuple[StationUse, ...]:
             kind, station = "rest", movement.to_station or movement.from_station
         elif movement.kind == MovementKind.SERVICE_EXIT:
             kind, station = "service", movement.from_station
-        elif movement.kind == MovementKind.SERVICE_ENTRY:
+        elif movement.kind in (MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN):
             kind, station = "service", movement.to_station
         else:
             kind, station = "travel", movement.to_station

@@ -54,7 +54,11 @@ def step_label(movement: PlannedMovement) -> str:
         mode = f" ({movement.power_mode})" if movement.power_mode else ""
         return f"pause{where}{mode}"
     if movement.from_station == movement.to_station != "":
-        direction = {MovementKind.SERVICE_ENTRY: "into", MovementKind.SERVICE_EXIT: "out of"}
+        direction = {
+            MovementKind.SERVICE_ENTRY: "into",
+            MovementKind.SERVICE_EXIT: "out of",
+            MovementKind.CARTESIAN: "along",
+        }
         return f"{direction.get(MovementKind(movement.kind), 'at')} {movement.to_station}"
     return f"{movement.from_station or 'start'} → {movement.to_station or 'goal'}"
 

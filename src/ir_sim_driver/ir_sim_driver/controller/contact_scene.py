@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ir_description import Body, Capsule, Cell, Station, cell_in, sweep_speeds
+from ir_description import AllowedContact, Body, Capsule, Cell, cell_in, sweep_speeds
 from ir_kernels.chain import Chain
 from ir_kernels.collision import CollisionModel
 from ir_msgs_py.arrays import BoolArray, FloatArray
@@ -103,10 +103,10 @@ class ContactScene:
                 far += float(offsets[joint])
         return result
 
-    def station(self, name: str) -> Station:
-        """The station of that name. Raises InvalidValueError (a station nobody has)."""
+    def contacts(self, stop: str) -> tuple[AllowedContact, ...]:
+        """What a station or a path allows. Raises InvalidValueError (one that nobody has)."""
         try:
-            return self.cell.station(name)
+            return self.cell.contacts_at(stop)
         except LookupError as error:
             raise InvalidValueError(str(error)) from error
 
@@ -114,7 +114,7 @@ class ContactScene:
         """Which pairs (Z,) may touch at a station; none for ""."""
         if not station:
             return np.zeros(len(self.model.pairs), dtype=bool)
-        contacts = {frozenset((c.body_a, c.body_b)) for c in self.station(station).allowed_contacts}
+        contacts = {frozenset((c.body_a, c.body_b)) for c in self.contacts(station)}
         return np.array([frozenset((a, b)) in contacts for _, a, b in self.model.pairs], dtype=bool)
 
     def inside(self, q: FloatArray, station: str) -> bool:
@@ -123,7 +123,9 @@ class ContactScene:
 
     def depth(self, q: FloatArray, station: str) -> FloatArray:
         """(N,): how far [m] the tcp at q (N, n) is from leaving that; negative: from getting there."""
-        zone = self.cell.machine(self.station(station).equipment).zone
+        zone = self.cell.zone_at(station)
+        if zone is None:
+            return np.full(len(q), -np.inf)
         tcp = self.chain.tcp_poses(q)[:, :3, 3]
         local = (tcp - zone.pose[:3, 3]) @ zone.pose[:3, :3]
         beyond = np.abs(local) - 0.5 * zone.size

@@ -48,7 +48,7 @@ class Timeline {
 const MODE_STYLE = /^m-/;
 function spanColour(style) {
   if (MODE_STYLE.test(style)) return css(`--${style}`) || css("--m-transition");
-  const colours = { pause: "--m-transition", regional: "--a1", service_entry: "--a2", service_exit: "--a5", load: "--part",
+  const colours = { pause: "--m-transition", regional: "--a1", service_entry: "--a2", service_exit: "--a5", cartesian: "--a4", load: "--part",
     none: "--line", bit: "--accent", moving: "--m-transition", contact: "--m-EMERGENCY_STOP" };
   return css(colours[style] || "--a1");
 }
