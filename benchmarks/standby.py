@@ -17,19 +17,22 @@ from _results import at_most, command_line, finish, line_of
 from _standby_search import Controller
 
 from ir_description import load_cell, load_power_data
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.transitions import TransitionTimes
+from ir_planner.checks.states import state_check
 from ir_planner.program import lengths_of
 from ir_planner.program.rests import Rests, rests_at
 from ir_planner.program.standby import advice
-from ir_planner.scene import load_text, scene_with
+from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_sim_driver.controller import SimulationSettings, make_simulation
 from ir_sim_driver.power import IdleTimes
 
 CELL, SEEDS, QUICK_SEEDS = "demo", 60, 12
 LENGTHS = 8
 JOULES = 20.0  # that a prediction may be off whatever the pause
+APART = 0.01  # m between the robot and what stands around it
 STEP = 0.01  # s: nothing moves, and no time of the controller is shorter
 
 
@@ -58,6 +61,15 @@ def times_of(rng: np.random.Generator, drawn: bool) -> tuple[TransitionTimes, fl
     return TransitionTimes(**values), float(round(rng.uniform(1.0, 40.0), 2))
 
 
+def free_posture(rng: np.random.Generator, scene: PlanningScene) -> FloatArray:
+    """A configuration (n,) in which nothing touches: the simulated robot stops at a contact."""
+    robot = scene.cell.robot
+    while True:
+        q = robot.position_min + rng.uniform(0.2, 0.8, robot.n) * (robot.position_max - robot.position_min)
+        if state_check(q, scene, APART, 1).valid:
+            return q
+
+
 def controller_of(rests: Rests) -> Controller:
     """The figures alone."""
     modes = rests.modes
@@ -70,7 +82,7 @@ def controller_of(rests: Rests) -> Controller:
     )
 
 
-def measured(rests_cell: str, load: str, q: np.ndarray, times: TransitionTimes, timer: float, pause: float,
+def measured(rests_cell: str, load: str, q: FloatArray, times: TransitionTimes, timer: float, pause: float,
              wake_at: float) -> float:  # fmt: skip
     """Energy [J] that the simulated controller draws over a pause [s] that it is woken from in time."""
     idle = IdleTimes(motors_to_brakes_in_program=timer)
@@ -84,18 +96,19 @@ def measured(rests_cell: str, load: str, q: np.ndarray, times: TransitionTimes, 
     plant.wake() if plant.modes.mode is Mode.HIBERNATION else plant.pauses.end()
     while not plant.modes.motors_on or plant.time < pause:
         plant.step()
+        if plant.stopped:
+            raise RuntimeError(f"the controller stopped the robot in a pause: {plant.fault}")
     return plant.mains.energy() - begun
 
 
 def row_of(name: str, seed: int) -> Row:
     """Plan, search and drive the pauses of a seed."""
     rng, cell = np.random.default_rng([seed, *name.encode()]), load_cell(name)
-    robot = cell.robot
-    q = robot.position_min + rng.uniform(0.2, 0.8, robot.n) * (robot.position_max - robot.position_min)
     times, timer = times_of(rng, drawn=seed % 2 == 1)
     tool = load_text(cell)
     load = (NO_LOAD, tool, f"{tool}+{cell.parts[0].name}" if cell.parts else tool)[seed % 3]
     scene = scene_with(cell, load, replace(load_power_data(), motors_to_brakes_in_program=timer))
+    q = free_posture(rng, scene)
     searched = controller_of(rests_at(q, scene, times))
     pause = float(round(10.0 ** rng.uniform(0.0, 3.857), 2))
     known = advice(lengths_of(pause), q, scene, times)
