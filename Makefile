@@ -70,6 +70,7 @@ docs: setup-tests ## the pages that are written from code: interfaces, parameter
 	@$(BIN)/python tools/interface_reference.py
 	@$(BIN)/python tools/parameter_reference.py
 	@$(BIN)/python tools/security_policy.py
+	@$(BIN)/python tools/mistakes_page.py
 	@$(BIN)/python tools/architecture_page.py
 
 clean:            ## remove what was built; .venv stays (rm -rf .venv for all)

@@ -19,6 +19,8 @@ from ir_msgs_py.arrays import FloatArray
 
 OVERLAPS_MAX = 1_000
 """Zones that overlap are named up to this many pairs."""
+_LARGE = 50.0  # m: a body longer than that is rather one in mm
+_FAR = 10.0  # times the reach: a place farther away is rather one in mm
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,7 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...
     """Return what looks wrong in a cell, errors first. power: the modes; None: the robot's own."""
     findings = [
         *_base(cell),
+        *_sizes(cell),
         *_stations(cell),
         *_zones(cell),
         *_signals(cell),
@@ -41,6 +44,15 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...
         *_parts(cell),
     ]
     return tuple(sorted(findings, key=lambda finding: finding.severity))
+
+
+def _sizes(cell: Cell) -> Iterator[Finding]:
+    """Lengths that were meant in mm."""
+    for body in cell.bodies():
+        longest = float(body.size.max(initial=0.0)) if body.kind != "plane" else 0.0
+        if longest > _LARGE:
+            sentence = f"is {longest:g} m long; lengths are in m: {longest / 1000.0:g} for {longest:g} mm?"
+            yield Finding("warning", body.name, sentence)
 
 
 def _base(cell: Cell) -> Iterator[Finding]:
@@ -83,9 +95,9 @@ def _stations(cell: Cell) -> Iterator[Finding]:
                 yield Finding("error", station.name, f"its tcp is {-depth:.3f} m inside {body.name}")
         distance = float(np.linalg.norm(point - shoulder[:3, 3]))
         if distance > reach:
-            yield Finding(
-                "error", station.name, f"its tcp is {distance:.3f} m from A1, the arm reaches {reach:.3f} m"
-            )
+            unit = "; lengths are in m, not in mm" if distance > _FAR * reach else ""
+            sentence = f"its tcp is {distance:.3f} m from A1, the arm reaches {reach:.3f} m{unit}"
+            yield Finding("error", station.name, sentence)
         machine = machines[station.equipment]
         if not machine.enabled:
             yield Finding("warning", station.name, f"its machine {machine.name} is switched off")

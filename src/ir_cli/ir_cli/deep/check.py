@@ -91,7 +91,8 @@ def _without_line(
     best = max(here, key=lambda each: (each.free, each.mendable, each.depth))
     if not (best.free or best.mendable):
         sentence = f"no configuration is free; in the best of them {best.sentence}"
-        return cell, [Suggestion("error", name, f"{sentence}: move the station{_by(best, found)}")]
+        advice = _door(best, cell) or f"move the station{_by(best, found)}"
+        return cell, [Suggestion("error", name, f"{sentence}: {advice}")]
     suggestions = []
     if best.contacts:
         station = with_contacts(station, best.contacts)
@@ -107,6 +108,17 @@ def _without_line(
 def _why(found: Sequence[Visit], approach: float) -> str:
     """What is in the path of the line that lacks least."""
     return max(exits(found, approach), key=lambda each: each.depth).sentence
+
+
+def _door(best: Exit, cell: Cell) -> str:
+    """What moves the body in the path, "" where it is always there."""
+    in_path = {near.body_b for line in best.lines for near in line.near}
+    for machine in cell.equipment:
+        for state in machine.states:
+            for body in in_path.intersection(state.bodies):
+                by = f" by signal {machine.switch.signal}, and wait for it" if machine.switch else ""
+                return f"{body} is there while {machine.name} is {state.name}: change that before{by}"
+    return ""
 
 
 def _by(best: Exit, found: Sequence[Visit]) -> str:

@@ -37,6 +37,7 @@ from ir_description.errors import CellFileError, RobotFileError, UnknownNameErro
 from ir_description.files.all_errors import document_errors
 from ir_description.files.body_reader import BodyReader, read_pose
 from ir_description.files.equipment_reader import read_equipment
+from ir_description.files.hints import other_angle_unit
 from ir_description.files.items import Item, Table, read_items
 from ir_description.files.load_reader import read_part, read_tool
 from ir_description.files.path_reader import PATHS_MAX, read_paths
@@ -264,7 +265,11 @@ class _CellReader:
         values = item.numbers(self._robot.n, -3600.0, 3600.0, "deg" if key.endswith("_deg") else "rad")
         posture = np.radians(values) if key.endswith("_deg") else values
         with item.blamed():
-            check_posture(self._robot, posture, name)
+            try:
+                check_posture(self._robot, posture, name)
+            except InvalidValueError as error:
+                meant = other_angle_unit(key, values, self._robot)
+                raise InvalidValueError(f"{error}{meant}") from error
         return posture
 
     def _program(

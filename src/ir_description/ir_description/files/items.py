@@ -15,6 +15,7 @@ from typing import NoReturn
 import numpy as np
 
 from ir_description.errors import DescriptionFileError, UnknownNameError, listed, shown
+from ir_description.files.hints import decimal_comma, in_thousandths
 from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -64,11 +65,11 @@ class Item:
         items = {}
         for key, entry in self._content.items():
             if key not in known:
-                place = self.where or "the file"
+                place, meant = self.where or "the file", decimal_comma(key)
                 raise self._error(
                     self._source,
                     entry.line,
-                    f"{place} has the unknown key {shown(key)}; known are {listed(known)}",
+                    f"{place} has the unknown key {shown(key)}; known are {listed(known)}{meant}",
                 )
             items[key] = Item(entry.node, self._source, self._error, prefix + key)
         for key in required:
@@ -172,7 +173,8 @@ class Item:
             self.fail(f"is {shown(text)}, which is not finite")
         if not (low < value <= high if above else low <= value <= high):
             left = "(" if above else "["
-            self.fail(f"is {text}{_unit(unit)}, must be in {left}{low:g}, {high:g}]{_unit(unit)}")
+            bounds = f"must be in {left}{low:g}, {high:g}]{_unit(unit)}"
+            self.fail(f"is {text}{_unit(unit)}, {bounds}{in_thousandths(value, low, high, unit)}")
         return value
 
     def numbers(

@@ -64,13 +64,20 @@ def parse_yaml(
     except yaml.MarkedYAMLError as broken:
         mark = broken.problem_mark or broken.context_mark
         line = mark.line + 1 if mark is not None else 0
-        raise error(source, line, f"this is not YAML: {broken.problem or broken.context}") from broken
+        tab = mark is not None and "\t" in _before(text, mark)
+        why = "a tab; indent by spaces" if tab else str(broken.problem or broken.context)
+        raise error(source, line, f"this is not YAML: {why}") from broken
     except UnicodeEncodeError as broken:
         line = text.count("\n", 0, broken.start) + 1
         raise error(source, line, f"character {shown(text[broken.start])} is not allowed in YAML") from broken
     except yaml.reader.ReaderError as broken:
         line = text.count("\n", 0, broken.position) + 1 if isinstance(broken.position, int) else 0
         raise error(source, line, f"character {shown(broken.character)} is not allowed in YAML") from broken
+
+
+def _before(text: str, mark: yaml.Mark) -> str:
+    """What stands in the line of a mark up to and with it."""
+    return text.splitlines()[mark.line][: mark.column + 1] if mark.line < text.count("\n") + 1 else ""
 
 
 class _Builder:

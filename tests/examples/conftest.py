@@ -1,0 +1,8 @@
+"""Modules beside the tests of pages and examples."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # pages.py

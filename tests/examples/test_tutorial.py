@@ -1,0 +1,35 @@
+"""docs/tutorial.md, followed to the letter: every command, every line typed, and the cell that comes out."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+from pages import commands, patched, snippets
+
+from ir_cli.main import main
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def test_who_follows_the_tutorial_gets_a_cell_that_plans(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    typed, said, count = Path("first.yaml"), "", 0
+    typed.write_text("")
+    for snippet in snippets("tutorial.md"):
+        if snippet.language == "yaml":
+            typed.write_text(typed.read_text() + snippet.text)
+        elif snippet.language == "diff":
+            added = [line[1:].strip() for line in snippet.text.splitlines() if line[0] == "+"]
+            assert [line for line in added if line not in said] == []
+            typed.write_text(patched(typed.read_text(), snippet.text))
+        for command in commands(snippet.text):
+            code = main(shlex.split(command.words))
+            said = capsys.readouterr().out
+            assert code == command.code, f"ir {command.words}: {said}"
+            count += 1
+    assert count == 10
+    assert typed.read_text() == (EXAMPLES / "first_cell.yaml").read_text()
