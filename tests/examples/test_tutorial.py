@@ -17,7 +17,7 @@ def test_who_follows_the_tutorial_gets_a_cell_that_plans(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    typed, said, count = Path("first.yaml"), "", 0
+    typed, said, count = Path("first_cell.yaml"), "", 0
     typed.write_text("")
     for snippet in snippets("tutorial.md"):
         if snippet.language == "yaml":
