@@ -14,6 +14,7 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     install_requires=["setuptools", "numpy", "PyYAML"],
+    extras_require={"view": ["viser"]},
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",

@@ -38,6 +38,7 @@ COMMAND_MODULES = {
     "study": "ir_cli.offline.study_command",
     "compare": "ir_cli.offline.compare_command",
     "cell": "ir_cli.offline.cell_commands",
+    "view": "ir_cli.view.command",
     "robot": "ir_cli.offline.robot_commands",
     "completion": "ir_cli.completion_command",
 }
@@ -70,6 +71,7 @@ HELP = {
     "study": "where things should stand, statistics: many plans of one cell; needs no ROS",
     "compare": "today's program (KRL, a trace, or PTP at 100 %%) against the planner's",
     "cell": "check cell files, list the bundled cells",
+    "view": "look at a cell in a browser, move it about, plan it; needs no ROS",
     "robot": "check robot files, make one from a URDF, list the bundled ones",
     "completion": "completion for bash: source <(ir completion)",
 }
@@ -92,6 +94,7 @@ WITHOUT_ROS = (
     "study",
     "compare",
     "cell",
+    "view",
     "robot",
     "completion",
 )

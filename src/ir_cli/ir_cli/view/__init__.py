@@ -1,0 +1,1 @@
+"""`ir view`: a cell in a browser, from its file: looked at, moved about, checked and planned again."""

@@ -1,0 +1,91 @@
+"""viser's server, for browsers on this machine alone.
+
+It listens on 127.0.0.1 and answers to a page that it served itself: a page from elsewhere in the same browser
+is refused by its Origin. viser can publish a server through a tunnel when a client asks for it; not this one.
+"""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from functools import partial
+from importlib.util import find_spec
+from typing import Any
+
+from ..errors import CommandError, InputError
+from ..ports import TCP, free_port, is_free
+
+HOST = "127.0.0.1"
+PORT = 8880
+ATTEMPTS = 20
+"""Free ports that are tried: another program may take one between the look and the use."""
+MISSING = 'ir view needs viser: pip install "ir_cli[view]", or pip install viser'
+_STARTING = threading.Lock()
+
+
+def check_installed() -> None:
+    """Raise InputError with what to install where viser is missing."""
+    if find_spec("viser") is None:
+        raise InputError(MISSING)
+
+
+def opened(port: int | None) -> Any:
+    """A running viser.ViserServer on a port, 0: a free one, None: the usual one or a free one.
+
+    Raises CommandError where the port is taken.
+    """
+    if port is None:
+        port = PORT if is_free(PORT, TCP, HOST) else 0
+    if port:
+        server = _on(port)
+        if server is None:
+            raise CommandError(f"port {port} of {HOST} is taken: give another, or 0 for a free one")
+        return server
+    for _ in range(ATTEMPTS):
+        server = _on(free_port(TCP))
+        if server is not None:
+            return server
+    raise CommandError(f"no port of {HOST} is free")
+
+
+def closed(server: Any) -> None:
+    """Ends the server and its threads, without a word on the terminal."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def _on(port: int) -> Any:
+    """A server on exactly this port, None where that is taken."""
+    if not is_free(port, TCP, HOST):
+        return None
+    import viser
+    from viser import _messages
+
+    origins = [f"http://{name}:{port}" for name in (HOST, "localhost")]
+    with _STARTING, _asked_by(origins), redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host=HOST, port=port, verbose=False)
+    if server.get_port() != port:  # viser goes on to the next port, where the origins would not fit
+        closed(server)
+        return None
+    for request in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+        server._websock_server.unregister_handler(request)
+    return server
+
+
+class _asked_by:  # noqa: N801 - used as a function
+    """While it lasts, servers of websockets start that answer to these origins only (None: to programs)."""
+
+    def __init__(self, origins: list[str]) -> None:
+        self._origins: list[Any] = [*origins, None]
+
+    def __enter__(self) -> None:
+        import websockets.asyncio.server as module
+
+        self._module, self._serve = module, module.serve
+        guarded: Callable[..., Any] = partial(self._serve, origins=self._origins)
+        module.serve = guarded  # type: ignore[assignment, misc]  # viser has no argument for it
+
+    def __exit__(self, *_: object) -> None:
+        self._module.serve = self._serve  # type: ignore[misc]

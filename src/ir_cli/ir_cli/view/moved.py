@@ -1,0 +1,174 @@
+"""A cell with machines and stations where they were dragged, and its file with nothing else changed.
+
+Only the numbers of the poses are replaced in the file's text: comments, order and layout stay. What comes out
+is read again and compared with what is shown before anybody gets it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import yaml
+
+from ir_description import Cell, Station
+from ir_description.cell import station_at
+from ir_description.poses import abc_from_rotation
+from ir_msgs_py.arrays import FloatArray
+
+from .poses import TENTH
+
+Kind = str
+"""equipment or station."""
+_TURNS = ("abc_deg", "quaternion", "rotation")
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is dragged: a machine, or a station within its machine."""
+
+    kind: Kind
+    name: str
+
+    @property
+    def text(self) -> str:
+        """As it stands in a list."""
+        return f"{'machine' if self.kind == 'equipment' else self.kind} {self.name}"
+
+
+Moves = Mapping[Target, FloatArray]
+"""New poses (4, 4): of machines in the world, of stations in their machine."""
+
+
+def targets(cell: Cell) -> list[Target]:
+    """Everything in a cell that can be dragged."""
+    machines = [Target("equipment", machine.name) for machine in cell.equipment if machine.enabled]
+    return [*machines, *(Target("station", station.name) for station in cell.stations)]
+
+
+def pose_in(cell: Cell, target: Target) -> FloatArray:
+    """The pose (4, 4) of a target, as a move gives it."""
+    if target.kind == "equipment":
+        return cell.machine(target.name).pose
+    return cell.station(target.name).pose_in_equipment
+
+
+def cell_with(cell: Cell, moves: Moves) -> Cell:
+    """The cell after all moves; raises what a cell raises for places that it can't have."""
+    for target, pose in moves.items():
+        if target.kind == "equipment":
+            cell = cell.with_equipment(target.name, pose=pose)
+        else:
+            stations = (_put(each, cell, target, pose) for each in cell.stations)
+            cell = replace(cell, stations=tuple(stations))
+    return cell
+
+
+def _put(station: Station, cell: Cell, target: Target, pose: FloatArray) -> Station:
+    if station.name != target.name:
+        return station
+    machine = cell.machine(station.equipment)
+    return station_at(machine, station.name, pose, station.allowed_contacts, station.approach_distance)
+
+
+def snippet(moves: Moves) -> str:
+    """The moved poses as lines of YAML to paste."""
+    lines = []
+    for target, pose in moves.items():
+        lines += [f"# {target.text}", f"pose: {{{_pose_text(pose)}}}"]
+    return "\n".join(lines)
+
+
+def edited(text: str, cell: Cell, moves: Moves) -> str:
+    """The text of the file of `cell` with the moves. ValueError where a pose can't be found in it."""
+    changes: list[tuple[int, int, str]] = []
+    places = dict(_places(yaml.compose(text, Loader=_LOADER)))
+    for target, pose in moves.items():
+        if target not in places:
+            raise ValueError(f"{target.text} was not found in the file")
+        changes += _changes(places[target], pose_in(cell, target), pose)
+    for start, end, new in sorted(changes, reverse=True):
+        text = text[:start] + new + text[end:]
+    return text
+
+
+def _places(root: yaml.Node | None) -> Iterator[tuple[Target, yaml.MappingNode]]:
+    """Every machine and station of a document with its mapping."""
+    for machine in _items(_value(root, "equipment")):
+        yield Target("equipment", _scalar(_value(machine, "name"))), machine
+        for station in _items(_value(machine, "stations")):
+            yield Target("station", _scalar(_value(station, "name"))), station
+
+
+def _changes(
+    place: yaml.MappingNode, before: FloatArray, after: FloatArray
+) -> Iterator[tuple[int, int, str]]:
+    pose = _value(place, "pose")
+    if not isinstance(pose, yaml.MappingNode) or not pose.value:
+        if pose is not None:
+            yield pose.start_mark.index, pose.end_mark.index, f"{{{_pose_text(after)}}}"
+        else:
+            yield _after(place, f"pose: {{{_pose_text(after)}}}", 0)
+        return
+    if not np.array_equal(before[:3, 3], after[:3, 3]):
+        xyz = _value(pose, "xyz")
+        row = _row(after[:3, 3], None)
+        yield (_start(xyz), _end(xyz), row) if xyz is not None else _after(pose, f"xyz: {row}", -1)
+    if not np.array_equal(before[:3, :3], after[:3, :3]):
+        turn = f"abc_deg: {_row(abc_from_rotation(after[:3, :3]), TENTH)}"
+        for key, value in pose.value:
+            if key.value in _TURNS:
+                yield _start(key), _end(value), turn
+                return
+        yield _after(pose, turn, -1)
+
+
+def _after(mapping: yaml.MappingNode, entry: str, which: int) -> tuple[int, int, str]:
+    """A further entry of a mapping, after its first or last one."""
+    key, value = mapping.value[which]
+    end = _end(value)
+    if mapping.flow_style:
+        return end, end, f", {entry}"
+    return end, end, f"\n{' ' * key.start_mark.column}{entry}"
+
+
+def _start(node: yaml.Node) -> int:
+    return int(node.start_mark.index)
+
+
+def _end(node: yaml.Node) -> int:
+    """Where a value ends; a block's own mark stands behind the comments that follow it."""
+    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        return _end(last[1] if isinstance(last, tuple) else last)
+    return int(node.end_mark.index)
+
+
+def _value(node: yaml.Node | None, key: str) -> yaml.Node | None:
+    if not isinstance(node, yaml.MappingNode):
+        return None
+    return next((value for name, value in node.value if name.value == key), None)
+
+
+def _items(node: yaml.Node | None) -> list[yaml.MappingNode]:
+    values = node.value if isinstance(node, yaml.SequenceNode) else []
+    return [each for each in values if isinstance(each, yaml.MappingNode)]
+
+
+def _scalar(node: yaml.Node | None) -> str:
+    return str(node.value) if isinstance(node, yaml.ScalarNode) else ""
+
+
+def _pose_text(pose: FloatArray) -> str:
+    xyz = f"xyz: {_row(pose[:3, 3], None)}"
+    if np.array_equal(pose[:3, :3], np.eye(3)):
+        return xyz
+    return f"{xyz}, abc_deg: {_row(abc_from_rotation(pose[:3, :3]), TENTH)}"
+
+
+def _row(values: FloatArray, digits: int | None) -> str:
+    """Numbers as people write them; without digits the shortest that give the same."""
+    rounded = [float(value) if digits is None else round(float(value), digits) for value in values]
+    return f"[{', '.join(repr(value + 0.0).removesuffix('.0') for value in rounded)}]"
