@@ -114,8 +114,11 @@ def _changes(
         return
     if not np.array_equal(before[:3, 3], after[:3, 3]):
         xyz = _value(pose, "xyz")
-        row = _row(after[:3, 3], None)
-        yield (_start(xyz), _end(xyz), row) if xyz is not None else _after(pose, f"xyz: {row}", -1)
+        if isinstance(xyz, yaml.SequenceNode):
+            for item, value in zip(xyz.value, after[:3, 3], strict=True):
+                yield _start(item), _end(item), _number(float(value))
+        else:
+            yield _after(pose, f"xyz: {_row(after[:3, 3], None)}", -1)
     if not np.array_equal(before[:3, :3], after[:3, :3]):
         turn = f"abc_deg: {_row(abc_from_rotation(after[:3, :3]), TENTH)}"
         for key, value in pose.value:
@@ -171,4 +174,8 @@ def _pose_text(pose: FloatArray) -> str:
 def _row(values: FloatArray, digits: int | None) -> str:
     """Numbers as people write them; without digits the shortest that give the same."""
     rounded = [float(value) if digits is None else round(float(value), digits) for value in values]
-    return f"[{', '.join(repr(value + 0.0).removesuffix('.0') for value in rounded)}]"
+    return f"[{', '.join(map(_number, rounded))}]"
+
+
+def _number(value: float) -> str:
+    return repr(value + 0.0).removesuffix(".0")

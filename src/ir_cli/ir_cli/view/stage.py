@@ -20,7 +20,10 @@ from .panel import bad, box, plain
 
 
 class Stage:
-    """A cell as it is shown; found, failure and errors say what is wrong with it, note what happened last."""
+    """A cell as it is shown, its robot at q (n,).
+
+    found, failure and errors say what is wrong with it, note what happened last.
+    """
 
     def __init__(self, server: Any, cell: Cell, source: str, q: FloatArray) -> None:
         self._server, self._source, self._pairs = server, source, NearestPairs()
