@@ -11,7 +11,7 @@ from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations import free_configurations, no_configuration
 
-from ..offline.stations import MARGIN, Visit, visits
+from ..deep.stations import MARGIN, Visit, visits
 
 
 @dataclass(frozen=True, eq=False)

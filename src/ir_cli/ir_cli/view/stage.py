@@ -11,7 +11,7 @@ from ir_description import Cell, PartPlaces
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement
 
-from ..offline.stations import MARGIN
+from ..deep.stations import MARGIN
 from .drawing import Drawing
 from .judged import Judged
 from .named import names_in
