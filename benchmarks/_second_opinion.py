@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from _coal_refined import RefinedCoal
 from _drives import Drives
 from _kernels_peers import Coal
 
@@ -35,14 +36,17 @@ class SecondOpinion:
     def __init__(self, scene: PlanningScene) -> None:
         loads = [capsule for load in scene.loads for capsule in load.capsules]
         self._scene = scene
-        self._coal = Coal(scene.collision, [*scene.cell.robot.capsules, *loads], scene.cell.bodies())
+        capsules = [*scene.cell.robot.capsules, *loads]
+        self._coal = Coal(scene.collision, capsules, scene.cell.bodies())
         self._coal.precise()
+        self._refined = RefinedCoal(self._coal, scene.collision, scene.cell.robot, capsules)
         self._drives = Drives(scene)
 
     def clearance_left(
         self, trajectory: JointTrajectory, margin: float, station: str = "", step: float = STEP
     ) -> tuple[float, int]:
-        """Least distance minus what its pair must keep [m] by Coal, and how many configurations.
+        """Least distance minus what its pair must keep [m] by Coal, exact where it is negative, and at how
+        many configurations it was asked.
 
         station: inside its zone its allowed contacts keep their own distances.
         """
@@ -51,8 +55,7 @@ class SecondOpinion:
         if station:
             inside = tcp_inside(asked, self._scene, station, margin)
             kept = np.where(inside[:, None], self._scene.thresholds(margin, station), plain)
-        left = [float((self._coal.distances(q) - row).min()) for q, row in zip(asked, kept, strict=True)]
-        return min(left), len(asked)
+        return self._refined.least(asked, kept)
 
     def least_distance(self, trajectory: JointTrajectory) -> tuple[float, int]:
         """Least distance of all pairs [m] by Coal, and at how many configurations."""

@@ -1,9 +1,9 @@
 """Are paths of the tool driven as asked for, whenever somebody could, and how soon is that known?
 
-    python benchmarks/cartesian.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
+    python benchmarks/cartesian.py [--cell FILE]... [--seeds N] [--first SEED] [--quick] [--json FILE]
 Random lines, circles, splines and rounded corners in every cell, with and without a free angle about the
-tool's axis. What is certified is judged by Pinocchio (places, speed), Coal (distances) and 10 kHz samples
-(limits); what is refused is put to an oracle that draws configurations and angles.
+tool's axis. What is certified is judged by Pinocchio (places, speed), Coal (distances at 0.0005 rad) and
+10 kHz samples (limits); what is refused is put to an oracle that draws configurations and angles.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from ir_planner.scene import PlanningScene
 
 SEEDS, QUICK_SEEDS = 200, 8
 CELLS = tuple(sorted(bundled_cells()))
-COAL_STEP = 0.004  # rad of the fastest joint between two configurations that Coal is asked about
 _LIMIT, _NEAR = 1.0 + 1e-6, 2e-6  # share of a limit, m of a distance, that rounding may cost
 
 
@@ -58,7 +57,7 @@ def row_of(cell: str, seed: int, planner: Planner, judge: SecondOpinion) -> Row:
         can = oracle(path, scene, rng)
         return Row(cell, seed, kind, path.free_angle, took, False, can, refused=plan.status.message)
     found = seen(plan.trajectory, path, scene)
-    left = 1e3 * judge.clearance_left(plan.trajectory, MARGIN, step=COAL_STEP)[0]
+    left = 1e3 * judge.clearance_left(plan.trajectory, MARGIN)[0]
     share = judge.largest_share(plan.trajectory)
     figures = (1e3 * found.error, 1e3 * plan.tool_error, found.speed, left, share)
     return Row(cell, seed, kind, path.free_angle, took, plan.report.certified, True, *figures)
@@ -90,6 +89,7 @@ def line_seconds(planner: Planner, scene: PlanningScene, count: int) -> list[flo
 def main() -> None:
     """Run all cells and seeds."""
     parser = command_line(__doc__, CELLS, SEEDS, f"{QUICK_SEEDS} paths of each cell")
+    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="of the paths (0)")
     arguments = parser.parse_args()
     seeds = QUICK_SEEDS if arguments.quick else arguments.seeds
     rows: list[Row] = []
@@ -98,7 +98,7 @@ def main() -> None:
         planner = Planner(time.monotonic)
         planner.set_cell("", cell)
         judge = SecondOpinion(planner.scene())
-        for seed in range(seeds):
+        for seed in range(arguments.first, arguments.first + seeds):
             rows.append(row_of(cell, seed, planner, judge))
             print(line_of(asdict(rows[-1])), flush=True)
         lines += line_seconds(planner, planner.scene(), max(seeds // 10, 2))

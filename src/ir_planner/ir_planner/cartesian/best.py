@@ -25,6 +25,8 @@ from ir_planner.timing import Movement, within_torque
 
 T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
 COMPARED = 3  # movements, over the cheapest chains by the estimate
+_SAME = 1e-6  # relative joules
+_COSTLIER, _COSTLIER_J = 1.2, 100.0  # estimates of joules leave out ramps, which cost about the same in all
 _TRIED = 12  # chains at most: where one can't keep the speed, the next is tried
 _ROUNDS = 6  # of chains that aren't certified
 _AROUND = 0.02  # m along the path, and
@@ -101,12 +103,25 @@ def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRef
     for chain in found:
         if len(driven) == COMPARED or (driven and asked.context.work.exhausted):
             break
+        if not _worth(chain, driven, asked.context.options.objective):
+            continue
         try:
             driven.append(timed(asked, chain))
         except PathRefusedError as error:
             asked.context.journal.reject(str(error))
             reason = reason or error
     return driven, reason
+
+
+def _worth(chain: Chain, driven: list[DrivenPath], objective: str) -> bool:
+    """Whether a chain may be cheaper than those that are driven. One of the same joules is their mirror image
+    with the wrist turned over; where joules decide, those that cost far more lose.
+    """
+    known = [one.chain.joules for one in driven]
+    if any(abs(chain.joules - joules) <= _SAME * joules for joules in known):
+        return False
+    by_joules = objective in ("time_and_energy", "energy")
+    return not (by_joules and known and chain.joules > min(known) * _COSTLIER + _COSTLIER_J)
 
 
 def within_limits(asked: Asked, one: DrivenPath) -> DrivenPath:

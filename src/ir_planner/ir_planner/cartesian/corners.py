@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_planner.cartesian.parts import Part
-from ir_planner.cartesian.tool_path import ToolPath, covered
+from ir_planner.cartesian.tool_path import ToolPath, covered, joint_bend
 
 SMOOTHING = 2e-5  # m by which a smoothed joint may leave the parts, well below the 0.1 mm of the whole
 SMOOTHING_TURN = 5e-4  # rad
@@ -18,7 +18,7 @@ _LONGEST_JOINT = 0.05  # m
 _TANGENT = np.radians(2.0)  # parts that meet at less are smoothed, whatever the radius asked for
 _REVERSAL = np.radians(175.0)  # beyond, a rounded corner would come to a stand
 _SHRINK = 0.8
-_SAMPLES = 33
+_SAMPLES = 129
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,9 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
 
 
 def _left_by(before: Part, after: Part, radius: float) -> tuple[float, float]:
-    """Largest distance [m] and turn [rad] between joined and unjoined parts at the same length."""
+    """A bound of the distance [m], and the largest turn [rad], between joined and unjoined parts at the same
+    length.
+    """
     u = np.linspace(-radius, radius, _SAMPLES)
     left, right = before.length - covered(-u, radius), covered(u, radius)
     corner = after.places.at(np.array([0.0]))
@@ -82,7 +84,9 @@ def _left_by(before: Part, after: Part, radius: float) -> tuple[float, float]:
         before.turning.at(np.minimum(before.length + u, before.length)),
         after.turning.at(np.maximum(u, 0.0)),
     )
-    return _largest(place - exact), _turn(asked, turned)
+    bends = max(before.places.curvature, after.places.curvature) + joint_bend(before, after, radius)
+    between = bends * (u[1] - u[0]) ** 2 / 8.0
+    return _largest(place - exact) + between, _turn(asked, turned)
 
 
 def _largest(difference: FloatArray) -> float:

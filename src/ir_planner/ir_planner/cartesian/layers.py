@@ -29,6 +29,7 @@ _FEWEST = 8
 _SAME = 1e-6  # relative cost of chains that differ by whole turns only
 _APART = 0.3  # rad: ends of chains with a free angle that are nearer are smoothed to one
 _OVERSPEED_WATTS = 2000.0  # what an axis at its speed limit costs in the search; far more beyond
+_FEW = 100  # configurations of a layer, up to which all pairs are compared
 _LAYER = 10.0  # between layers in the tree of neighbours, further than any jump
 
 
@@ -208,12 +209,34 @@ def _no_further(layers: Layers, q: FloatArray, layer: IntArray, space: FreeSpace
 
 def _neighbours(q: FloatArray, layer: IntArray) -> tuple[IntArray, IntArray]:
     """Edges (E,) from one layer to the next with no axis beyond JUMP, ordered by where they lead."""
+    widest = int(np.bincount(layer).max(initial=0))
+    before, after = (_by_pairs if widest <= _FEW else _by_tree)(q, layer)
+    order = np.lexsort((before, after))
+    return before[order], after[order]
+
+
+def _by_pairs(q: FloatArray, layer: IntArray) -> tuple[IntArray, IntArray]:
+    """The same in any order, all pairs compared axis by axis: quicker where layers are small."""
+    count = np.bincount(layer)
+    begin = np.cumsum(count) - count
+    number = np.full((len(count), count.max(initial=0)), -1)
+    number[layer, np.arange(len(layer)) - begin[layer]] = np.arange(len(layer))
+    axes = np.argsort(-q.std(axis=0))
+    first = np.where(number >= 0, q[number, axes[0]], np.nan)
+    k, i, j = np.nonzero(np.abs(first[:-1, :, None] - first[1:, None, :]) <= JUMP)
+    before, after = number[k, i], number[k + 1, j]
+    for axis in axes[1:]:
+        near = np.abs(q[before, axis] - q[after, axis]) <= JUMP
+        before, after = before[near], after[near]
+    return before, after
+
+
+def _by_tree(q: FloatArray, layer: IntArray) -> tuple[IntArray, IntArray]:
+    """The same by a tree of all configurations: where layers are large."""
     place = np.column_stack([q / JUMP, layer * _LAYER])
     ahead = np.column_stack([q / JUMP, (layer + 1) * _LAYER])
     near = cKDTree(ahead).sparse_distance_matrix(cKDTree(place), 1.0, p=np.inf, output_type="ndarray")
-    before, after = near["i"].astype(np.int64), near["j"].astype(np.int64)
-    order = np.lexsort((before, after))
-    return before[order], after[order]
+    return near["i"].astype(np.int64), near["j"].astype(np.int64)
 
 
 def _edge_joules(

@@ -25,6 +25,10 @@ class PlaceCurve(Protocol):
     def breaks(self) -> FloatArray:
         """Arc lengths (K,) between which the curve is smooth, both ends included [m]."""
 
+    @property
+    def curvature(self) -> float:
+        """A bound of it, all along [1/m]."""
+
     def at(self, s: FloatArray) -> FloatArray:
         """Places (M, 3) m at s (M,)."""
 
@@ -43,6 +47,11 @@ class Line:
     def length(self) -> float:
         """m."""
         return float(np.linalg.norm(self.end - self.start))
+
+    @property
+    def curvature(self) -> float:
+        """None."""
+        return 0.0
 
     @property
     def breaks(self) -> FloatArray:
@@ -77,6 +86,11 @@ class Arc:
     def length(self) -> float:
         """m."""
         return abs(self.angle) * float(np.linalg.norm(self.radius))
+
+    @property
+    def curvature(self) -> float:
+        """The same all along [1/m]."""
+        return 1.0 / float(np.linalg.norm(self.radius))
 
     @property
     def breaks(self) -> FloatArray:
@@ -138,6 +152,20 @@ class Through:
         """Arc lengths of the spline's knots."""
         return self._arc.of(np.unique(self._curve.t))
 
+    @cached_property
+    def curvature(self) -> float:
+        """A bound of it [1/m]: |p''| / |p'|^2, of which p'' is linear between knots, so largest at an end of
+        each part of a piece, and p' is shorter than at both ends by half of what p'' makes of it at most.
+        """
+        u = self._arc.samples
+        bent = np.linalg.norm(self._curve(u, nu=2), axis=1)
+        bent = np.maximum(bent[1:], bent[:-1])
+        speed = self._speed(u)
+        least = np.minimum(speed[1:], speed[:-1]) - 0.5 * bent * np.diff(u)
+        if least.min() <= 0.0:
+            return np.inf
+        return float((bent / least**2).max())
+
     def at(self, s: FloatArray) -> FloatArray:
         """Places (M, 3) m at s (M,)."""
         return np.asarray(self._curve(self._arc.inverse(s)))
@@ -163,6 +191,11 @@ class ArcLength:
         self._offset = float(self._length(breaks[0]))
         self._s = np.asarray(self._length(self._u)) - self._offset
         self.length = float(self._s[-1])
+
+    @property
+    def samples(self) -> FloatArray:
+        """Parameters (M,), the breaks among them, so dense that the speed is known between."""
+        return self._u
 
     def of(self, u: FloatArray) -> FloatArray:
         """Arc lengths (M,) m at u (M,)."""

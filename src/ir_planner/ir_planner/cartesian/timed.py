@@ -17,8 +17,8 @@ from ir_planner.cartesian.speed_law import Span, SpeedLaw, TooShortError, law_of
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
 from ir_planner.timing import lasting_longer
 
-_RAMPS = np.geomspace(0.01, 10.0, 40)  # s
-_FINER, _PER_RAMP = 12, 13
+_RAMPS = np.geomspace(0.01, 10.0, 13)  # s
+_FINER, _ZOOMS, _PER_RAMP = 8, 3, 13
 _USED = 0.97  # of a limit: the interpolant between points needs a little more than the samples
 _STEP_S, _SAMPLES_MIN, _SAMPLES_MAX = 4e-3, 200, 6000
 _WARP_S, _WARP_MIN, _WARP_MAX = 0.02, 60, 1500  # of the slowness' knots
@@ -82,7 +82,15 @@ def driven(
     curve: JointCurve, t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
 ) -> Driven:
     """The axes at s (M,) with speed, acceleration and jerk (M,) along the path."""
-    q, first, second, third = curve.at(np.clip(s, curve.begin, curve.end))
+    along = curve.at(np.clip(s, curve.begin, curve.end))
+    return _with_speed(along, t, s, v, a, j)
+
+
+def _with_speed(
+    along: tuple[FloatArray, ...], t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
+) -> Driven:
+    """The same from q and its derivatives by s (M, n)."""
+    q, first, second, third = along
     v1, a1, j1 = v[:, None], a[:, None], j[:, None]
     qd = first * v1
     qdd = second * v1**2 + first * a1
@@ -149,7 +157,7 @@ def _ramp(
     if first == last:
         return 0.0
     durations = _RAMPS
-    for _ in range(2):
+    for _ in range(_ZOOMS):
         fits = _ramps_fit(curve, spans, k, durations, limits, scene)
         d = int(np.argmax(fits)) if fits.any() else len(fits) - 1
         low = durations[max(d - 1, 0)]
@@ -171,10 +179,11 @@ def _ramps_fit(
     s = curve.begin + begin[:, None] + T * x * (first + rise * x**2 * (1.0 - 0.5 * x))
     v = np.broadcast_to(first + rise * x**2 * (3.0 - 2.0 * x), s.shape)
     a, j = rise / T * 6.0 * x * (1.0 - x), rise / T**2 * (6.0 - 12.0 * x)
-    none = np.zeros(s.size)
+    none, places = np.zeros(s.size), s.ravel()
     even = np.full(s.size, max(first, last))
-    ramp = use_of(driven(curve, none, s.ravel(), v.ravel(), a.ravel(), j.ravel()), limits, scene)
-    cruise = use_of(driven(curve, none, s.ravel(), even, none, none), limits, scene)
+    along = curve.at(np.clip(places, curve.begin, curve.end))
+    ramp = use_of(_with_speed(along, none, places, v.ravel(), a.ravel(), j.ravel()), limits, scene)
+    cruise = use_of(_with_speed(along, none, places, even, none, none), limits, scene)
     allowed = np.maximum(_USED, cruise.reshape(s.shape).max(axis=1))
     return np.asarray(ramp.reshape(s.shape).max(axis=1) <= allowed)
 

@@ -35,6 +35,18 @@ def covering(u: FloatArray, radius: float) -> FloatArray:
     return np.asarray(y**4 * (35.0 + y * (-84.0 + y * (70.0 - 20.0 * y))))
 
 
+def joint_bend(before: Part, after: Part, radius: float) -> float:
+    """A bound [1/m] of the second derivative by u of the place within a radius [m] around a corner.
+
+    There p'' = k1 c1'^2 + k2 c2'^2 + (t2 - t1) c'', with c' <= 1, c'' <= 35 / (32 radius), and tangents that
+    turn by no more than the curvatures times the radius.
+    """
+    ends = before.places.tangent(np.array([before.length]))[0], after.places.tangent(np.array([0.0]))[0]
+    bends = before.places.curvature + after.places.curvature
+    corner = float(np.linalg.norm(ends[1] - ends[0]))
+    return bends + 35.0 / (32.0 * radius) * (corner + bends * radius)
+
+
 def _apart(u: FloatArray) -> FloatArray:
     """Different values of u (M,) in order; none nearer to the one before than rounding brings it."""
     values = np.unique(u)
@@ -87,6 +99,23 @@ class ToolPath:
         u = _apart(np.clip(np.concatenate([*inner, *zones]), 0.0, self.corners[-1]))
         return u if self._arc is None else self._arc.of(u)
 
+    def bends(self, u: FloatArray) -> FloatArray:
+        """A bound (M - 1,) [1/m] of the second derivative of the place by u between u (M,) and the next."""
+        result = np.zeros(len(u) - 1)
+        for k, part in enumerate(self.parts):
+            within = (u[1:] >= self.corners[k]) & (u[:-1] <= self.corners[k + 1])
+            result[within] = np.maximum(result[within], part.places.curvature)
+        for k, radius in enumerate(self.radius):
+            if radius > 0.0:
+                near = (u[1:] >= self.corners[k] - radius) & (u[:-1] <= self.corners[k] + radius)
+                bend = joint_bend(self.parts[k - 1], self.parts[k], float(radius))
+                result[near] = np.maximum(result[near], bend)
+        return result
+
+    def parameter(self, s: FloatArray) -> FloatArray:
+        """u (M,) along the parts at arc lengths s (M,) m."""
+        return s if self._arc is None else self._arc.inverse(s)
+
     @cached_property
     def begin(self) -> int:
         """The first part that is no approach."""
@@ -94,7 +123,7 @@ class ToolPath:
 
     def poses(self, s: FloatArray) -> FloatArray:
         """Poses (M, 4, 4) of the tcp at arc lengths s (M,) m."""
-        u = s if self._arc is None else self._arc.inverse(s)
+        u = self.parameter(s)
         result = np.tile(np.eye(4), (len(u), 1, 1))
         for k, chosen in self._owners(u):
             result[chosen] = self._of_part(k, u[chosen])
