@@ -46,7 +46,7 @@ def _of_stroke(sent: SentPath, k: int, path: ToolPath, angle: Angle | None, scen
     accelerations = _accelerations(sent.trajectory, scene)
 
     def passed(at: FloatArray) -> FloatArray:
-        return np.minimum(begin + stroke.at(at).t, last)
+        return np.asarray(np.minimum(begin + stroke.at(at).t, last))
 
     points = passed(tau)
     step = np.sqrt(8.0 * _BETWEEN / np.maximum(_largest(accelerations, points, sent.trajectory), 1e-9))
