@@ -1,8 +1,8 @@
-"""Modules beside the tests of pages and examples."""
+"""Where the tests of pages find what reads a page."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # pages.py
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # _pages.py

@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from pages import commands, patched, snippets
+from _pages import commands, patched, snippets
 
 from ir_cli.main import main
 
