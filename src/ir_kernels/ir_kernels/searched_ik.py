@@ -2,8 +2,9 @@
 
 With q4 known, q1 and q5 follow in closed form (shoulder_wrist), then q6, the sum of q2 and q3, and q2; what
 remains is one equation, that axis 3 is as far from axis 2 as it is built. It is evaluated on a grid of q4,
-and Newton's steps start wherever it is smallest along a branch. Every answer is exact; that none is missed
-is a matter of the grid and is measured (benchmarks/robots.py).
+and Newton's steps start wherever it is smallest along a branch. Solutions are the real roots of a polynomial,
+which come in pairs: where an odd number is found, one is missing, and the grid gets finer. Every answer is
+exact; that none is missed is measured (benchmarks/robots.py).
 """
 
 import numpy as np
@@ -20,6 +21,7 @@ from ir_kernels.three_parallel import angle_about, displacements, wrist_and_sum
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 GRID = 720  # values of q4: half a degree; a pair of solutions nearer than that is found by Newton's steps
+FINER = (4, 16)  # times the grid, in turn, where a solution is missing
 CHUNK = 64  # poses at once: 64 x 720 x 4 candidates fit into the cache
 SLACK = 0.05  # how far beyond a tangent a guess may lie: solutions between two values of q4 are near it
 _STEPS, _MORE_STEPS = 8, 40
@@ -40,8 +42,7 @@ class SearchedIk:
     ) -> None:
         self.chain, self.lines = chain, arm_lines(chain)
         self.position_min, self.position_max = limits(position_min, position_max)
-        self._q4 = np.linspace(-np.pi, np.pi, grid, endpoint=False)
-        self._E4 = self.lines.turned(3, self._q4)
+        self._grid = grid
 
     def solve(self, poses: ArrayLike) -> IkSet:
         """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
@@ -52,13 +53,26 @@ class SearchedIk:
         found: list[Found] = []
         for first in range(0, len(targets), CHUNK):
             chunk = targets[first : first + CHUNK]
-            found += [(first + pose, branch, q) for pose, branch, q in self._of(chunk)]
+            found += [(first + pose, branch, q) for pose, branch, q in self._all_of(chunk)]
         return with_turns(found, self.position_min, self.position_max)
 
-    def _of(self, targets: FloatArray) -> list[Found]:
-        count, grid = len(targets), len(self._q4)
+    def _all_of(self, targets: FloatArray) -> list[Found]:
+        """Solutions on the grid, and on finer ones for poses that lack one of a pair."""
+        found = self._of(targets, self._grid)
+        for times in FINER:
+            count = np.bincount([pose for pose, _, _ in found], minlength=len(targets))
+            for k in np.flatnonzero(count % 2):
+                again = self._of(targets[k : k + 1], times * self._grid)
+                if len(again) > count[k]:
+                    found = [each for each in found if each[0] != k]
+                    found += [(int(k), branch, q) for _, branch, q in again]
+        return found
+
+    def _of(self, targets: FloatArray, grid: int) -> list[Found]:
+        count, q4 = len(targets), np.linspace(-np.pi, np.pi, grid, endpoint=False)
         X = np.repeat(displacements(self.chain, self.lines, targets), grid, axis=0)
-        q, lack = self._candidates(X, np.tile(self._E4, (count, 1, 1)), np.tile(self._q4, count))
+        E4 = np.tile(self.lines.turned(3, q4), (count, 1, 1))
+        q, lack = self._candidates(X, E4, np.tile(q4, count))
         pose, k, branch = np.nonzero(_starts(lack.reshape(count, grid, -1)))
         starts = q.reshape(count, grid, -1, 6)[pose, k, branch]
         best, error = newton(self.chain, targets[pose], starts, _STEPS)
