@@ -66,12 +66,13 @@ bench-long: setup-tests ## every benchmark in full: what claims quote; JSON in o
 compare: setup-tests ## the same answers, and as fast? This checkout against BEFORE=CHECKOUT
 	@$(BIN)/python benchmarks/compare.py --before "$(BEFORE)" --json out/bench/compare.json $(ARGS)
 
-docs: setup-tests ## the pages that are written from code: interfaces, parameters, rooms
+docs: setup-tests ## pages that are written from code, then all of docs/ as a site: out/site
 	@$(BIN)/python tools/interface_reference.py
 	@$(BIN)/python tools/parameter_reference.py
 	@$(BIN)/python tools/security_policy.py
 	@$(BIN)/python tools/mistakes_page.py
 	@$(BIN)/python tools/architecture_page.py
+	@$(BIN)/python tools/docs_site.py
 
 clean:            ## remove what was built; .venv stays (rm -rf .venv for all)
 	rm -rf out build install log ros_ws/build ros_ws/install ros_ws/log .mypy_cache .ruff_cache .pytest_cache .hypothesis

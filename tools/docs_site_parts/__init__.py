@@ -1,0 +1,1 @@
+"""Parts of the documentation's site: its lists, links, rendering and reference."""
