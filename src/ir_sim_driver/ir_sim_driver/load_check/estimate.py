@@ -18,11 +18,13 @@ from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.load_check.uncertainty import Uncertainty
 from ir_sim_driver.plant import Carried
 
-UNEXPLAINED = 0.01
-"""Standard deviation of what no parameter explains, at one instant, as a share of the peak torque."""
+UNEXPLAINED = 0.005
+"""Standard deviation of what no parameter explains, at one instant, as a share of the peak torque: twice what
+the stepped plants show.
+"""
 LOAD_MASS, LOAD_CENTRE = 0.01, 0.01
 """Standard deviations of a declared load: share of its mass, m of its centre in each direction."""
-_STANDS = 0.02  # rad/s below which friction may act either way
+_CHANGES = 0.1  # of the friction of an axis that stands: what changes from one instant to the next
 _KG = 1.0
 
 
@@ -83,7 +85,8 @@ class Declared:
         q, qd, qdd, _ = motion
         expected = self._model.inverse_dynamics(q, qd, qdd)
         more, *shifted = (other.inverse_dynamics(q, qd, qdd) - expected for other in self._others)
-        return expected, more / _KG, np.stack(shifted, axis=2)
+        either_way = np.sign(qd) * self.robot.standing(qd)
+        return expected - either_way, more / _KG, np.stack(shifted, axis=2)
 
 
 def weighed(motion: Motion, declared: Declared, threshold: float) -> LoadFinding | None:
@@ -135,9 +138,10 @@ def _shifted(loads: Sequence[Load]) -> list[tuple[Load, ...]]:
 
 
 def _noise(robot: Uncertainty, qd: FloatArray) -> FloatArray:
-    """Deviation (N, n) [Nm] of what no parameter explains; at rest, the friction either way."""
-    stuck = robot.model.friction_coulomb / (1.0 + (qd / _STANDS) ** 2)
-    return np.asarray(np.hypot(UNEXPLAINED * robot.model.envelope_torque[:, 0], stuck))
+    """Deviation (N, n) [Nm] of what no parameter explains; at rest, the friction that may change."""
+    return np.asarray(
+        np.hypot(UNEXPLAINED * robot.model.envelope_torque[:, 0], _CHANGES * robot.standing(qd))
+    )
 
 
 def _clearest(

@@ -3,7 +3,8 @@
 Friction, gears, rotors, counterbalance and the scale of all masses have the covariance of the power
 parameters (the data's marks of confidence, or a fit). Each link's own mass, centre and inertia, and the
 friction at low speed, have the deviations of the table below, whatever was fitted: an energy fit does not
-separate them.
+separate them. An axis that stands has whatever friction holds it: its motor's torque says how the gravity on
+it changes, hardly how large that is.
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ LINK_SIZE = 0.2
 """m: a link's centre of mass is off by its mark's share of this, in each direction."""
 STRIBECK_SHARE, STRIBECK_SPEED = 0.15, 0.05
 """Friction more at rest as a share of the Coulomb friction, gone over so many rad/s: an assumption."""
+STANDING_SHARE = 0.5
+"""Friction of an axis that stands, as a share of the Coulomb friction: either way, all along the movement."""
 _SIGN = 0.01  # rad/s over which the sign of a friction turns
+_STANDS = 0.003  # rad/s below which friction is whatever holds the axis
 _AXIS_TERMS = ("viscous", "coulomb", "gear")
 _SCALES = ("rotor_inertia", "link_mass", "counterbalance")
 
@@ -66,6 +70,7 @@ class Uncertainty:
         rest = self.model.friction_coulomb * STRIBECK_SHARE * np.exp(-np.abs(qd) / STRIBECK_SPEED) * sign
         axes = (qd, sign, np.abs(torque) * sign)
         known = [_on_axis(values, j) for values in axes for j in range(n)]
+        standing = STANDING_SHARE * self.standing(qd)
         known.append(self.model.reflected_inertia * qdd)
         known.append(self._scaled.inverse_dynamics(q, qd, qdd) - plain)
         known.append(-self._plain.counterbalance(q))
@@ -73,10 +78,14 @@ class Uncertainty:
             (
                 np.stack(known, axis=2) @ self._root,
                 np.stack(links, axis=2),
-                np.stack([_on_axis(rest, j) for j in range(n)], axis=2),
+                np.stack([_on_axis(values, j) for values in (rest, standing) for j in range(n)], axis=2),
             ),
             axis=2,
         )
+
+    def standing(self, qd: FloatArray) -> FloatArray:
+        """Friction (N, n) [Nm] that may act either way, because the axis hardly moves."""
+        return np.asarray(self.model.friction_coulomb / (1.0 + (qd / _STANDS) ** 2))
 
     def _dynamics(self, robot: RobotModel) -> DynamicsModel:
         return DynamicsModel(robot, (), self._base_pose)
