@@ -40,8 +40,9 @@ class Carrier:
                 self.simulation.execute(executed, 0)
                 while not (outcomes := self.simulation.take_outcomes()):
                     self.simulation.step()
-                assert outcomes[-1].load_check is not None  # it took longer than the instants that it needs
-                return outcomes[-1].load_check
+                if outcomes[-1].load_check is not None:
+                    return outcomes[-1].load_check
+                self._recover()  # more than the motors can carry so fast: the supervision stopped it
 
     def _goal(self, start: FloatArray, end: FloatArray, slower: float) -> TrajectoryGoal:
         robot, size, rest = self.simulation.robot, np.abs(end - start), np.zeros((2, len(start)))
@@ -49,6 +50,10 @@ class Carrier:
         times = np.array([0.0, max(fastest) * slower])
         path = JointTrajectory.from_seconds(robot.joint_names, times, np.array([start, end]), rest, rest)
         return TrajectoryGoal(path)
+
+    def _recover(self) -> None:
+        self.simulation.run(SETTLING)
+        self.simulation.recover()
 
     def _stand(self, q: FloatArray) -> None:
         self.simulation.backend.reset(q)

@@ -24,7 +24,7 @@ the stepped plants show.
 """
 LOAD_MASS, LOAD_CENTRE = 0.01, 0.01
 """Standard deviations of a declared load: share of its mass, m of its centre in each direction."""
-_CHANGES = 0.1  # of the friction of an axis that stands: what changes from one instant to the next
+_CHANGES, _STARTS = 0.1, 2.0  # of the Coulomb friction
 _KG = 1.0
 
 
@@ -85,8 +85,8 @@ class Declared:
         q, qd, qdd, _ = motion
         expected = self._model.inverse_dynamics(q, qd, qdd)
         more, *shifted = (other.inverse_dynamics(q, qd, qdd) - expected for other in self._others)
-        either_way = np.sign(qd) * self.robot.standing(qd)
-        return expected - either_way, more / _KG, np.stack(shifted, axis=2)
+        either_way = self.robot.standing(qd) * self.robot.model.friction_coulomb
+        return expected - np.sign(qd) * either_way, more / _KG, np.stack(shifted, axis=2)
 
 
 def weighed(motion: Motion, declared: Declared, threshold: float) -> LoadFinding | None:
@@ -138,10 +138,12 @@ def _shifted(loads: Sequence[Load]) -> list[tuple[Load, ...]]:
 
 
 def _noise(robot: Uncertainty, qd: FloatArray) -> FloatArray:
-    """Deviation (N, n) [Nm] of what no parameter explains; at rest, the friction that may change."""
-    return np.asarray(
-        np.hypot(UNEXPLAINED * robot.model.envelope_torque[:, 0], _CHANGES * robot.standing(qd))
-    )
+    """Deviation (N, n) [Nm] of what no parameter explains; of axes that stand, and more so of those that
+    start or stop, the friction that may change from one instant to the next.
+    """
+    unexplained, standing = UNEXPLAINED * robot.model.envelope_torque[:, 0], robot.standing(qd)
+    changing = _CHANGES * standing + _STARTS * standing * (1.0 - standing)
+    return np.asarray(np.hypot(unexplained, changing * robot.model.friction_coulomb))
 
 
 def _clearest(

@@ -70,7 +70,7 @@ class Uncertainty:
         rest = self.model.friction_coulomb * STRIBECK_SHARE * np.exp(-np.abs(qd) / STRIBECK_SPEED) * sign
         axes = (qd, sign, np.abs(torque) * sign)
         known = [_on_axis(values, j) for values in axes for j in range(n)]
-        standing = STANDING_SHARE * self.standing(qd)
+        standing = STANDING_SHARE * self.model.friction_coulomb * self.standing(qd)
         known.append(self.model.reflected_inertia * qdd)
         known.append(self._scaled.inverse_dynamics(q, qd, qdd) - plain)
         known.append(-self._plain.counterbalance(q))
@@ -84,8 +84,8 @@ class Uncertainty:
         )
 
     def standing(self, qd: FloatArray) -> FloatArray:
-        """Friction (N, n) [Nm] that may act either way, because the axis hardly moves."""
-        return np.asarray(self.model.friction_coulomb / (1.0 + (qd / _STANDS) ** 2))
+        """Share (N, n) of the Coulomb friction that may act either way, because the axis hardly moves."""
+        return np.asarray(1.0 / (1.0 + (qd / _STANDS) ** 2))
 
     def _dynamics(self, robot: RobotModel) -> DynamicsModel:
         return DynamicsModel(robot, (), self._base_pose)
