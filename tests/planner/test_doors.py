@@ -19,7 +19,7 @@ from ir_planner import Planner
 from ir_planner.heard import Heard
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.doors import doors_along
-from ir_planner.request import Work
+from ir_planner.request import Work, parse_goal
 from ir_sim_driver.controller.machines import Machines
 
 DEMO = load_cell("demo")
@@ -133,3 +133,39 @@ def test_a_door_that_closes_on_the_robot_is_refused():
     plan = planned(replace(OPENED, dwell=1.5), closing, HOME)
     assert not plan.status.ok
     assert "lathe changes from door_open to door_closed" in plan.status.message
+
+
+def planner_that_hears(*said: MachineState) -> Planner:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "demo")
+    planner.heard.machines = said
+    return planner
+
+
+SHUT = "lathe is door_closed, as signal lathe_open_door has it; lathe_open_door turns it"
+
+
+def test_single_movements_and_states_count_with_doors_as_the_driver_says_and_name_them():
+    planner = planner_that_hears(MachineState("lathe", "door_open"))
+    home, options = np.array(planner.cell.machine_home), PlanOptions()
+    there = parse_goal("lathe_work", planner.cell)
+    found = planner.plan_regional(home, there, options)
+    assert found.trajectory is not None
+    inside = found.trajectory.positions[-1]
+    planner.heard.machines = (MachineState("lathe", "door_closed"),)
+    refused = planner.plan_regional(home, there, options)
+    again = planner.evaluate(found.trajectory, 0.0, "", "lathe_work")
+    state = planner.check_state(inside, 0.0, 1, "", "lathe_work")
+    assert not refused.status.ok
+    assert refused.status.message.endswith(SHUT)
+    assert "as the driver says: lathe door_closed" in refused.info.stages[-1].note
+    assert again.status.message.endswith(SHUT)
+    assert not state.valid
+    assert state.status.message.endswith(SHUT)
+    away = planner.plan_regional(home, parse_goal("park", planner.cell), options)
+    assert away.status.ok
+    assert away.info.stages[-1].name == "doors"
+    planner.heard.machines = None
+    assert (
+        planner.plan_regional(home, there, options).trajectory.trajectory_id == found.trajectory.trajectory_id
+    )

@@ -1,6 +1,6 @@
 """Questions about states: one with its nearest pairs, or many at once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import StateCheck, state_check
 from ir_planner.errors import RequestError
+from ir_planner.program import with_doors
 from ir_planner.request import bounded, safety_distance, within_limits
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
@@ -27,7 +28,8 @@ def asked_state(
     safety_distance(margin)
     bounded(max_pairs, 0, PAIRS_MAX, "max_pairs")
     q = within_limits(q, scene.cell, "state", StatusCode.INVALID_ROBOT_STATE)
-    return state_check(q, scene, margin, max_pairs, station)
+    found = state_check(q, scene, margin, max_pairs, station)
+    return found if found.valid else replace(found, status=with_doors(found.status, scene))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,17 +1,20 @@
 """Where an answer holds: every report names the cell and the load that it was proved with, and the power
-parameters that its joules follow from, with the interval that their uncertainty leaves.
+parameters that its joules follow from, with the interval that their uncertainty leaves. Every answer says
+which doors were not as the cell has them.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-from ir_msgs_py.report import PlannedMovement, PlanningStage, TrajectoryReport
+from ir_msgs_py.report import PlannedMovement, PlanningInfo, PlanningStage, TrajectoryReport
+from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import CartesianPlan
-from ir_planner.checks import interval, movement_spread
-from ir_planner.program import ProgramPlan, Spreads, with_intervals
+from ir_planner.checks import Evaluation, interval, movement_spread
+from ir_planner.program import ProgramPlan, Spreads, doors_advice, doors_text, with_doors, with_intervals
 from ir_planner.regional import MovementPlan
+from ir_planner.request import noted
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ServicePlan
 from ir_planner.trajectories import OptimizationPlan
@@ -43,21 +46,41 @@ def in_scene(scene: PlanningScene) -> Stamp:
     return stamp
 
 
-def movement_in(plan: AnyMovement, stamp: Stamp) -> AnyMovement:
-    """The plan with its report stamped."""
-    return replace(plan, report=stamp(plan.report, plan.trajectory))
+def movement_in(plan: AnyMovement, scene: PlanningScene, note: str) -> AnyMovement:
+    """The plan with its report stamped, remarks on its options and on doors, and what a failure may want."""
+    report, info = in_scene(scene)(plan.report, plan.trajectory), remarked(plan.info, scene, note)
+    return replace(plan, report=report, info=info, status=_advised(plan.status, scene))
 
 
-def service_in(plan: ServicePlan, stamp: Stamp) -> ServicePlan:
-    """The plan with the reports of its candidates stamped."""
+def service_in(plan: ServicePlan, scene: PlanningScene, note: str) -> ServicePlan:
+    """The plan with the reports of its candidates stamped, and the same remarks."""
+    stamp, info = in_scene(scene), remarked(plan.info, scene, note)
     candidates = tuple(replace(each, report=stamp(each.report, each.trajectory)) for each in plan.candidates)
-    return replace(plan, candidates=candidates)
+    return replace(plan, candidates=candidates, info=info, status=_advised(plan.status, scene))
 
 
-def optimization_in(plan: OptimizationPlan, original: JointTrajectory, stamp: Stamp) -> OptimizationPlan:
-    """The plan with its reports stamped."""
-    after = stamp(plan.after, plan.trajectory)
-    return replace(plan, before=stamp(plan.before, original), after=after)
+def optimization_in(
+    plan: OptimizationPlan, original: JointTrajectory, scene: PlanningScene, note: str
+) -> OptimizationPlan:
+    """The plan with its reports stamped, and the same remarks."""
+    stamp, info = in_scene(scene), remarked(plan.info, scene, note)
+    before, after = stamp(plan.before, original), stamp(plan.after, plan.trajectory)
+    return replace(plan, before=before, after=after, info=info, status=_advised(plan.status, scene))
+
+
+def evaluation_in(found: Evaluation, trajectory: JointTrajectory, scene: PlanningScene) -> Evaluation:
+    """What is known of a trajectory with its report stamped, and what a violation may come from."""
+    report, advice = in_scene(scene)(found.report, trajectory), doors_advice(scene.cell, "", scene.doors)
+    return replace(found, report=report, advice=advice)
+
+
+def remarked(info: PlanningInfo, scene: PlanningScene, note: str) -> PlanningInfo:
+    """The record with a remark on the options, and with doors that are not as the cell has them."""
+    return noted(noted(info, note), doors_text(scene.doors), "doors")
+
+
+def _advised(status: Status, scene: PlanningScene) -> Status:
+    return status if status.ok else with_doors(status, scene)
 
 
 def program_in(plan: ProgramPlan, cell_hash: str, timers: str, spreads: Spreads) -> ProgramPlan:

@@ -4,16 +4,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from threading import Lock
 
-from ir_description import Cell, PowerData, cell_from_yaml, cell_hash, load_cell
+from ir_description import Cell, PowerData, cell_from_yaml, cell_hash, cell_in, load_cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.heard import Heard
+from ir_planner.program import Doors
 from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
 
 ReadCell = Callable[[str, str], Cell]
 """Gives the cell of a text, or else of a path or a bundled name."""
+_Key = tuple[str, Doors, Drives, float]
 
 
 def read_cell_here(cell_yaml: str, cell_file: str) -> Cell:
@@ -41,8 +43,9 @@ class CurrentCell:
         self._cell: Cell | None = None
         self._changing = Lock()
         self._hashed: tuple[Cell | None, str] = None, ""
-        # the scene of each load; its models take a millisecond to build, and nothing in it ever changes
-        self._scenes: dict[tuple[str, Drives, float], tuple[Cell, PlanningScene]] = {}
+        # the scene of each load and of machines as they stand; its models take a millisecond to build, and
+        # nothing in it ever changes
+        self._scenes: dict[_Key, tuple[Cell, PlanningScene]] = {}
 
     @property
     def cell(self) -> Cell:
@@ -88,13 +91,13 @@ class CurrentCell:
 
     def scene(self, load: str = "") -> PlanningScene:
         """Snapshot of the cell with `load` attached; "" = what the robot carries, and while no driver says
-        so the tool.
+        so the tool. Machines with a switch are as the driver says, and while none does as the cell has them.
         """
         cell = self.cell
         key = self._key(load or self._attached(cell), cell)
         known, scene = self._scenes.get(key, (None, None))
         if scene is None or known is not cell:
-            scene = self._scene_of(cell, key[0])
+            scene = self._scene_of(cell, key[0], key[1])
             self._scenes[key] = cell, scene
         return scene
 
@@ -102,12 +105,12 @@ class CurrentCell:
         """The figures of a cell's controller as planned with, with the timer that counts."""
         return self._heard.of(self._drives().power(self._power or cell.robot.controller))
 
-    def _key(self, load: str, cell: Cell) -> tuple[str, Drives, float]:
-        return load, self._drives(), self.power(cell).motors_to_brakes_in_program
+    def _key(self, load: str, cell: Cell) -> _Key:
+        return load, self._heard.doors(cell), self._drives(), self.power(cell).motors_to_brakes_in_program
 
-    def _scene_of(self, cell: Cell, load: str) -> PlanningScene:
-        scene = scene_with(cell, load, self.power(cell), self._drives())
-        return replace(scene, cell_hash=self.hash_of(cell))
+    def _scene_of(self, cell: Cell, load: str, doors: Doors) -> PlanningScene:
+        scene = scene_with(cell_in(cell, dict(doors)), load, self.power(cell), self._drives())
+        return replace(scene, cell_hash=self.hash_of(cell), doors=doors)
 
     def _replaced_by(self, cell: Cell) -> Cell:
         """The cell from now on; its models of all pairs, a second's work in a large one, are built before."""
@@ -115,9 +118,10 @@ class CurrentCell:
             load = self._attached(cell)
         except RequestError:  # of requests without a load, as long as the driver carries that
             load = load_text(cell)
-        scene = self._scene_of(cell, load)
+        key = self._key(load, cell)
+        scene = self._scene_of(cell, load, key[1])
         scene.thresholds(0.0)
-        self._scenes = {self._key(load, cell): (cell, scene)}  # nothing of former cells is kept
+        self._scenes = {key: (cell, scene)}  # nothing of former cells is kept
         self._cell = cell
         return cell
 

@@ -17,7 +17,7 @@ from ir_planner.asked_states import StatesCheck, asked_state, asked_states
 from ir_planner.cartesian import CartesianPlan, checked_path_options, plan_path
 from ir_planner.certificates import (
     AnyMovement,
-    in_scene,
+    evaluation_in,
     movement_in,
     optimization_in,
     program_in,
@@ -125,7 +125,9 @@ class Planner:
         return self._current.set_equipment(name, pose, enabled, state)
 
     def scene(self, load: str = "") -> PlanningScene:
-        """Snapshot of the cell with `load` attached; "": what the robot carries, else the tool."""
+        """Snapshot of the cell with `load` attached ("": what the robot carries, else the tool); doors are as
+        the driver says.
+        """
         return self._current.scene(load)
 
     def check_state(
@@ -164,7 +166,7 @@ class Planner:
         scene = self.scene(load)
         scene.allowed(station)  # one that nobody has is refused here
         found = evaluate_trajectory(examinable(trajectory), scene, margin, station)
-        return replace(found, report=in_scene(scene)(found.report, trajectory))
+        return evaluation_in(found, trajectory, scene)
 
     def standby(
         self, pause: float | Lengths, q: FloatArray | None, load: str, postures: tuple[str, ...] = ()
@@ -213,7 +215,7 @@ class Planner:
         for candidate in plan.candidates:
             if candidate.trajectory is not None:
                 self.trajectories.add(candidate.trajectory)
-        return service_in(replace(plan, info=noted(plan.info, note)), in_scene(scene))
+        return service_in(plan, scene, note)
 
     def plan_trajectory(
         self, reference: Reference, options: PlanOptions, cancelled: Cancelled = _NEVER
@@ -249,7 +251,7 @@ class Planner:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
-        return optimization_in(replace(plan, info=noted(plan.info, note)), original, in_scene(scene))
+        return optimization_in(plan, original, scene, note)
 
     def plan_program(
         self,
@@ -287,7 +289,7 @@ class Planner:
     def _kept(self, plan: AnyMovement, scene: PlanningScene, note: str) -> AnyMovement:
         if plan.trajectory is not None:
             self.trajectories.add(plan.trajectory)
-        return movement_in(replace(plan, info=noted(plan.info, note)), in_scene(scene))
+        return movement_in(plan, scene, note)
 
     def _checked(self, options: PlanOptions) -> tuple[PlanOptions, str]:
         chosen(options.planner_id, ("", *self.settings.searches), "planner_id")

@@ -8,6 +8,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy
@@ -18,12 +19,21 @@ from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Everything that is known about a trajectory."""
+    """Everything that is known about a trajectory. advice: where a violation may come from, else ""."""
 
     report: TrajectoryReport
     verification: Verification
     clearance: ClearanceProfile
     energy: MovementEnergy
+    advice: str = ""
+
+    @property
+    def status(self) -> Status:
+        """That of the verification, a violation with the advice."""
+        status = self.verification.status
+        if status.ok or not self.advice:
+            return status
+        return replace(status, message=f"{status.message}; {self.advice}")
 
 
 def evaluate_trajectory(

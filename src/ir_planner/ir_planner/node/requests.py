@@ -266,7 +266,7 @@ class Requests:
         trajectory = trajectory_of(request, self.planner)
         evaluation = self.planner.evaluate(trajectory, request.safety_distance, request.load, request.station)
         fill_evaluation(response, evaluation)
-        return evaluation.verification.status
+        return evaluation.status
 
     def get_trajectory(self, request: Any, response: Any) -> Status:
         """The points of a trajectory planned before."""

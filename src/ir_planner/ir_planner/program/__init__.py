@@ -1,7 +1,7 @@
 """Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
 
 from ir_planner.program.charge import Charge
-from ir_planner.program.doors import Doors, doors_along
+from ir_planner.program.doors import Doors, doors_advice, doors_along, doors_text, with_doors
 from ir_planner.program.pause_lengths import Lengths, lengths_of
 from ir_planner.program.pauses import AUTO, Pause, pause_by_itself
 from ir_planner.program.program import plan_program
@@ -26,11 +26,14 @@ __all__ = [
     "Standby",
     "Trip",
     "best_posture",
+    "doors_advice",
     "doors_along",
+    "doors_text",
     "lengths_of",
     "nobody",
     "pause_by_itself",
     "placed_steps",
     "plan_program",
+    "with_doors",
     "with_intervals",
 ]

@@ -7,8 +7,11 @@ there.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from ir_description import Cell, Equipment, ProgramStep
+from ir_msgs_py.status import Status
+from ir_planner.scene import PlanningScene
 
 Doors = tuple[tuple[str, tuple[str, ...]], ...]
 """Machines that are not as the cell has them, with their state, or the two between which they change."""
@@ -28,14 +31,22 @@ def doors_along(cell: Cell, steps: Sequence[ProgramStep], begin: Doors = ()) -> 
 
 
 def doors_text(doors: Doors) -> str:
-    """How they stand at the start of a program, "" where all are as the cell has them."""
+    """How they stand at the start of a program or a movement, "" where all are as the cell has them."""
     said = (f"{name} {' changing to '.join(states)}" for name, states in doors)
     return f"at the start, as the driver says: {', '.join(said)}" if doors else ""
 
 
-def advice(cell: Cell, target: str, doors: Doors) -> str:
-    """What a movement to `target` that was not found may want, "" where all is as the cell has it."""
-    return "; ".join(_advice(cell, cell.machine(name), target, states) for name, states in doors)
+def with_doors(status: Status, scene: PlanningScene) -> Status:
+    """The status of what was not found or is not free, and doors that are not as the cell has them."""
+    said = doors_advice(scene.cell, "", scene.doors)
+    return replace(status, message="; ".join(filter(None, (status.message, said))))
+
+
+def doors_advice(cell: Cell, target: str, doors: Doors) -> str:
+    """What a movement to `target` ("": the one that was asked for) that was not found may want, "" where all
+    is as the cell has it.
+    """
+    return "; ".join(_of_machine(cell, cell.machine(name), target, states) for name, states in doors)
 
 
 def _switched(cell: Cell) -> list[Equipment]:
@@ -72,10 +83,10 @@ def _unlike(cell: Cell, states: Mapping[str, tuple[str, ...]]) -> Doors:
     return tuple((name, now) for name, now in states.items() if now != (cell.machine(name).state,))
 
 
-def _advice(cell: Cell, machine: Equipment, target: str, states: tuple[str, ...]) -> str:
+def _of_machine(cell: Cell, machine: Equipment, target: str, states: tuple[str, ...]) -> str:
     switch = machine.switch
     assert switch is not None
-    there = f"when {target} is next, {machine.name}"
+    there = f"when {target} is next, {machine.name}" if target else machine.name
     if len(states) == 1:
         level = "" if states[0] == switch.off else "=0"
         return f"{there} is {states[0]}, as signal {switch.signal} has it; {switch.signal}{level} turns it"

@@ -18,7 +18,7 @@ from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
 from ir_planner.program.choice import Steps
 from ir_planner.program.comparison import held_against_common
-from ir_planner.program.doors import advice, doors_text
+from ir_planner.program.doors import doors_advice, doors_text
 from ir_planner.program.front import front_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
@@ -92,7 +92,7 @@ def _with_reason(status: Status, work: Work) -> Status:
 def _advised(status: Status, route: Route) -> Status:
     """A failure with what is known of doors that were not as the cell has them."""
     stops = (route.steps[k] for k in route.stops)
-    said = (advice(route.scenes.cell, stop.step.target, stop.doors_before) for stop in stops)
+    said = (doors_advice(route.scenes.cell, stop.step.target, stop.doors_before) for stop in stops)
     sentences = [status.message, *filter(None, said)]
     return replace(status, message="; ".join(sentences[:_SENTENCES]))
 

@@ -51,7 +51,7 @@ def load_text(cell: Cell, held: str = "") -> str:
 class PlanningScene:
     """cell: its parts lie where they are for this request. loads: what is attached, in the frame of the
     last link. drives: what is assumed of them. cell_hash: of the cell as it stood when the request came, ""
-    where nobody asked.
+    where nobody asked. doors: machines that are not as that cell has them, by what a driver says.
     """
 
     cell: Cell
@@ -59,6 +59,7 @@ class PlanningScene:
     power: PowerData
     drives: Drives = field(default_factory=Drives)
     cell_hash: str = ""
+    doors: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     @property
     def load_text(self) -> str:
