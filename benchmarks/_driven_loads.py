@@ -40,9 +40,11 @@ class Carrier:
                 self.simulation.execute(executed, 0)
                 while not (outcomes := self.simulation.take_outcomes()):
                     self.simulation.step()
-                if outcomes[-1].load_check is not None:
-                    return outcomes[-1].load_check
-                self._recover()  # more than the motors can carry so fast: the supervision stopped it
+                found = outcomes[-1].load_check
+                if self.simulation.stopped:  # more than the motors carry so fast: the supervision stopped it
+                    self._recover()
+                if found is not None:
+                    return found
 
     def _goal(self, start: FloatArray, end: FloatArray, slower: float) -> TrajectoryGoal:
         robot, size, rest = self.simulation.robot, np.abs(end - start), np.zeros((2, len(start)))

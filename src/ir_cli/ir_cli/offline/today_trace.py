@@ -9,11 +9,13 @@ import numpy as np
 
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, Stretch, Today
+from ir_planner.program import Doors
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces import read_mapping, read_traces
 
 from ..errors import InputError
 from .measured_options import motion_of
+from .recorded_doors import RecordedDoors, recorded_doors
 
 PAUSE = 0.5  # s: a shorter standstill belongs to the movement before it
 _STOP = 0.1  # s: the shortest standstill
@@ -26,7 +28,7 @@ _NEAR = 0.02  # s: points nearer to the ends of a movement are left out
 def today_of_trace(arguments: argparse.Namespace, planner: Planner, path: Path) -> Today:
     """Today's program of a trace; InputError where the robot doesn't move in it."""
     known, motion = motion_of(arguments, planner, path)
-    stretches, lost = stretches_of(motion)
+    stretches, lost = stretches_of(motion, recorded_doors(path, planner.cell))
     if not stretches:
         raise InputError(f"{path}: the robot does not move in it")
     notes = [] if known is None else [known.sentence]
@@ -38,17 +40,24 @@ def today_of_trace(arguments: argparse.Namespace, planner: Planner, path: Path) 
     return Today(path.name, "trace", start, tuple(stretches), tuple(notes))
 
 
-def stretches_of(motion: JointTrajectory) -> tuple[list[Stretch], float]:
+def stretches_of(motion: JointTrajectory, doors: RecordedDoors | None = None) -> tuple[list[Stretch], float]:
     """Movements and pauses from the first movement to the last, and the seconds [s] outside of them."""
     runs = _runs(motion)
     found: list[Stretch] = []
+
+    def stood(begin: float, end: float) -> Doors | None:
+        return None if doors is None else doors.during(begin, end)
+
     for k, (begin, end) in enumerate(runs):
         behind = runs[k + 1][0] if k + 1 < len(runs) else end
         stands = behind - end >= PAUSE
-        part = cut(motion, begin, end if stands else behind)
-        found.append(Stretch(part, np.asarray(part.positions[-1]), part.duration, label=f"{begin:.2f} s"))
+        last = end if stands else behind
+        part, label = cut(motion, begin, last), f"{begin:.2f} s"
+        at = stood(begin, last)
+        found.append(Stretch(part, np.asarray(part.positions[-1]), part.duration, label=label, doors=at))
         if stands:
-            found.append(Stretch(None, found[-1].q, behind - end, label=f"{end:.2f} s"))
+            at = stood(end, behind)
+            found.append(Stretch(None, found[-1].q, behind - end, label=f"{end:.2f} s", doors=at))
     covered = runs[-1][1] - runs[0][0] if runs else 0.0
     return found, float(motion.duration - motion.times[0] - covered)
 

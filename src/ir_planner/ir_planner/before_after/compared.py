@@ -8,6 +8,7 @@ import numpy as np
 from ir_description import ProgramStep
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.before_after import BeforeAfter, Side
+from ir_msgs_py.contact import MachineState
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
@@ -17,6 +18,7 @@ from ir_planner.before_after.asked import Asked, asked_program
 from ir_planner.before_after.changes import changes
 from ir_planner.before_after.costed import costed_steps
 from ir_planner.before_after.costs_of import Costed, costed, saving, side_of
+from ir_planner.before_after.stood import assumed_doors, doors_at_the_start
 from ir_planner.before_after.today import Stretch, Today
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
@@ -43,6 +45,8 @@ def before_after(
     asked = asked_program(today, planner.scene(NO_LOAD if chosen.load == NO_LOAD else ""))
     own = Planner(planner.clock, planner.settings, read_cell=lambda _text, _name: asked.cell)
     own.set_cell("cell", "")
+    doors, stood = doors_at_the_start(today, asked, own.cell)
+    own.heard.machines = tuple(MachineState(name, states[0], "".join(states[1:])) for name, states in doors)
     asking = _Asking(own, (), today.start, chosen, progress)
     before = asking.costed(costed_steps(asked.steps, asking.request))
     waiting = before
@@ -53,7 +57,7 @@ def before_after(
     sides = [asking.planned(SAME, before.seconds, before), asking.planned(FREE, 0.0, before)]
     if _differs(cycle_time, before.seconds):
         sides.append(asking.planned(LINE, cycle_time, waiting))
-    return asking.answer(today.name, today.kind, before, sides, (*today.notes, *asked.notes))
+    return asking.answer(today.name, today.kind, before, sides, (*today.notes, *asked.notes, *stood))
 
 
 def before_after_common(
@@ -88,7 +92,8 @@ def before_after_common(
     around = (
         f"{free.savings.around} of {free.savings.across} movements of the common program run around bodies"
     )
-    return asking.answer(PTP, "common program", before, sides, (around,) if free.savings.around else ())
+    notes = (*((around,) if free.savings.around else ()), *assumed_doors(planner.cell))
+    return asking.answer(PTP, "common program", before, sides, notes)
 
 
 def _differs(cycle_time: float, today: float) -> bool:
@@ -109,7 +114,15 @@ class _Asking:
         self._planner, self._options, self._progress = planner, options, progress
         settings = replace(planner.settings, transitions=planner.heard.transitions)
         power, start = planner.scene("").power, np.asarray(start)
-        self.request = ProgramRequest(planner.cell, power, stations, start, options, settings=settings)
+        self.request = ProgramRequest(
+            planner.cell,
+            power,
+            stations,
+            start,
+            options,
+            settings=settings,
+            doors=planner.heard.doors(planner.cell),
+        )
         self._spreads = Spreads(self.request)
         self._found: dict[str, Costed] = {}
 

@@ -16,17 +16,20 @@ def costed_steps(asked: tuple[Asked, ...], request: ProgramRequest) -> tuple[Pla
     isn't there.
     """
     cell, times = request.cell, request.settings.transitions
-    placed = placed_steps(cell, tuple(step.step for step in asked), cell.parts_at_start())
+    steps = tuple(step.step for step in asked)
+    placed = placed_steps(cell, steps, cell.parts_at_start(), request.doors)
     scenes = Scenes(cell, request.power, request.settings.drives)
     costing = _Costing(request, Charge(times))
     here = ""
     for step, at in zip(asked, placed, strict=True):
         there = here if step.step.kind == "PAUSE" else step.step.target
         for stretch in step.stretches:
+            doors = at.doors_before if stretch.doors is None else stretch.doors
+            scene = scenes.of(at.before, doors)
             if stretch.trajectory is None:
-                costing.pause(stretch, here, scenes.before(at))
+                costing.pause(stretch, here, scene)
             else:
-                costing.movement(stretch, here, there, scenes.before(at))
+                costing.movement(stretch, here, there, scene)
         here = there
     return tuple(costing.steps)
 

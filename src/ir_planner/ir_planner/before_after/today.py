@@ -8,6 +8,7 @@ from ir_krl import Place
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.krl import EvaluatedProgram, EvaluatedStep
+from ir_planner.program import Doors
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,7 +16,8 @@ class Stretch:
     """One movement, or a standstill of `seconds` (trajectory None), that ends at q (n,) [rad].
 
     works: something is done where it ends (an output, a wait for a machine), so that the stop is not only
-    passed through. label: where it stands in its source.
+    passed through. label: where it stands in its source. doors: machines that were not as the cell has them
+    meanwhile; None: nobody recorded it, they are as the program's own signals move them.
     """
 
     trajectory: JointTrajectory | None
@@ -23,6 +25,7 @@ class Stretch:
     seconds: float
     works: bool = False
     label: str = ""
+    doors: Doors | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,11 @@ class Today:
     start: FloatArray
     stretches: tuple[Stretch, ...]
     notes: tuple[str, ...] = ()
+
+    @property
+    def doors(self) -> Doors | None:
+        """Machines that were not as the cell has them when it began; None: nobody recorded it."""
+        return self.stretches[0].doors if self.stretches else None
 
     @property
     def seconds(self) -> float:
