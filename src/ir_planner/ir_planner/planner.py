@@ -125,9 +125,7 @@ class Planner:
         return self._current.set_equipment(name, pose, enabled, state)
 
     def scene(self, load: str = "") -> PlanningScene:
-        """Snapshot of the cell with `load` attached ("": what the robot carries, else the tool); doors are as
-        the driver says.
-        """
+        """Snapshot of the cell, doors as heard, with `load` attached; "": what is carried, else the tool."""
         return self._current.scene(load)
 
     def check_state(
