@@ -41,10 +41,25 @@ def frames(driver, count, first=1):
 
 def test_frames_carry_what_is_due(driver):
     got = frames(driver, 500)
-    assert all(frame.q is not None for frame in got)
+    assert all(frame.joints.q is not None for frame in got)
     assert sum(frame.power is not None for frame in got) == 100
     assert sum(frame.following is not None for frame in got) == 50
     assert sum(frame.outputs is not None for frame in got) == 1  # outputs only when they change
+
+
+def test_joints_are_handed_out_before_the_meter_is_read(make, monkeypatch):
+    """The meter takes a fifth of a tick at every fifth one: joint states would come that irregularly."""
+    simulation = make()
+    driver, happened = Driver(simulation), []
+    settle = simulation.mains.settle
+    monkeypatch.setattr(simulation.mains, "settle", lambda: (happened.append("meter"), settle())[1])
+    for k in range(1, 51):
+        frame = driver.tick(k * PERIOD, happened.append)
+        assert frame.joints in happened[-2:]
+    driver.close()
+    assert happened.count("meter") == 10
+    before_meter = [happened[k - 1] for k, event in enumerate(happened) if event == "meter"]
+    assert [joints.stamp_ns for joints in before_meter] == [5 * k * PERIOD for k in range(1, 11)]
 
 
 def test_power_is_the_mean_since_the_last_frame(driver, plan, cell):
@@ -61,7 +76,7 @@ def test_power_is_the_mean_since_the_last_frame(driver, plan, cell):
 def test_a_sleeping_controller_leaves_only_the_meter(make):
     driver = Driver(make(controller=ControllerSettings(start_mode="HIBERNATION")))
     got = frames(driver, 50)
-    assert all(frame.q is None and frame.following is None for frame in got)
+    assert all(frame.joints.q is None and frame.following is None for frame in got)
     powers = [frame.power for frame in got if frame.power is not None]
     assert len(powers) == 10
     assert powers[-1].mode is Mode.HIBERNATION

@@ -88,7 +88,7 @@ class Fuzz:
             self._stamp += PERIOD
             frame = self.driver.tick(self._stamp)
             braking = self.simulation.modes.mode is Mode.EMERGENCY_STOP  # recovered while it still rolls
-            self.judge.see(frame.q, self.simulation.stopped, braking)
+            self.judge.see(frame.joints.q, self.simulation.stopped, braking)
 
     def case(self) -> None:
         """One hostile request, and some time."""

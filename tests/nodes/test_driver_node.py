@@ -25,7 +25,8 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.wake_on_lan import magic_packet
-from ir_sim_driver.node import SimDriver
+from ir_sim_driver.controller.mains import Mains
+from ir_sim_driver.node import SimDriver, streams
 from ir_sim_driver.plant import plant_to_yaml, typical_plant
 from ir_sim_driver.plc.modbus_map import COILS
 
@@ -104,6 +105,19 @@ def test_power_state_is_the_derivative_of_its_energy(make_driver, listen, wait_f
     energy = np.array([msg.energy for msg in received])
     power = np.array([msg.power for msg in received])
     assert np.allclose(np.diff(energy), power[1:] * np.diff(stamps) * 1e-9, rtol=1e-6)
+
+
+def test_joint_states_are_published_before_the_meter_is_read(make_driver, wait_for, monkeypatch):
+    happened = []
+    fill, settle = streams.fill_joint_state, Mains.settle
+    monkeypatch.setattr(streams, "fill_joint_state", lambda *a: (happened.append("joints"), fill(*a))[1])
+    monkeypatch.setattr(Mains, "settle", lambda mains: (happened.append("meter"), settle(mains))[1])
+    make_driver()
+    wait_for(lambda: happened.count("meter") >= 20, timeout=60.0)
+    events = list(happened)
+    first = events.index("meter", events.index("joints"))
+    rounds = "".join(event[0] for event in events[first + 1 :]).split("m")[:-1]
+    assert set(rounds) == {"jjjjj"}
 
 
 def test_the_plant_is_named_by_the_meter_and_published_with_its_figures(make_driver, listen, wait_for):

@@ -3,7 +3,7 @@
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.diagnostics import Entry, report
 from ir_sim_driver.controller.driver import Bodies, Driver, Snapshot
-from ir_sim_driver.controller.frames import Frame
+from ir_sim_driver.controller.frames import Frame, Joints
 from ir_sim_driver.controller.goals import NO_GOAL
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation
@@ -18,6 +18,7 @@ __all__ = [
     "Driver",
     "Entry",
     "Frame",
+    "Joints",
     "PlannedCell",
     "Simulation",
     "SimulationSettings",

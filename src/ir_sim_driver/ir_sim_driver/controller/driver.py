@@ -20,7 +20,7 @@ from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access
 from ir_sim_driver.controller.cell_side import CellSide
 from ir_sim_driver.controller.diagnostics import Entry, report
-from ir_sim_driver.controller.frames import Frame, Frames
+from ir_sim_driver.controller.frames import Frame, Frames, Joints
 from ir_sim_driver.controller.goals import Goals
 from ir_sim_driver.controller.moving_in import take_offered_cell
 from ir_sim_driver.controller.plc_side import PlcSide
@@ -72,16 +72,20 @@ class Driver:
         """Stop checking trajectories."""
         self._goals.close()
 
-    def tick(self, stamp_ns: int) -> Frame:
-        """Let the steps of a tick pass, which ends at the stamp [ns]."""
+    def tick(self, stamp_ns: int, moved: Callable[[Joints], None] = lambda joints: None) -> Frame:
+        """Let the steps of a tick pass, which ends at the stamp [ns].
+
+        moved: gets the joints before the rest of the frame is made; it must be quick, everybody waits for it.
+        """
         with self._lock:
             self._stamp = stamp_ns
             try:
                 take_offered_cell(self._simulation)
                 for _ in range(self._steps):
                     self._simulation.step()
+                moved(joints := self._frames.joints(stamp_ns))
                 calls = self._goals.take_calls(self._simulation.take_outcomes())
-                frame = self._frames.take(stamp_ns)
+                frame = self._frames.take(joints)
             except Exception as error:
                 self._access.failure = f"the plant has stopped: {error!r}"
                 self._simulation.notices.add(Level.ERROR, self._access.failure)

@@ -27,7 +27,7 @@ from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.quality import ACTION_SERVICES
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.serving import BoundedService
-from ir_sim_driver.controller import Driver, Frame, Simulation, make_simulation
+from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, PlantStoppedError
 from ir_sim_driver.node.announcements import Announcements
 from ir_sim_driver.node.bounded_goals import BoundedActionServer
@@ -79,7 +79,7 @@ class SimDriver(Node):
         steps = round(1.0 / (options.joint_state_rate * simulation.settings.dt))
         self._driver = Driver(simulation, steps, configuration.wake_hint)
         self._hardware = hardware_id(simulation.robot)
-        self._frame: Frame | None = None
+        self._joints: Joints | None = None
         self._last_words = 0.0
         self._open_topics()
         self._open_requests()
@@ -198,9 +198,13 @@ class SimDriver(Node):
         return plant
 
     def _tick(self, stamp_ns: int) -> None:
-        frame = self._frame = self._driver.tick(stamp_ns)
+        frame = self._driver.tick(stamp_ns, self._publish_joints)
         self._streams.publish(frame)
         self._announcements.watch(frame.load)
+
+    def _publish_joints(self, joints: Joints) -> None:
+        self._joints = joints
+        self._streams.publish_joints(joints)
 
     def _plant_failed(self, error: Exception) -> None:
         self._driver.fail(f"the plant has stopped: {error!r}")
@@ -220,18 +224,18 @@ class SimDriver(Node):
             self._transforms.publish_fixed(self.now_msg())
 
     def _publish_transforms(self) -> None:
-        frame = self._frame
-        if self._transforms is not None and frame is not None and frame.q is not None:
-            self._transforms.publish_moving(frame.q, frame.stamp_ns)
+        joints = self._joints
+        if self._transforms is not None and joints is not None and joints.q is not None:
+            self._transforms.publish_moving(joints.q, joints.stamp_ns)
 
     def _publish_markers(self) -> None:
-        frame = self._frame
+        joints = self._joints
         if not self._markers.get_subscription_count():
             self._markers_timer.cancel()  # until somebody listens: every wake delays the plant's thread
             return
-        if frame is None or frame.q is None:
+        if joints is None or joints.q is None:
             return
-        markers = robot_markers(self._driver.bodies(frame.q), frame.stamp_ns, Marker)
+        markers = robot_markers(self._driver.bodies(joints.q), joints.stamp_ns, Marker)
         self._markers.publish(MarkerArray(markers=markers))
 
     def _publish_diagnostics(self) -> None:

@@ -1,4 +1,4 @@
-"""What the plant's thread publishes: joint states at every stamp, the rest when it is due."""
+"""What the plant's thread publishes: joint states at every stamp and first, the rest when it is due."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
 )
 from ir_msgs_py.ros.quality import LATCHED
-from ir_sim_driver.controller import Frame
+from ir_sim_driver.controller import Frame, Joints
 from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state, fill_load_check
 
 _NS = 1_000_000_000
@@ -52,14 +52,18 @@ class Streams:
         self._clock = self._node.create_publisher(Clock, "/clock", 10)
         self._clock_period = math.ceil(rate * factor / _CLOCK_RATE) * (_NS // rate)
 
-    def publish(self, frame: Frame) -> None:
-        """Publish what the frame holds."""
-        stamp_ns = frame.stamp_ns
+    def publish_joints(self, joints: Joints) -> None:
+        """Publish time, where it is ours, and the joints."""
+        stamp_ns = joints.stamp_ns
         if self._clock is not None and stamp_ns % self._clock_period == 0:
             self._clock.publish(Clock(clock=time_to_msg(stamp_ns)))
-        if frame.q is not None and frame.qd is not None and frame.torque is not None:
-            fill_joint_state(self._joint_state, stamp_ns, frame.q, frame.qd, frame.torque)
+        if joints.q is not None and joints.qd is not None and joints.torque is not None:
+            fill_joint_state(self._joint_state, stamp_ns, joints.q, joints.qd, joints.torque)
             self._joint_states.publish(self._joint_state)
+
+    def publish(self, frame: Frame) -> None:
+        """Publish what the frame holds beside its joints."""
+        stamp_ns = frame.joints.stamp_ns
         if frame.power is not None:
             self._power_states.publish(power_state_to_msg(frame.power))
         if frame.following is not None:
