@@ -107,7 +107,8 @@ class Client:
         client = self._executor.run(lambda: self._client(service, service_type))
         deadline = time.monotonic() + limit
         if not self._executor.wait_until(client.service_is_ready, limit):
-            raise ServiceUnavailableError(f"no node offers the service {service} (waited {limit:g} s)")
+            other = self.graph.other_type(service, service_type)
+            raise ServiceUnavailableError(f"no node offers the service {service} (waited {limit:g} s){other}")
         future: Future = self._executor.run(lambda: client.call_async(request))
         if not self._executor.wait(future, max(0.0, deadline - time.monotonic())):
             self._executor.run(lambda: client.remove_pending_request(future))
@@ -149,7 +150,8 @@ class Client:
         )
         try:
             if not self._executor.wait_until(lambda: bool(received), limit):
-                raise CallTimedOutError(f"no message on {topic} within {limit:g} s")
+                other = self.graph.other_type(topic, message_type)
+                raise CallTimedOutError(f"no message on {topic} within {limit:g} s{other}")
             if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:  # the kept ones come one after another
                 deadline = time.monotonic() + limit
                 while time.monotonic() < deadline:

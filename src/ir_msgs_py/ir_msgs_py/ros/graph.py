@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.action import get_action_names_and_types
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from ir_msgs_py.ros.calls import type_text
+
 _DEPTH = 100
+_OWN = "ir_msgs/"
 
 
 class Graph:
@@ -20,19 +24,19 @@ class Graph:
     def services(self) -> dict[str, str]:
         """Service names with their type, without those of actions."""
         return {
-            name: types[0]
+            name: _chosen(types)
             for name, types in self._node.get_service_names_and_types()
             if "/_action/" not in name
         }
 
     def actions(self) -> dict[str, str]:
         """Action names with their type."""
-        return {name: types[0] for name, types in get_action_names_and_types(self._node)}
+        return {name: _chosen(types) for name, types in get_action_names_and_types(self._node)}
 
     def topics(self) -> dict[str, str]:
         """Topic names with their type, without those of actions."""
         return {
-            name: types[0]
+            name: _chosen(types)
             for name, types in self._node.get_topic_names_and_types()
             if "/_action/" not in name
         }
@@ -41,6 +45,15 @@ class Graph:
         """Full names of the nodes."""
         found = self._node.get_node_names_and_namespaces()
         return [f"{namespace.rstrip('/')}/{name}" for name, namespace in found]
+
+    def other_type(self, name: str, kind: Any) -> str:
+        """What to add to a sentence when nobody offers the service or topic `name` as the class `kind`: the
+        type that somebody has it with, "" when nobody does.
+        """
+        full, own = self._node.resolve_service_name(name), type_text(kind)
+        known = (*self._node.get_service_names_and_types(), *self._node.get_topic_names_and_types())
+        found = [each for offered, types in known if offered == full for each in types if each != own]
+        return f"; somebody in the graph has it as {found[0]}" if found else ""
 
     def publishers(self, topic: str) -> list[Any]:
         """End points that publish the topic."""
@@ -57,3 +70,8 @@ class Graph:
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
         )
+
+
+def _chosen(types: Sequence[str]) -> str:
+    """The type that counts where somebody offers a name with another one too: this project's."""
+    return next((each for each in types if each.startswith(_OWN)), types[0])
