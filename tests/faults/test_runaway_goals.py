@@ -83,6 +83,26 @@ def test_five_percent_more_than_an_axis_may_accelerate_is_refused(simulation: Si
         simulation.vet(TrajectoryGoal(trajectory(simulation, [0.0, time], [q, there], rest, rest)), 1)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("joint", range(6))
+def test_five_percent_more_than_an_axis_may_turn_is_refused_in_either_direction(
+    simulation: Simulation, joint: int, sign: float
+) -> None:
+    q, rest, angle = simulation.backend.q, np.zeros((2, 6)), 0.2
+    time = 1.875 * angle / (1.05 * simulation.robot.velocity_max[joint])  # of a quintic from rest to rest
+    there = q + sign * angle * np.eye(6)[joint]
+    with pytest.raises(DriverError, match=r"needs .* rad/s at"):
+        simulation.vet(TrajectoryGoal(trajectory(simulation, [0.0, time], [q, there], rest, rest)), 1)
+
+
+def test_what_leads_in_keeps_the_limits_too(simulation: Simulation) -> None:
+    """A trajectory of one point is nothing but its lead-in."""
+    q, rest = simulation.backend.q, np.zeros((1, 6))
+    assert not execute(simulation, trajectory(simulation, [0.1], [q + 0.3], rest, rest))
+    assert execute(simulation, trajectory(simulation, [2.0], [q + 0.3], rest, rest))
+    assert within(excesses(ride(simulation, 2.2), simulation))
+
+
 def test_what_happens_between_milliseconds_is_seen(simulation: Simulation) -> None:
     """A spike of 0.4 ms, at rest at every whole millisecond."""
     q = simulation.backend.q
@@ -145,7 +165,9 @@ def test_a_movement_that_is_replaced_by_a_later_one_does_not_stop_dead(simulatio
     positions = ride(simulation, 1.0)
     later = trajectory(simulation, [2.0], [q], rest[:1])
     assert execute(simulation, later, stamp_ns=1 + 500_000_000)
-    assert within(excesses(positions + ride(simulation, 3.0)[1:], simulation))
+    positions += ride(simulation, 2.4)[1:]
+    assert np.abs(simulation.backend.q - q).max() > 1e-6, "it arrives at its stamp, not before"
+    assert within(excesses(positions + ride(simulation, 0.2)[1:], simulation))
     assert np.abs(simulation.backend.q - q).max() < 1e-9
 
 

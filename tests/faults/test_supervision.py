@@ -94,6 +94,22 @@ def moved_to(simulation: Simulation, q: np.ndarray) -> None:
     simulation.executor.hold(q)
 
 
+def test_a_lead_in_that_swings_farther_out_first_is_refused() -> None:
+    """Its ends are allowed; to arrive with that speed it would begin outwards."""
+    simulation = make_simulation(BARE, backend="ideal")
+    robot, outside = simulation.robot, simulation.backend.q.copy()
+    outside[0] = robot.position_max[0] + 0.01  # within what the supervision allows
+    moved_to(simulation, outside)
+    points, speeds = np.array([outside, outside]), np.zeros((2, 6))
+    points[:, 0] -= 0.1, 0.6
+    speeds[0, 0] = -0.5
+    names = robot.joint_names
+    goal = JointTrajectory.from_seconds(names, [2.0, 4.0], points, speeds, np.zeros((2, 6)))
+    with pytest.raises(TrajectoryRefusedError, match="joint_a1 is at"):
+        simulation.execute(simulation.vet(TrajectoryGoal(goal), 0), 0)
+    start(simulation, [2.0], [points[1]])
+
+
 @pytest.mark.parametrize("beyond", [0.03, 0.2])
 def test_beyond_a_limit_it_is_stopped_and_can_only_be_driven_back(beyond: float) -> None:
     simulation = make_simulation(BARE, backend="ideal")
