@@ -9,6 +9,7 @@ Each study is a room; they share the work (processes, results, settings) and the
 
 from ir_studies.arena import ArenaSettings, read_settings, run_arena
 from ir_studies.errors import FolderError, SettingsError, StoppedError, StudyError, WorkerError
+from ir_studies.layout import LayoutSettings, read_layout, run_layout
 from ir_studies.studies import KINDS, Answer, Kind, Study, read_study, study_of
 from ir_studies.work import Means
 
@@ -18,14 +19,17 @@ __all__ = [
     "ArenaSettings",
     "FolderError",
     "Kind",
+    "LayoutSettings",
     "Means",
     "SettingsError",
     "StoppedError",
     "Study",
     "StudyError",
     "WorkerError",
+    "read_layout",
     "read_settings",
     "read_study",
     "run_arena",
+    "run_layout",
     "study_of",
 ]

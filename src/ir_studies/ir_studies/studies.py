@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ir_studies import arena
+from ir_studies import arena, layout
 from ir_studies.arena.settings import arena_settings
 from ir_studies.errors import SettingsError
 from ir_studies.work import Means, Placed, beside, read_text
@@ -59,7 +59,18 @@ def _run_arena(settings: arena.ArenaSettings, folder: Path, means: Means) -> Ans
     return Answer(finished.summary, finished.files, finished.summed_up)
 
 
+def _run_layout(settings: layout.LayoutSettings, folder: Path, means: Means) -> Answer:
+    found = layout.run_layout(settings, folder, means)
+    return Answer(found.summary, found.files, found.table)
+
+
 KINDS = {
+    "layout": Kind(
+        "where robot, machines, posture and tool should stand for least energy",
+        layout.EXAMPLE,
+        layout.layout_settings,
+        _run_layout,
+    ),
     "arena": Kind("planners against each other", arena.EXAMPLE, arena_settings, _run_arena),
 }
 

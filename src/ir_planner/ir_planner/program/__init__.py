@@ -2,6 +2,7 @@
 
 from ir_planner.program.charge import Charge
 from ir_planner.program.doors import Doors, doors_advice, doors_along, doors_text, with_doors
+from ir_planner.program.outlook import Outlook, outlook
 from ir_planner.program.pause_lengths import Lengths, lengths_of
 from ir_planner.program.pauses import AUTO, Pause, pause_by_itself
 from ir_planner.program.program import plan_program
@@ -16,6 +17,7 @@ __all__ = [
     "Charge",
     "Doors",
     "Lengths",
+    "Outlook",
     "Pause",
     "PlacedStep",
     "ProgramPlan",
@@ -31,6 +33,7 @@ __all__ = [
     "doors_text",
     "lengths_of",
     "nobody",
+    "outlook",
     "pause_by_itself",
     "placed_steps",
     "plan_program",

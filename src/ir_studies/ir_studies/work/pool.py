@@ -112,9 +112,10 @@ class Pool:
     def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
         """Each job with its row, as they are made. WorkerError where no worker starts."""
         self._turns = deque(_Turn(job) for job in jobs)
-        for worker in [worker for worker in self._workers if worker.ready and worker.turn is None]:
-            self._give(worker)
         while self._turns or any(worker.turn for worker in self._workers):
+            for worker in self._workers:
+                if worker.ready and worker.turn is None:
+                    self._give(worker)
             while len(self._workers) < min(self._count, self._unmade):
                 self._start()
             yield from self._step()

@@ -1,0 +1,150 @@
+"""The search for the best placements: a look at many, full plans where they could be the best.
+
+A look costs a tenth of a plan and estimates its cost but for what stands in between. The least difference of
+cost and estimate that was seen, less a margin, makes it a bound: what can't be the best by it is not planned.
+Everything goes on in rounds and batches of fixed size, so that the same settings give the same placements,
+however many processes make the jobs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from scipy.stats import qmc
+
+from ir_studies.layout.placement import Known, Placement
+from ir_studies.layout.settings import LayoutSettings
+from ir_studies.work import Job, Row
+
+BATCH = 16  # placements that are planned before the bound is looked at again
+_SPREAD = 8  # of the first batch, over all estimates: for the least difference
+GIVEN = Placement({})
+Made = Callable[[list[Job], str, str], None]
+"""Makes jobs whose rows are missing: the jobs, the phase, and the best so far in words."""
+
+
+class Search:
+    """rows: by the keys of jobs; made: makes those that are missing."""
+
+    def __init__(self, settings: LayoutSettings, rows: dict[str, Row], made: Made) -> None:
+        self._settings, self._rows, self._made = settings, rows, made
+        self._conditions = settings.conditions
+        self._placements: dict[str, Placement] = {}
+        self._wanted: set[str] = set()  # keys of placements whose plans were made for this search
+
+    def run(self) -> list[Known]:
+        """All placements that were looked at, the given one first, then in the order of the search."""
+        rounds = 1 if self._settings.method == "grid" else self._settings.rounds
+        for k in range(rounds):
+            new = {each.key: each for each in self._candidates(k, rounds)}
+            self._placements |= {key: each for key, each in new.items() if key not in self._placements}
+            looks = [each.look(self._conditions) for each in self._placements.values()]
+            self._made(looks, f"round {k + 1} of {rounds}: looks", self._best_words())
+            self._plan_what_matters(f"round {k + 1} of {rounds}: plans")
+        return self._known()
+
+    def _known(self) -> list[Known]:
+        return [self._of(placement) for placement in self._placements.values()]
+
+    def _of(self, placement: Placement) -> Known:
+        """What the rows say; plans that a part of the search did not ask for don't count."""
+        look = self._rows[placement.look(self._conditions).key]
+        plans = {}
+        if placement.key in self._wanted:
+            plans = {each: self._rows[placement.plan(each).key] for each in self._conditions}
+        return Known(placement, look, plans, self._conditions)
+
+    def _candidates(self, k: int, rounds: int) -> Iterator[Placement]:
+        if k == 0:
+            yield GIVEN
+            yield from grid(self._settings) if self._settings.method == "grid" else self._spread(rounds)
+            return
+        found = best_of(self._known(), self._settings.keep)
+        count = (self._settings.placements - self._first(rounds)) // max(rounds - 1, 1)
+        for place, known in enumerate(found):
+            share = count // len(found) + (place < count % len(found))
+            yield from self._near(known.placement, share, k, place)
+
+    def _first(self, rounds: int) -> int:
+        """Placements of the first round."""
+        return self._settings.placements if rounds == 1 else (self._settings.placements + 1) // 2
+
+    def _spread(self, rounds: int) -> Iterator[Placement]:
+        variables = self._settings.variables
+        for share in points(len(variables), self._first(rounds) - 1, self._settings.seed, 0):
+            yield Placement({v.name: v.at(float(s)) for v, s in zip(variables, share, strict=True)})
+
+    def _near(self, centre: Placement, count: int, k: int, place: int) -> Iterator[Placement]:
+        """Placements in ranges that are halved for the k-th time, around a good one."""
+        variables = self._settings.variables
+        for share in points(len(variables), count, self._settings.seed, k, place):
+            values = {}
+            for v, s in zip(variables, share, strict=True):
+                width = max(v.high - v.low, 1e-12)
+                at = (centre.values.get(v.name, 0.0) - v.low) / width + (float(s) - 0.5) * 0.5**k
+                values[v.name] = v.at(min(max(at, 0.0), 1.0))
+            yield Placement(values)
+
+    def _plan_what_matters(self, phase: str) -> None:
+        """Plan in batches, best estimate first, until nothing that is left can be the best."""
+        while batch := self._batch():
+            jobs = [known.placement.plan(each) for known in batch for each in self._conditions]
+            self._made(jobs, phase, self._best_words())
+            self._wanted |= {known.placement.key for known in batch}
+
+    def _batch(self) -> list[Known]:
+        settings, known = self._settings, self._known()
+        left = sorted(
+            (one for one in known if not one.planned and math.isfinite(one.coarse)),
+            key=lambda one: (one.coarse, one.placement.key),
+        )
+        planned = [one for one in known if one.planned]
+        most = min(settings.plans - len(planned), BATCH) if settings.plans else BATCH
+        finite = [one for one in planned if math.isfinite(one.cost)]
+        if not finite:
+            first = [one for one in left if one.placement.key == GIVEN.key]
+            over_all = left[:: max(len(left) // _SPREAD, 1)][:_SPREAD]
+            chosen = {one.placement.key: one for one in (*first, *over_all, *left)}
+            return list(chosen.values())[: max(most, 0)]
+        least = min(one.cost - one.coarse for one in finite)
+        best = min(one.cost for one in finite)
+        could = [one for one in left if one.coarse * (1.0 - settings.margin) + least < best]
+        return could[: max(most, 0)]
+
+    def _best_words(self) -> str:
+        costs = [one.cost for one in self._looked_at() if math.isfinite(one.cost)]
+        return f"best {min(costs) / 1e3:.2f} kJ" if costs else ""
+
+    def _looked_at(self) -> Iterable[Known]:
+        looked = (p for p in self._placements.values() if p.look(self._conditions).key in self._rows)
+        return [self._of(placement) for placement in looked]
+
+
+def grid(settings: LayoutSettings) -> Iterator[Placement]:
+    """`steps` values of every variable, all combined."""
+    shares = np.linspace(0.0, 1.0, settings.steps)
+    values = [[(v.name, v.at(float(share))) for share in shares] for v in settings.variables]
+    for combined in product(*values):
+        yield Placement(dict(combined))
+
+
+def points(dimensions: int, count: int, *seeds: int) -> np.ndarray:
+    """Points (count, dimensions) in [0, 1) that are spread evenly: Halton's sequence, scrambled."""
+    rng = np.random.default_rng(list(seeds))
+    return np.asarray(qmc.Halton(dimensions, scramble=True, rng=rng).random(max(count, 0)))
+
+
+def best_of(known: Iterable[Known], count: int) -> list[Known]:
+    """The best that were planned."""
+    finite = [one for one in known if math.isfinite(one.cost)]
+    return sorted(finite, key=lambda one: (one.cost, one.placement.key))[:count]
+
+
+def with_plans(known: Known, rows: dict[str, Row], seed: int) -> Known:
+    """The same placement with its plans of another seed."""
+    plans = {each: rows[known.placement.plan(each, seed).key] for each in known.conditions}
+    return replace(known, plans=plans)

@@ -1,0 +1,219 @@
+"""What a layout study may move and within which ranges, and what it may cost, from a YAML file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from itertools import product
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from ir_description import Cell, DescriptionError, load_cell
+from ir_studies.errors import SettingsError
+from ir_studies.layout.example import EXAMPLE
+from ir_studies.layout.freedom import JOINTS, TURNS, Placing, Range, Variable, variables
+from ir_studies.work import Placed, beside, checked_number, read_text, settings_values
+
+__all__ = ["EXAMPLE", "FORMAT", "Condition", "LayoutSettings", "layout_settings", "read_layout"]
+FORMAT = "ir_layout/1"
+METHODS = ("spread", "grid")
+MOST_PLACEMENTS = 100_000
+MOST_CONDITIONS = 50
+Ranges: TypeAlias = "Mapping[str, Range]"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What every placement is planned for: a cycle time (0: free) and the masses [kg] of parts."""
+
+    cycle_time: float
+    payload: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        cycle = f"{self.cycle_time:g} s" if self.cycle_time else "free"
+        return " ".join([cycle, *(f"{name} {mass:g} kg" for name, mass in self.payload)])
+
+
+@dataclass(frozen=True)
+class LayoutSettings:
+    """EXAMPLE says what each key means."""
+
+    cell: str
+    base: Ranges = field(default_factory=dict)
+    carried: tuple[str, ...] = ()
+    equipment: Mapping[str, Ranges] = field(default_factory=dict)
+    park: Ranges = field(default_factory=dict)
+    tool: Ranges = field(default_factory=dict)
+    payloads: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    cycle_times: tuple[float, ...] = (0.0,)
+    stations: tuple[str, ...] = ()
+    method: str = "spread"
+    placements: int = 200
+    steps: int = 5
+    rounds: int = 3
+    keep: int = 5
+    seeds: int = 3
+    seed: int = 0
+    plans: int = 0
+    margin: float = 0.01
+    time_value: float = 500.0
+    safety_distance: float = 0.02
+    max_iterations: int = 0
+    hang_after: float = 600.0
+
+    def __post_init__(self) -> None:
+        for name, low, high in _WHOLE:
+            checked_number(name, getattr(self, name), low, high, whole=True)
+        for name, least, most in _REAL:
+            checked_number(name, getattr(self, name), least, most)
+        if self.method not in METHODS:
+            raise SettingsError(f"method is {self.method!r:.60}: known are {', '.join(METHODS)}")
+        self._check_names()
+        self._check_conditions()
+        if not self.variables:
+            raise SettingsError("nothing may move: give ranges to base, equipment, park or tool")
+        if self.method == "grid" and self.steps ** len(self.variables) > MOST_PLACEMENTS:
+            points = f"{self.steps} steps of {len(self.variables)} variables"
+            raise SettingsError(f"a grid of {points} has more than {MOST_PLACEMENTS} placements")
+
+    @property
+    def placing(self) -> Placing:
+        """How values become a cell."""
+        return Placing(self.carried)
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """What may move, in the order of the file."""
+        groups = {"base": self.base, "park": self.park, "tool": self.tool}
+        machines = {f"equipment.{name}": ranges for name, ranges in self.equipment.items()}
+        return variables({**groups, **machines})
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """All cycle times with all masses."""
+        masses = product(*self.payloads.values())
+        payloads = [tuple(zip(self.payloads, one, strict=True)) for one in masses]
+        return tuple(Condition(cycle, payload) for payload in payloads for cycle in self.cycle_times)
+
+    @property
+    def budget(self) -> dict[str, Any]:
+        """What a row depends on beside its placement, condition and seed."""
+        names = ("carried", "stations", "time_value", "safety_distance", "max_iterations")
+        return {name: getattr(self, name) for name in names}
+
+    def _check_names(self) -> None:
+        cell = _cell(self.cell)
+        machines = [machine.name for machine in cell.equipment]
+        _known("equipment", self.equipment, machines)
+        _known("carried", self.carried, machines)
+        _known("stations", self.stations, [station.name for station in cell.stations])
+        _known("payloads", self.payloads, [part.name for part in cell.parts])
+        _known("park", self.park, JOINTS[: cell.robot.n])
+        for name in ("base", "tool"):
+            _known(name, getattr(self, name), TURNS[name])
+        for machine, ranges in self.equipment.items():
+            _known(f"equipment: {machine}", ranges, TURNS["equipment"])
+        if self.tool and cell.tool is None:
+            raise SettingsError(f"tool: the cell {cell.name} has none")
+        if not (self.stations or cell.program):
+            raise SettingsError(f"the cell {cell.name} has no program: name its stations")
+
+    def _check_conditions(self) -> None:
+        for cycle in self.cycle_times:
+            checked_number("cycle_times", cycle, 0.0, 604_800.0)
+        for part, masses in self.payloads.items():
+            for mass in masses:
+                checked_number(f"payloads: {part}", mass, 0.001, 2000.0)
+        if not 0 < len(self.conditions) <= MOST_CONDITIONS:
+            count = len(self.conditions)
+            raise SettingsError(f"cycle_times and payloads make {count} conditions: 1 to {MOST_CONDITIONS}")
+
+
+_WHOLE = (
+    ("placements", 1, MOST_PLACEMENTS),
+    ("steps", 2, 1000),
+    ("rounds", 1, 20),
+    ("keep", 1, 100),
+    ("seeds", 1, 100),
+    ("seed", 0, 2**32 - 1),
+    ("plans", 0, MOST_PLACEMENTS),
+    ("max_iterations", 0, 100_000_000),
+)
+_REAL = (
+    ("margin", 0.0, 1e3),
+    ("time_value", 0.0, 1e9),
+    ("safety_distance", 0.0, 10.0),
+    ("hang_after", 1.0, 86_400.0),
+)
+
+
+def read_layout(path: str | Path) -> LayoutSettings:
+    """The settings of a YAML file; a cell file counts from its folder. SettingsError names the key."""
+    try:
+        return layout_settings(read_text(path), beside(path))
+    except SettingsError as error:
+        raise SettingsError(f"{path}: {error}") from error
+
+
+def layout_settings(content: str, placed: Placed) -> LayoutSettings:
+    """The settings of a text. placed: where a cell is."""
+    values = settings_values(content, FORMAT, [each.name for each in fields(LayoutSettings)])
+    if not isinstance(values.get("cell"), str):
+        raise SettingsError("cell is missing: the name of a bundled cell, or a file")
+    values["cell"] = placed(values["cell"])
+    for name in ("base", "park", "tool"):
+        if name in values:
+            values[name] = _ranges(name, values[name])
+    if "equipment" in values:
+        machines = _mapping("equipment", values["equipment"])
+        values["equipment"] = {name: _ranges(f"equipment: {name}", one) for name, one in machines.items()}
+    if "payloads" in values:
+        payloads = _mapping("payloads", values["payloads"])
+        values["payloads"] = {name: _list(f"payloads: {name}", one) for name, one in payloads.items()}
+    for name in ("carried", "stations", "cycle_times"):
+        if name in values:
+            values[name] = _list(name, values[name])
+    return LayoutSettings(**values)
+
+
+def _mapping(key: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
+        raise SettingsError(f"{key} is {value!r:.60}: it must be names with values")
+    return value
+
+
+def _list(key: str, value: Any) -> tuple[Any, ...]:
+    if not isinstance(value, list | tuple):
+        raise SettingsError(f"{key} is {value!r:.60}: it must be a list")
+    if any(value.count(one) > 1 for one in value):
+        raise SettingsError(f"{key} names one twice")
+    return tuple(value)
+
+
+def _ranges(key: str, value: Any) -> dict[str, Range]:
+    found = {}
+    for name, ends in _mapping(key, value).items():
+        if not isinstance(ends, list) or len(ends) != 2:
+            raise SettingsError(f"{key}: {name} is {ends!r:.60}: it must be [lowest, highest]")
+        most = 360.0 if name.endswith("_deg") else 100.0
+        for end in ends:
+            checked_number(f"{key}: {name}", end, -most, most)
+        if ends[0] > ends[1]:
+            raise SettingsError(f"{key}: {name} is {ends}: the lowest comes first")
+        found[name] = float(ends[0]), float(ends[1])
+    return found
+
+
+def _known(key: str, names: Any, known: Any) -> None:
+    for name in names:
+        if name not in known:
+            raise SettingsError(f"{key}: {name!r:.60} is unknown: known are {', '.join(known)}")
+
+
+def _cell(name: str) -> Cell:
+    try:
+        return load_cell(name)
+    except (DescriptionError, OSError) as error:
+        raise SettingsError(f"cell: {error}") from error

@@ -1,0 +1,96 @@
+"""What follows from a layout study, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from ir_recorder.report.words import joules, percent
+from ir_studies.layout.finals import Final
+from ir_studies.layout.placement import Known
+from ir_studies.layout.settings import LayoutSettings
+
+SHOWN = 4  # reasons
+
+
+def sentences(
+    known: Sequence[Known], finals: Sequence[Sequence[Final]], settings: LayoutSettings
+) -> Iterator[str]:
+    """How many were looked at, what is impossible, and the best against the given placement."""
+    impossible = [one for one in known if one.cost == math.inf]
+    planned = sum(math.isfinite(one.cost) for one in known)
+    yield (
+        f"{len(known)} placements looked at: {len(impossible)} impossible{reasons(impossible)}, "
+        f"{planned} planned in full."
+    )
+    if planned and planned + len(impossible) < len(known):
+        yield bound_words(settings)
+    given, best = ends(finals)
+    if given is None and best is None:
+        yield "No placement is possible."
+    if given is None:
+        yield "The given placement is impossible itself: " + given_reason(known)
+    for one in best or ():
+        yield words(one, None if given is None else of_condition(given, one))
+    if given is not None and best is None:
+        yield "None of the others is possible: the given placement stays."
+
+
+def bound_words(settings: LayoutSettings) -> str:
+    """Why the others were not planned."""
+    if settings.plans:
+        return f"The others were not planned: at most {settings.plans} plans were asked for."
+    return (
+        f"By their bound none of the others can be the best by more than {100 * settings.margin:g} % "
+        "(coarse movements plus the least difference to a plan that was seen)."
+    )
+
+
+def ends(
+    finals: Sequence[Sequence[Final]],
+) -> tuple[Sequence[Final] | None, Sequence[Final] | None]:
+    """The given placement and the best of the others, None where there is none that is possible."""
+    possible = [own for own in finals if all(one.solved for one in own)]
+    given = next((own for own in possible if own[0].is_given), None)
+    best = next((own for own in possible if not own[0].is_given), None)
+    return given, best
+
+
+def of_condition(own: Sequence[Final], like: Final) -> Final:
+    """The one of the same condition."""
+    return next(one for one in own if one.condition == like.condition)
+
+
+def words(best: Final, given: Final | None) -> str:
+    """The best under a condition, against the given one."""
+    within = best.interval
+    text = (
+        f"Best ({best.placement.key}; {best.condition.text}): {joules(best.mean())} at the mains per cycle, "
+        f"predicted, 90 % interval {joules(within.low)} to {joules(within.high)}, "
+        f"{joules(best.spread())} between {len(best.rows)} seeds"
+    )
+    if given is None:
+        return f"{text}."
+    less, saved = best.saving(given)
+    sure = "" if saved.low > 0.0 else "; zero lies in it: it is open whether anything is saved"
+    moving = best.mean("moving_j") / given.mean("moving_j") - 1.0
+    return (
+        f"{text}; the given one {joules(given.mean())}. It saves {joules(less)}, "
+        f"{percent(less / given.mean()).lstrip('+')} "
+        f"(90 % interval {joules(saved.low)} to {joules(saved.high)}{sure}); of the movements alone "
+        f"{percent(moving)}. A cycle takes {best.mean('duration_s'):.2f} s instead of "
+        f"{given.mean('duration_s'):.2f} s."
+    )
+
+
+def reasons(impossible: Sequence[Known]) -> str:
+    """Kinds with their counts in brackets."""
+    counts = Counter(one.reason[0] for one in impossible)
+    shown = ", ".join(f"{kind} {count}" for kind, count in counts.most_common(SHOWN))
+    return f" ({shown})" if shown else ""
+
+
+def given_reason(known: Sequence[Known]) -> str:
+    """Why the given placement is impossible."""
+    return known[0].reason[1]

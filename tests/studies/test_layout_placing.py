@@ -1,0 +1,117 @@
+"""Where things stand after they were moved, judged by matrices made here, and which machines overlap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ir_description import Cell, InvalidValueError, cell_from_yaml, cell_to_yaml, load_cell
+from ir_studies.layout.freedom import Placing, Variable
+from ir_studies.layout.overlap import overlaps, separable
+
+DEMO = load_cell("demo")
+METRES = st.floats(-2.0, 2.0)
+DEGREES = st.floats(-180.0, 180.0)
+
+
+def about_vertical(degrees: float) -> np.ndarray:
+    """Rotation (3, 3)."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def moved(values: dict[str, float], carried: tuple[str, ...] = ()) -> Cell:
+    return Placing(carried).cell(DEMO, values)
+
+
+@settings(max_examples=20)  # each checks a whole cell several times
+@given(x=METRES, y=METRES, z=METRES, turn=DEGREES)
+def test_the_base_moves_along_the_axes_of_the_cell_and_turns_about_itself(
+    x: float, y: float, z: float, turn: float
+) -> None:
+    cell = moved({"base.x": x, "base.y": y, "base.z": z, "base.turn_deg": turn}, ("cabinet",))
+    np.testing.assert_allclose(cell.base_pose[:3, 3], DEMO.base_pose[:3, 3] + [x, y, z], atol=1e-12)
+    R = about_vertical(turn) @ DEMO.base_pose[:3, :3]
+    np.testing.assert_allclose(cell.base_pose[:3, :3], R, atol=1e-12)
+    seen = np.linalg.inv(DEMO.base_pose) @ DEMO.machine("cabinet").pose
+    np.testing.assert_allclose(np.linalg.inv(cell.base_pose) @ cell.machine("cabinet").pose, seen, atol=1e-9)
+    assert np.array_equal(cell.machine("gauge").pose, DEMO.machine("gauge").pose)
+
+
+@settings(max_examples=20)
+@given(x=METRES, turn=DEGREES)
+def test_stations_move_with_their_machine(x: float, turn: float) -> None:
+    cell = moved({"equipment.gauge.x": x, "equipment.gauge.turn_deg": turn})
+    machine, station = cell.machine("gauge"), cell.station("gauge_measure")
+    np.testing.assert_allclose(station.pose, machine.pose @ station.pose_in_equipment, atol=1e-12)
+    np.testing.assert_allclose(machine.pose[0, 3], DEMO.machine("gauge").pose[0, 3] + x, atol=1e-12)
+
+
+@settings(max_examples=20)
+@given(shift=st.tuples(METRES, METRES, METRES), c=DEGREES)
+def test_the_tool_keeps_its_shape_and_its_tcp(shift: tuple[float, float, float], c: float) -> None:
+    cell = moved({**{f"tool.{a}": v for a, v in zip("xyz", shift, strict=True)}, "tool.c_deg": c})
+    assert cell.tool is not None
+    assert DEMO.tool is not None
+    was = np.linalg.norm(DEMO.tool.com - DEMO.tcp[:3, 3])
+    assert np.linalg.norm(cell.tool.com - cell.tcp[:3, 3]) == pytest.approx(was, abs=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.eigvalsh(cell.tool.inertia), np.linalg.eigvalsh(DEMO.tool.inertia), rtol=1e-9
+    )
+
+
+def test_masses_scale_inertia_and_postures_count_from_those_of_the_file() -> None:
+    cell = Placing().cell(DEMO, {"park.a1_deg": 10.0}, {"gear": 10.0})
+    np.testing.assert_allclose(cell.part("gear").load.inertia * 2.0, DEMO.part("gear").load.inertia)
+    assert np.degrees(cell.park - DEMO.park) == pytest.approx([10.0, 0, 0, 0, 0, 0])
+    with pytest.raises(InvalidValueError, match="joint_a2"):
+        moved({"park.a2_deg": 170.0})
+
+
+def test_a_placement_is_written_and_read_as_it_is() -> None:
+    cell = moved(
+        {"base.x": 0.123, "base.turn_deg": 12.3, "equipment.gauge.turn_deg": -7.7, "tool.b_deg": 3.3}
+    )
+    assert cell_to_yaml(cell_from_yaml(cell_to_yaml(cell))) == cell_to_yaml(cell)
+
+
+@given(share=st.floats(0.0, 1.0))
+def test_values_are_what_people_can_set_up_and_within_the_range(share: float) -> None:
+    for variable in (Variable("base.x", -0.3, 0.7), Variable("base.turn_deg", -20.0, 11.0)):
+        value = variable.at(share)
+        assert variable.low <= value <= variable.high
+        scale = 10.0 if variable.unit == "deg" else 1000.0
+        assert value * scale == pytest.approx(round(value * scale))
+
+
+def test_machines_of_the_bundled_cells_stand_apart() -> None:
+    assert overlaps(DEMO) == set()
+
+
+def test_what_reaches_into_each_other_and_below_the_floor_is_named() -> None:
+    cell = moved({"equipment.cabinet.x": 0.5, "equipment.cabinet.y": -1.2, "equipment.gauge.z": -0.1})
+    assert overlaps(cell) == {
+        ("outfeed_belt", "cabinet"),
+        ("gauge_table", "floor"),
+    }
+
+
+@settings(max_examples=50)
+@given(
+    centre=st.tuples(*[st.floats(-3.0, 3.0)] * 3), turn=DEGREES, size=st.tuples(*[st.floats(0.1, 2.0)] * 3)
+)
+def test_boxes_are_separable_where_one_of_fifteen_axes_says_so(
+    centre: tuple[float, float, float], turn: float, size: tuple[float, float, float]
+) -> None:
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0
+    R = about_vertical(turn) @ about_vertical(30.0).T[[1, 2, 0]][:, [1, 2, 0]]
+    first, second = corners, corners * size @ R.T + centre
+    axes = [*np.eye(3), *R.T, *np.cross(np.eye(3)[:, None], R.T[None]).reshape(-1, 3)]
+    gaps = []
+    for axis in (a / np.linalg.norm(a) for a in axes if np.linalg.norm(a) > 1e-6):
+        a, b = first @ axis, second @ axis
+        gaps.append(max(a.min() - b.max(), b.min() - a.max()))
+    if abs(max(gaps)) > 1e-6:  # else they touch
+        assert separable(first, second) == (max(gaps) > 0.0)

@@ -1,0 +1,121 @@
+"""The search finds what an exhaustive one finds, gives the same again, and says what is impossible."""
+
+from __future__ import annotations
+
+import csv
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ir_description import load_cell
+from ir_studies import LayoutSettings, Means, run_layout
+from ir_studies.errors import FolderError, StoppedError
+from ir_studies.layout import Layouts
+from ir_studies.work.results import NAME
+
+WORKER = Path(__file__).with_name("fake_layout_worker.py")
+Laid = Callable[..., Layouts]
+GRID = LayoutSettings(
+    cell="demo",
+    base={"x": (-0.5, 0.5), "y": (-0.5, 0.5)},
+    method="grid",
+    steps=11,
+    keep=2,
+    seeds=2,
+    hang_after=2.0,
+)
+SPREAD = replace(GRID, method="spread", placements=120, rounds=3)
+
+
+@pytest.fixture
+def laid(tmp_path: Path) -> Laid:
+    """Runs a study with workers that plan nothing."""
+
+    def run(settings: LayoutSettings, folder: str = "out", *faults: str, **means: Any) -> Layouts:
+        command = (sys.executable, "-S", str(WORKER), str(tmp_path), *faults)
+        return run_layout(settings, tmp_path / folder, Means(2, command=command, **means))
+
+    return run
+
+
+def best_cost(found: Layouts) -> float:
+    return min(one.cost for one in found.known if math.isfinite(one.cost))
+
+
+def test_the_best_of_a_grid_is_never_left_out(laid: Laid) -> None:
+    bounded, everything = laid(GRID, "a"), laid(replace(GRID, margin=1000.0), "b")
+    planned = [sum(one.planned for one in found.known) for found in (bounded, everything)]
+    assert planned[1] == sum(math.isfinite(one.coarse) for one in everything.known) == 121 - 11
+    assert planned[0] < planned[1] / 2
+    assert best_cost(bounded) == best_cost(everything)
+
+
+def test_rounds_come_nearer_than_a_first_look(laid: Laid) -> None:
+    rounds, once = laid(SPREAD, "a"), laid(replace(SPREAD, rounds=1), "b")
+    assert best_cost(rounds) < best_cost(once)
+    assert best_cost(rounds) < 1032.0  # 1030 is the least that any can have
+
+
+def test_interrupted_hanging_and_dying_it_leaves_the_same_files(laid: Laid, tmp_path: Path) -> None:
+    whole = laid(SPREAD, "whole")
+    seen: list[int] = []
+    with pytest.raises(StoppedError):
+        laid(SPREAD, "again", progress=lambda *one: seen.append(1), stopped=lambda: len(seen) > 70)
+    lines = (tmp_path / "again" / NAME).read_bytes()
+    (tmp_path / "again" / NAME).write_bytes(lines[:-20])  # as a power loss leaves it
+    again = laid(SPREAD, "again", "die")
+    for one, other in zip(whole.files, again.files, strict=True):
+        assert one.read_bytes() == other.read_bytes(), one.name
+    assert whole.summary == again.summary
+
+
+def test_more_placements_are_added_to_a_folder_and_other_budgets_refused(laid: Laid) -> None:
+    laid(SPREAD)
+    made: list[str] = []
+    laid(replace(SPREAD, keep=3), progress=lambda phase, *_: made.append(phase))
+    assert 0 < len(made) < 100
+    with pytest.raises(FolderError, match=r"results with time_value 500.0, the settings have 100.0"):
+        laid(replace(SPREAD, time_value=100.0))
+
+
+def test_a_given_placement_that_hangs_is_cut_and_said(laid: Laid) -> None:
+    found = laid(replace(SPREAD, placements=40), "out", "hang")
+    assert found.known[0].reason == ("cut", "no answer within 2 s")
+    assert "The given placement is impossible itself: no answer within 2 s" in found.summary
+
+
+def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
+    settings = replace(SPREAD, cycle_times=(0.0, 10.0), placements=40)
+    found = laid(settings)
+    with (tmp_path / "out" / "table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * len(found.known)
+    assert {row["state"] for row in rows} == {"planned", "looked at", "impossible"}
+    assert {row["reason"] for row in rows} == {"", "out of reach"}
+    best = found.finals[1][0].placement.values
+    cell, given = load_cell(str(tmp_path / "out" / "best_1.yaml")), load_cell("demo")
+    shift = (cell.base_pose - given.base_pose)[:2, 3]
+    assert shift == pytest.approx([best["base.x"], best["base.y"]], abs=1e-12)
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "https://" not in page
+    assert "{{" not in page
+    assert "station infeed_pick is too far" in page
+    table = list(csv.DictReader(found.table.splitlines()))
+    assert [row["rank"] for row in table] == ["0", "0", "1", "1", "2", "2"]
+    least = table[2]
+    saved = float(table[0]["energy_j"]) - float(least["energy_j"])
+    assert float(least["saved_j"]) == pytest.approx(saved, abs=2e-3)
+    # robots add 10 % of the joules at most: of a difference 10 % of the difference
+    assert float(least["saved_high_j"]) == pytest.approx(1.09 * saved, rel=0.02)
+
+
+def test_where_nothing_is_possible_the_study_says_why(laid: Laid) -> None:
+    found = laid(replace(SPREAD, base={"x": (0.45, 0.5)}, placements=10, rounds=2))
+    assert found.finals[0][0].is_given
+    assert "None of the others is possible" in found.summary
+    assert "out of reach 5" in found.summary

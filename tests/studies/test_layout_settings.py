@@ -1,0 +1,71 @@
+"""A layout's settings without sense are refused with the key, its value and what it may be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ir_studies import SettingsError, read_layout, study_of
+from ir_studies.layout import EXAMPLE
+
+HEAD = "format: ir_layout/1\ncell: demo\n"
+MOVES = HEAD + "base: {x: [0, 1]}\n"
+
+
+def test_the_example_is_read_and_names_every_key() -> None:
+    settings = study_of(EXAMPLE).settings
+    for name in vars(settings):
+        assert f"\n{name}:" in EXAMPLE
+    assert len(settings.variables) == 11
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("", "format is ''"),
+        ("[]", "format is ''"),
+        ("format: ir_cell/1\n", "kind 'cell' is unknown: known are layout"),
+        ("format: ir_layout/1\n", "cell is missing"),
+        ("format: ir_layout/1\ncell: 5\n", "cell is missing"),
+        ("format: ir_layout/1\ncell: dem\nbase: {x: [0, 1]}\n", "cell: "),
+        ("format: ir_layout/1\ncell: /etc/passwd\nbase: {x: [0, 1]}\n", "cell: "),
+        (HEAD, "nothing may move"),
+        (HEAD + "base: 5\n", "base is 5: it must be names with values"),
+        (HEAD + "base: {x: 5}\n", "base: x is 5: it must be [lowest, highest]"),
+        (HEAD + "base: {x: [1, 0]}\n", "the lowest comes first"),
+        (HEAD + "base: {x: [0, .inf]}\n", "base: x is inf: it must be a number in -100 .. 100"),
+        (HEAD + "base: {w: [0, 1]}\n", "base: 'w' is unknown: known are x, y, z, turn_deg"),
+        (HEAD + "equipment: {oven: {x: [0, 1]}}\n", "equipment: 'oven' is unknown: known are infeed"),
+        (HEAD + "equipment: [gauge]\n", "equipment is ('gauge',)"),
+        (HEAD + "park: {a7_deg: [0, 1]}\n", "park: 'a7_deg' is unknown: known are a1_deg"),
+        (MOVES + "carried: gauge\n", "carried is 'gauge': it must be a list"),
+        (MOVES + "stations: [nowhere]\n", "stations: 'nowhere' is unknown"),
+        (MOVES + "payloads: {gear: [0]}\n", "payloads: gear is 0: it must be a number in 0.001 .. 2000"),
+        (MOVES + "payloads: {gear: []}\n", "make 0 conditions"),
+        (MOVES + "cycle_times: [-1]\n", "cycle_times is -1"),
+        (MOVES + "cycle_times: []\n", "make 0 conditions"),
+        (MOVES + "cycle_times: [0, 0]\n", "cycle_times names one twice"),
+        (MOVES + "method: guess\n", "method is 'guess': known are spread, grid"),
+        (MOVES + "method: grid\nsteps: 1000\npark: {a1_deg: [0, 1]}\n", "more than 100000 placements"),
+        (MOVES + "placements: 1.5\n", "placements is 1.5: it must be a whole number"),
+        (MOVES + "placements: true\n", "placements is True"),
+        (MOVES + f"placements: {10**400}\n", "placements is 1000"),
+        (MOVES + "a: &a [1]\nb: *a\n", "aliases are not read"),
+        (MOVES + "x: 2026-99-99\n", "is no YAML"),
+        ("{" * 1_500, "is no YAML"),
+        (MOVES + "#" * 1_000_001, "at most 1000000"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(content: str, said: str) -> None:
+    with pytest.raises(SettingsError) as refused:
+        study_of(content)
+    assert said in str(refused.value)
+    assert len(str(refused.value)) < 1000
+
+
+def test_a_file_is_named_in_its_refusal_and_its_cell_stands_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "layout.yaml"
+    path.write_text("format: ir_layout/1\ncell: mine.yaml\nbase: {x: [0, 1]}\n")
+    with pytest.raises(SettingsError, match=r"layout.yaml: cell: .*can't be opened"):
+        read_layout(path)
