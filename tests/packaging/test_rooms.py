@@ -15,7 +15,7 @@ ROOMS = {
     "ir_planner": (
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
         "cartesian", "regional", "trajectories", "service", "settings", "program", "store", "heard",
-        "current_cell", "certificates", "asked_states", "trips", "planner", "krl", "before_after",
+        "current_cell", "certificates", "asked_states", "trips", "planner", "krl", "before_after", "what_if",
         "node",
     ),
     "ir_description": (

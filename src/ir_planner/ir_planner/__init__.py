@@ -23,6 +23,7 @@ from ir_planner.service import ServicePlan
 from ir_planner.settings import PlannerSettings
 from ir_planner.store import StoredProgram
 from ir_planner.trajectories import OptimizationPlan, Reference
+from ir_planner.what_if import what_if
 
 __all__ = [
     "CancelledError",
@@ -56,4 +57,5 @@ __all__ = [
     "parse_goal",
     "today_of_krl",
     "tool_in_flange",
+    "what_if",
 ]
