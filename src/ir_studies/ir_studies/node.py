@@ -38,6 +38,7 @@ from ir_studies.work import Means
 
 _FEEDBACK_S = 0.2  # a person reads no faster
 _ROWS = 1000  # of the table in the result
+_LONGEST = 200  # characters of output_folder
 _END_S = 10.0  # until a study that was asked to stop has stopped
 _THREADS = 4  # the study, goals that are refused, cancelling, parameters
 
@@ -105,12 +106,12 @@ class StudiesNode(Node):
 
     def _means_of(self, goal: ServerGoalHandle) -> Means:
         """The means of a goal: progress as feedback, cancel as what stops it."""
-        own, last = self._means, [-_FEEDBACK_S]
+        own, last, said = self._means, [-_FEEDBACK_S], [""]
 
         def progress(phase: str, done: int, of: int, best: str) -> None:
             self._doing = f"{phase} {done} of {of}"
-            if time.monotonic() - last[0] >= _FEEDBACK_S or done == of:
-                last[0] = time.monotonic()
+            if time.monotonic() - last[0] >= _FEEDBACK_S or done == of or phase != said[0]:
+                last[0], said[0] = time.monotonic(), phase
                 goal.publish_feedback(RunStudy.Feedback(phase=phase, done=done, total=of, best=best))
 
         def stopped() -> bool:
@@ -124,6 +125,8 @@ class StudiesNode(Node):
 
     def _folder(self, name: str) -> Path:
         """A folder of the output, or one below it."""
+        if len(name) > _LONGEST:
+            raise SettingsError(f"output_folder has {len(name)} characters: at most {_LONGEST}")
         return self._output.inside(self._output.folders[0] / name)
 
     def _diagnose(self) -> None:

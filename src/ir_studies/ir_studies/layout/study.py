@@ -46,6 +46,8 @@ def run_layout(settings: LayoutSettings, folder: str | Path, means: Means | None
             def made(jobs: Sequence[Job], phase: str, best: str) -> None:
                 missing = [job for job in jobs if job.key not in results.rows]
                 done = len(jobs) - len(missing)
+                if missing:
+                    means.progress(phase, done, len(jobs), best)
                 for job, row in makers.rows(missing):
                     results.add(job, row)
                     done += 1

@@ -1,0 +1,169 @@
+"""A Dask cluster gives the same bytes, whatever dies in it; the long tests start real processes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ir_studies import LayoutSettings, Means, StoppedError, WorkerError, run_layout
+from ir_studies.layout import Layouts
+from ir_studies.work import cluster
+from ir_studies.work.results import NAME
+
+SETTINGS = LayoutSettings(
+    cell="demo",
+    base={"x": (-0.3, 0.3), "y": (-0.3, 0.3)},
+    stations=("infeed_pick", "gauge_measure"),
+    placements=12,
+    rounds=2,
+    keep=2,
+    seeds=1,
+)
+
+
+def test_without_dask_a_sentence_says_how_to_install_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(WorkerError, match=r'pip install "ir_studies\[cluster\]"'):
+        run_layout(SETTINGS, tmp_path, Means(scheduler="tcp://127.0.0.1:1"))
+
+
+def free_port() -> int:
+    """A port of the loopback that nobody uses now."""
+    with socket.socket() as tried:
+        tried.bind(("127.0.0.1", 0))
+        return int(tried.getsockname()[1])
+
+
+@pytest.fixture
+def processes() -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Processes of a test, which end with it."""
+    started: list[subprocess.Popen[bytes]] = []
+    yield started
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def dask(processes: list[subprocess.Popen[bytes]], folder: Path, *words: str) -> subprocess.Popen[bytes]:
+    """Starts a scheduler or a worker."""
+    command = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:]]
+    with (folder / f"{words[0]}_{len(processes)}.log").open("wb") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, start_new_session=True)
+    processes.append(process)
+    return process
+
+
+def scheduler(processes: list[subprocess.Popen[bytes]], folder: Path, wait_for: Any) -> str:
+    """Starts a scheduler; its address."""
+    port = free_port()
+    dask(processes, folder, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+
+    def answers() -> bool:
+        with socket.socket() as tried:
+            return tried.connect_ex(("127.0.0.1", port)) == 0
+
+    wait_for(answers, what="the scheduler listens")
+    return f"tcp://127.0.0.1:{port}"
+
+
+def worker(processes: list[subprocess.Popen[bytes]], folder: Path, address: str) -> subprocess.Popen[bytes]:
+    """Starts a worker of one thread, without a nanny that would start it again."""
+    words = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+    return dask(processes, folder, "worker", address, *words)
+
+
+def same(one: Layouts, other: Layouts) -> None:
+    assert one.summary == other.summary
+    for mine, theirs in zip(one.files, other.files, strict=True):
+        assert mine.read_bytes() == theirs.read_bytes(), mine.name
+
+
+@pytest.mark.long
+def test_two_workers_of_which_one_is_killed_half_way_give_the_same_bytes(
+    processes: list[subprocess.Popen[bytes]], tmp_path: Path, wait_for: Any
+) -> None:
+    alone = run_layout(SETTINGS, tmp_path / "alone", Means(2))
+    address = scheduler(processes, tmp_path, wait_for)
+    workers = [worker(processes, tmp_path, address) for _ in range(2)]
+    killed: list[int] = []
+    children: list[int] = []
+
+    def kill(phase: str, done: int, of: int, best: str) -> None:
+        if done == 5 and not killed:
+            children.extend(children_of(workers[0].pid))
+            os.kill(workers[0].pid, signal.SIGKILL)
+            killed.append(workers[0].wait())
+
+    found = run_layout(SETTINGS, tmp_path / "cluster", Means(scheduler=address, progress=kill))
+    assert killed == [-signal.SIGKILL]
+    same(alone, found)
+    assert children
+    wait_for(lambda: not any(map(alive, children)), what="nothing of the dead worker is left")
+
+
+@pytest.mark.long
+def test_a_local_cluster_gives_the_same_bytes_and_ends_what_it_started(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    alone = run_layout(SETTINGS, tmp_path / "alone", Means(1))
+    seen: list[int] = []
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=2, processes=True, host="127.0.0.1", dashboard_address=None
+    ) as local:
+        address = local.scheduler_address
+        stopped = Means(scheduler=address, progress=lambda *_: seen.append(1), stopped=lambda: len(seen) > 4)
+        with pytest.raises(StoppedError):
+            run_layout(SETTINGS, tmp_path / "cluster", stopped)
+        assert (tmp_path / "cluster" / NAME).read_bytes().count(b"\n") > 4
+        same(alone, run_layout(SETTINGS, tmp_path / "cluster", Means(scheduler=address)))
+        with distributed.Client(address) as client:
+            assert set(client.run(pools).values()) == {0}
+
+
+@pytest.mark.long
+def test_nobody_at_the_address_and_other_builds_are_refused(
+    processes: list[subprocess.Popen[bytes]],
+    tmp_path: Path,
+    wait_for: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(cluster, "_CONNECT_S", 2.0)
+    with pytest.raises(WorkerError, match="no Dask scheduler answers at"):
+        run_layout(SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{free_port()}"))
+    address = scheduler(processes, tmp_path, wait_for)
+    with pytest.raises(WorkerError, match="has no worker: start: dask worker"):
+        run_layout(SETTINGS, tmp_path / "b", Means(scheduler=address))
+    worker(processes, tmp_path, address)
+    monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)
+    monkeypatch.setattr(cluster, "computed_with", lambda: "an abacus")
+    with pytest.raises(WorkerError, match="not with an abacus"):
+        run_layout(replace(SETTINGS, placements=2), tmp_path / "c", Means(scheduler=address))
+
+
+def pools() -> int:
+    """In a worker of the cluster: how many pools it has."""
+    return len(cluster._pools)
+
+
+def children_of(pid: int) -> list[int]:
+    """Processes that a process has started."""
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for file in tasks for child in file.read_text().split()]
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs: not one that nobody has collected yet."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
