@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from ir_description.cell import BODIES_MAX, NameRegister
+from ir_description.cell import BODIES_MAX, AllowedContact, NameRegister, Station
 from ir_description.files.items import Item, Table
 from ir_description.files.mesh import (
     CELL_TRIANGLES_MAX,
@@ -17,6 +20,7 @@ from ir_description.files.mesh import (
     mesh_path,
     read_stl,
 )
+from ir_description.files.solid_reader import SolidReader, piece_names
 from ir_description.poses import pose_of, rotation_from_abc, rotation_from_matrix, rotation_from_quaternion
 from ir_description.shapes import KINDS, SIZE_MAX, Body
 from ir_msgs_py.arrays import FloatArray
@@ -56,6 +60,61 @@ class BodyReader:
         self._shapes, self._folder = shapes, folder
         self._count = self._corners = self._triangles = 0
         self._meshes: dict[tuple[str, bool], FloatArray] = {}
+        self._solids = SolidReader(folder)
+        self.pieces: dict[str, tuple[str, ...]] = {}
+        """Names of the bodies that stand for a mesh, by its name."""
+
+    def all(self, items: Iterable[Item]) -> tuple[Body, ...]:
+        """Return the bodies of a list; a mesh from CAD becomes one body for each of its convex pieces."""
+        found: list[Body] = []
+        for item in items:
+            if item.holds("mesh"):
+                found += self._divided(item)
+            else:
+                found.append(self.read(item))
+        return tuple(found)
+
+    def named(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Return names of bodies, with the pieces of a mesh instead of its name."""
+        return tuple(piece for name in names for piece in self.pieces.get(name, (name,)))
+
+    def at_pieces(self, station: Station) -> Station:
+        """Return a station whose contacts name the pieces of meshes."""
+        contacts = (
+            AllowedContact(*pair, contact.safety_distance)
+            for contact in station.allowed_contacts
+            for pair in product(self.named((contact.body_a,)), self.named((contact.body_b,)))
+        )
+        return replace(station, allowed_contacts=tuple(contacts))
+
+    def _divided(self, item: Item) -> list[Body]:
+        table = item.table(("name", "mesh", "unit"), (*POSE_KEYS, "pieces"))
+        name = table["name"].name()
+        with table["name"].blamed():
+            self._shapes.add(name)
+        solid = self._solids.read(table)
+        pose = pose_in(table)
+        names = piece_names(name, len(solid))
+        bodies = []
+        for number, (piece, vertices) in enumerate(zip(names, solid, strict=True)):
+            with table["name"].blamed():
+                if number or piece != name:
+                    self._shapes.add(piece)
+            self._counted(item, len(vertices))
+            bodies.append(Body(piece, "mesh", pose, np.zeros(3), vertices))
+        self.pieces[name] = names
+        return bodies
+
+    def _counted(self, item: Item, corners: int) -> None:
+        """Refuse what is too much."""
+        self._count += 1
+        if self._count > BODIES_MAX:
+            item.fail(f"is one body too many, a cell has at most {BODIES_MAX}")
+        self._corners += corners
+        if self._corners > CORNERS_MAX:
+            item.fail(
+                f"is one mesh too many: all have {self._corners} corners, at most {CORNERS_MAX} are taken"
+            )
 
     def read(self, item: Item) -> Body:
         """Return one body; its keys depend on its kind."""
@@ -63,9 +122,6 @@ class BodyReader:
             ("name", "kind"),
             (*POSE_KEYS, "size", "radius", "length", "file", "scale", "convex_hull", "vertices"),
         )
-        self._count += 1
-        if self._count > BODIES_MAX:
-            item.fail(f"is one body too many, a cell has at most {BODIES_MAX}")
         name = table["name"].name()
         with table["name"].blamed():
             self._shapes.add(name)
@@ -77,11 +133,7 @@ class BodyReader:
                     f"does not belong to a {kind}; its keys are {', '.join(shape) or 'only its pose'}"
                 )
         size, vertices = self._mesh(table) if kind == "mesh" else (_size(table, kind), np.zeros((0, 3)))
-        self._corners += len(vertices)
-        if self._corners > CORNERS_MAX:
-            item.fail(
-                f"is one mesh too many: all have {self._corners} corners, at most {CORNERS_MAX} are taken"
-            )
+        self._counted(item, len(vertices))
         with item.blamed():
             return Body(name, kind, pose_in(table), size, vertices)  # type: ignore[arg-type]
 

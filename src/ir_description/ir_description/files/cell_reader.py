@@ -197,7 +197,7 @@ class _CellReader:
                 with station_item.blamed():
                     station_names.add(station.name)
                 placed.append(_Placed(station_item, station))
-        return tuple(machines), placed
+        return tuple(machines), [_Placed(e.item, self._bodies.at_pieces(e.station)) for e in placed]
 
     def _check_part_stations(self, parts: tuple[Part, ...], stations: tuple[Station, ...]) -> None:
         known = dict.fromkeys(station.name for station in stations)
@@ -232,10 +232,11 @@ class _CellReader:
         bodies, pairs = _body_names(equipment, parts), []
         for item in self._list("base_contacts", 1000):
             first, second = item.list(2, 2)
-            pair = (first.name(), second.name())
-            with item.blamed():
-                check_base_contact(self._robot, *pair, bodies)
-            pairs.append(pair)
+            for name in self._bodies.named((second.name(),)):
+                pair = (first.name(), name)
+                with item.blamed():
+                    check_base_contact(self._robot, *pair, bodies)
+                pairs.append(pair)
         return tuple(pairs)
 
     def _signals(self) -> tuple[CellSignal, ...]:

@@ -30,8 +30,8 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
     table = item.table(
         ("name", "bodies"), ("pose", "zone", "states", "state", "switch", "enabled", "stations")
     )
-    read = tuple(bodies.read(body) for body in table["bodies"].list(0, BODIES_MAX))
-    states = _states(table)
+    read = bodies.all(table["bodies"].list(0, BODIES_MAX))
+    states = _states(table, bodies)
     machine = Equipment(
         name=table["name"].name(),
         pose=_pose(table),
@@ -69,11 +69,11 @@ def _zone(table: Table, bodies: tuple[Body, ...]) -> Zone:
         return Zone(kind, pose_in(zone), size)  # type: ignore[arg-type]
 
 
-def _states(table: Table) -> tuple[EquipmentState, ...]:
+def _states(table: Table, bodies: BodyReader) -> tuple[EquipmentState, ...]:
     if "states" not in table:
         return ()
     return tuple(
-        EquipmentState(name, tuple(body.name() for body in item.list(0, 1000)))
+        EquipmentState(name, bodies.named(body.name() for body in item.list(0, 1000)))
         for name, item in table["states"].pairs()
     )
 

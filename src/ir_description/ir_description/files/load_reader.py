@@ -46,7 +46,7 @@ def read_part(item: Item, link: int, shapes: NameRegister, bodies: BodyReader) -
     )
     return Part(
         load=load,
-        bodies=tuple(bodies.read(body) for body in table["bodies"].list(0, 100)) if "bodies" in table else (),
+        bodies=bodies.all(table["bodies"].list(0, 100)) if "bodies" in table else (),
         grasp=read_pose(table["grasp"]) if "grasp" in table else np.eye(4),
         station=table["station"].name() if "station" in table else "",
     )

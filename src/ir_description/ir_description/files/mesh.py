@@ -50,7 +50,7 @@ def read_regular_file(path: Path, limit: int) -> bytes:
         os.close(descriptor)
 
 
-def mesh_path(folder: Path, name: str) -> Path:
+def mesh_path(folder: Path, name: str, suffixes: tuple[str, ...] = (".stl",)) -> Path:
     """Return the path of a mesh inside the folder of its cell file; nothing leads out of it."""
     path = Path(name)
     if (
@@ -58,11 +58,11 @@ def mesh_path(folder: Path, name: str) -> Path:
         or "\\" in name
         or path.is_absolute()
         or ".." in path.parts
-        or path.suffix.lower() != ".stl"
+        or path.suffix.lower() not in suffixes
     ):
         raise InvalidValueError(
-            f"mesh file {shown(name)} must be an .stl file in the cell file's folder, named relative to it, "
-            "without '..'"
+            f"mesh file {shown(name)} must be an {' or '.join(suffixes)} file in the cell file's folder, "
+            "named relative to it, without '..'"
         )
     resolved = (folder / path).resolve()
     if not resolved.is_relative_to(folder.resolve()):
@@ -109,7 +109,7 @@ def convex_vertices(triangles: FloatArray, take_hull: bool) -> FloatArray:
     points = np.unique(triangles.reshape(-1, 3), axis=0)
     hull = _hull(points)
     volume = abs(float(np.linalg.det(triangles).sum()) / 6.0)
-    if not take_hull and not _closed(triangles):
+    if not take_hull and not is_closed(triangles):
         raise InvalidValueError(
             "the mesh is not closed (an edge does not belong to exactly two triangles); "
             "say convex_hull: true to use its hull"
@@ -138,8 +138,8 @@ def _points_of(hull: ConvexHull, points: FloatArray) -> FloatArray:
     return frozen(corners, (None, 3), "vertices")
 
 
-def _closed(triangles: FloatArray) -> bool:
-    """Whether every edge is walked once in each direction."""
+def is_closed(triangles: FloatArray) -> bool:
+    """Whether every edge of a mesh (T, 3, 3) is walked once in each direction."""
     _, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     corners = index.reshape(-1, 3)
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])

@@ -1,0 +1,134 @@
+"""A closed mesh as convex pieces that contain it, and what that costs in distance and volume.
+
+Approximate convex decomposition (CoACD, Wei et al., 2022) gives pieces. They are widened by a margin until
+every point of the mesh lies in one of them, and that is proved: a triangle lies in a convex piece where its
+corners do; one that lies in none is cut into four. So the pieces are never smaller than the mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from ir_description.files.coacd_process import decomposed
+from ir_description.files.mesh import HULL_VERTICES_MAX, is_closed
+from ir_description.files.protrusion import protrusion
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.errors import InvalidValueError
+
+MARGINS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016)
+"""Metres by which pieces are widened; the first is taken with which they contain the mesh."""
+_WIDENED = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
+"""Corners of an octahedron that contains the unit ball."""
+_CUTS = 16
+_TRIANGLES = 100_000  # that are looked at in one cut
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexPieces:
+    """vertices: corners (V, 3) [m] of each piece. margin [m]: by which they were widened at least, to contain
+    the mesh. protrusion [m]: a bound of the distance from any point of them to the solid. volume,
+    of_pieces [m^3]: of the solid, and of the pieces, what several of them share counted for each.
+    """
+
+    vertices: tuple[FloatArray, ...]
+    margin: float
+    protrusion: float
+    volume: float
+    of_pieces: float
+
+    @property
+    def sentence(self) -> str:
+        """For people."""
+        more = 100.0 * (self.of_pieces / self.volume - 1.0)
+        return (
+            f"{len(self.vertices)} convex pieces contain it, widened by {1e3 * self.margin:g} mm: "
+            f"they protrude by at most {1e3 * self.protrusion:.1f} mm, "
+            f"their volume is {more:+.1f} % of its {self.volume:.4g} m^3"
+        )
+
+
+def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
+    """At most `most` pieces that contain a mesh (T, 3, 3) [m]. Raises InvalidValueError with the reason."""
+    triangles = triangles[np.linalg.norm(_normals(triangles), axis=1) > 0.0]
+    volume = float(np.linalg.det(triangles).sum()) / 6.0
+    if not len(triangles) or not is_closed(triangles):
+        raise InvalidValueError(
+            "the mesh is not closed (an edge does not belong to exactly two triangles that agree which side "
+            "is outside): close it in CAD, or take kind: mesh with convex_hull: true"
+        )
+    if volume <= 0.0:
+        raise InvalidValueError(f"the mesh has {volume:.3g} m^3: its triangles must be seen from outside")
+    raw = [_sorted(piece) for piece in decomposed(triangles, most)]
+    for margin in MARGINS:
+        pieces = [_widened(piece, margin) for piece in raw]
+        if contains(pieces, triangles):
+            bound = protrusion(pieces, triangles)
+            total = sum(float(ConvexHull(piece).volume) for piece in pieces)
+            return ConvexPieces(tuple(pieces), margin, bound, volume, total)
+    raise InvalidValueError(
+        f"its convex pieces leave out more than {1e3 * MARGINS[-1]:g} mm of it: "
+        "give more pieces, or a simpler mesh"
+    )
+
+
+def contains(pieces: Sequence[FloatArray], triangles: FloatArray) -> bool:
+    """Whether every point of the triangles (T, 3, 3) is proved to lie in the hull of a piece (V, 3)."""
+    planes = [ConvexHull(piece).equations for piece in pieces]
+    left = triangles
+    for _ in range(_CUTS):
+        left = left[~_inside(planes, left)]
+        if not len(left):
+            return True
+        if len(left) > _TRIANGLES:
+            return False
+        left = _cut(left)
+    return False
+
+
+def _inside(planes: Sequence[FloatArray], triangles: FloatArray) -> BoolArray:
+    """Whether each triangle (T, 3, 3) lies in one piece; planes (F, 4) of each piece as Qhull gives them."""
+    found = np.zeros(len(triangles), dtype=bool)
+    for faces in planes:
+        open_ = np.flatnonzero(~found)
+        if not len(open_):
+            break
+        corners = triangles[open_]
+        near = (corners.reshape(-1, 3) @ faces[:, :3].T + faces[:, 3]).max(axis=1).reshape(-1, 3)
+        found[open_] = near.max(axis=1) <= 0.0
+    return found
+
+
+def _cut(triangles: FloatArray) -> FloatArray:
+    """Four triangles (4 T, 3, 3) instead of each, by the middles of its edges."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
+    fours = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return np.concatenate([np.stack(four, axis=1) for four in fours])
+
+
+def _widened(piece: FloatArray, margin: float) -> FloatArray:
+    """Corners (V, 3) of a convex body that contains all within `margin` m of a piece (V, 3)."""
+    try:
+        points = (piece[:, None] + margin * _WIDENED).reshape(-1, 3)
+        corners = _sorted(points[ConvexHull(points).vertices])
+    except QhullError as error:
+        raise InvalidValueError("one of its convex pieces is too thin") from error
+    if len(corners) > HULL_VERTICES_MAX:
+        raise InvalidValueError(
+            f"one of its convex pieces has {len(corners)} corners, must have at most {HULL_VERTICES_MAX}: "
+            "a coarser mesh is enough for planning"
+        )
+    return corners
+
+
+def _sorted(points: FloatArray) -> FloatArray:
+    return np.unique(points, axis=0)
+
+
+def _normals(triangles: FloatArray) -> FloatArray:
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    return np.cross(b - a, c - a)

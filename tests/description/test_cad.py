@@ -1,0 +1,346 @@
+"""Meshes from CAD as convex pieces: they contain the mesh, are repeatable, and hostile files are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import coal
+import numpy as np
+import pytest
+
+from ir_cli.main import main
+from ir_description import Body, CellFileError, cell_from_yaml, cell_to_yaml, load_cell
+from ir_description.files import coacd_process, piece_cache, solid_mesh
+from ir_description.files import convex_pieces as convex
+from ir_description.files.convex_pieces import ConvexPieces, contains
+from ir_description.files.piece_cache import pieces_of
+from ir_description.files.protrusion import protrusion, winding
+from ir_description.files.solid_mesh import triangles_from_obj
+from ir_description.shapes import point_distance
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
+
+PROFILE = np.array([(0, 0), (1, 0), (1, 0.2), (0.2, 0.2), (0.2, 0.8), (1, 0.8), (1, 1), (0, 1)])
+FACES = [
+    (0, 1, 2),
+    (0, 2, 3),
+    (0, 3, 4),
+    (0, 4, 7),
+    (4, 5, 6),
+    (4, 6, 7),
+]  # of the profile
+NOISE = 1e-9  # m: Coal's
+
+
+def c_frame() -> FloatArray:
+    """Triangles (T, 3, 3) of a press frame, 1 m high and 0.5 m wide."""
+    count = len(PROFILE)
+    low = np.column_stack([PROFILE, np.zeros(count)])
+    points = np.concatenate([low, low + np.array([0.0, 0.0, 0.5])])
+    faces = [(a, c, b) for a, b, c in FACES] + [(a + count, b + count, c + count) for a, b, c in FACES]
+    for k in range(count):
+        n = (k + 1) % count
+        faces += [(k, n, n + count), (k, n + count, k + count)]
+    return points[np.array(faces)]
+
+
+def obj_of(triangles: FloatArray, scale: float = 1000.0) -> str:
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (triangles.reshape(-1, 3) * scale).tolist()]
+    lines += [f"f {3 * k + 1}/1/1 {3 * k + 2}//2 {3 * k + 3}" for k in range(len(triangles))]
+    return "mtllib ../../../etc/passwd\n" + "\n".join(lines) + "\n"
+
+
+def gltf_of(triangles: FloatArray, uri: str) -> dict[str, object]:
+    """A glTF of the triangles, whose y is up."""
+    count = 3 * len(triangles)
+    points = triangles.reshape(-1, 3)[:, [0, 2, 1]] * (1, 1, -1)
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": count, "type": "VEC3", "min": low, "max": high}
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 12 * count}],
+        "buffers": [{"byteLength": 12 * count, "uri": uri}],
+    }
+
+
+def cell_text(line: str) -> str:
+    return f"""\
+format: ir_cell/1
+name: press
+robot: kr210_r2700_extra
+equipment:
+  - name: press
+    pose: {{xyz: [1.5, 0, 0]}}
+    bodies: [{line}]
+    states: {{there: [frame], gone: []}}
+    state: there
+    stations:
+      - name: feed
+        pose: {{xyz: [0.6, 0.5, 0.25]}}
+        allowed_contacts: [{{between: [l6, frame], safety_distance: 0.001}}]
+"""
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    folder = tmp_path_factory.mktemp("cache")
+    before = os.environ.get(piece_cache.FOLDER)
+    os.environ[piece_cache.FOLDER] = str(folder)
+    yield folder
+    if before is None:
+        del os.environ[piece_cache.FOLDER]
+    else:
+        os.environ[piece_cache.FOLDER] = before
+
+
+@pytest.fixture(scope="module")
+def divided(cache: Path) -> ConvexPieces:
+    return pieces_of(c_frame(), 32)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, cache: Path) -> Path:
+    (tmp_path / "frame.obj").write_text(obj_of(c_frame()))
+    return tmp_path
+
+
+def coal_mesh(triangles: FloatArray) -> coal.BVHModelOBBRSS:
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(triangles), 3 * len(triangles))
+    for a, b, c in triangles:
+        model.addTriangle(a, b, c)
+    model.endModel()
+    return model
+
+
+def distance(body: object, sphere: object, there: object) -> float:
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    return float(coal.distance(body, coal.Transform3s(), sphere, there, request, result))
+
+
+def test_distances_from_the_pieces_are_safe_and_as_near_as_stated(divided: ConvexPieces) -> None:
+    """Coal measures to the mesh itself; inside the solid it sees its shell, so points outside are taken."""
+    triangles, rng = c_frame(), np.random.default_rng(1)
+    mesh, sphere = coal_mesh(triangles), coal.Sphere(1e-6)
+    bodies = [Body(f"p{k}", "mesh", np.eye(4), np.zeros(3), each) for k, each in enumerate(divided.vertices)]
+    points = rng.uniform((-0.3, -0.3, -0.3), (1.3, 1.3, 0.8), (120, 3))
+    points = points[winding(triangles, points) < 0.5]
+    for point in points:
+        there = coal.Transform3s(np.eye(3), point)
+        truth = coal.distance(
+            mesh, coal.Transform3s(), sphere, there, coal.DistanceRequest(), coal.DistanceResult()
+        )
+        ours = min(point_distance(body, point) for body in bodies)
+        assert ours <= truth + 1e-6 + NOISE
+        assert truth - ours <= divided.protrusion + 2e-6
+
+
+def test_every_point_of_the_surface_lies_in_a_piece(divided: ConvexPieces) -> None:
+    triangles, rng = c_frame(), np.random.default_rng(2)
+    shares = rng.dirichlet(np.ones(3), (200, len(triangles)))
+    points = np.einsum("ntk,tkx->ntx", shares, triangles).reshape(-1, 3)
+    shapes = [coal.Convex.convexHull(_points(each), False, "") for each in divided.vertices]
+    sphere = coal.Sphere(1e-9)
+    for point in points[rng.choice(len(points), 200, replace=False)]:
+        there = coal.Transform3s(np.eye(3), point)
+        depth = [
+            coal.distance(
+                shape, coal.Transform3s(), sphere, there, coal.DistanceRequest(), coal.DistanceResult()
+            )
+            for shape in shapes
+        ]
+        assert min(depth) <= 1e-6
+
+
+def _points(vertices: FloatArray) -> coal.StdVec_Vec3s:
+    points = coal.StdVec_Vec3s()
+    points.extend(list(vertices))
+    return points
+
+
+def test_what_is_stated_is_so(divided: ConvexPieces) -> None:
+    assert 2 <= len(divided.vertices) <= 32
+    assert divided.volume == pytest.approx(0.26, abs=1e-9)
+    assert 0.26 < divided.of_pieces < 0.28
+    assert divided.margin <= divided.protrusion < 0.03
+    assert "convex pieces contain it, widened by 0.5 mm" in divided.sentence
+
+
+def test_the_same_mesh_gives_the_same_pieces_and_is_divided_once(
+    divided: ConvexPieces, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = list((cache / "pieces").glob("*.npz"))
+    assert kept
+    monkeypatch.setattr(coacd_process, "find_spec", lambda name: None)
+    again = pieces_of(c_frame(), 32)
+    for a, b in zip(divided.vertices, again.vertices, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert again.sentence == divided.sentence
+    with pytest.raises(InvalidValueError, match=r"ir_description\[cad\]"):
+        pieces_of(2.0 * c_frame(), 32)  # another mesh
+
+
+@pytest.mark.long
+def test_dividing_again_gives_the_same_bytes(divided: ConvexPieces) -> None:
+    from ir_description.files.convex_pieces import convex_pieces
+
+    for a, b in zip(divided.vertices, convex_pieces(c_frame(), 32).vertices, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_broken_cache_is_not_believed(
+    divided: ConvexPieces, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(piece_cache, "convex_pieces", lambda triangles, most: divided)
+    for content in (b"", b"PK\x03\x04 nothing"):
+        for path in (cache / "pieces").glob("*.npz"):
+            path.write_bytes(content)
+        assert pieces_of(c_frame(), 32) is divided
+    monkeypatch.setattr(convex, "_CUTS", 3)
+    small = ConvexPieces(tuple(0.5 * each for each in divided.vertices), 0.0, 0.0, 1.0, 1.0)
+    for path in (cache / "pieces").glob("*.npz"):
+        piece_cache._write(path, small)  # smaller than the mesh
+    assert pieces_of(c_frame(), 32) is divided
+
+
+def test_a_machine_is_one_line_of_a_cell(folder: Path, divided: ConvexPieces) -> None:
+    path = folder / "press.yaml"
+    path.write_text(cell_text("{name: frame, mesh: frame.obj, unit: mm, xyz: [0, 0, 0.1]}"))
+    cell = load_cell(path)
+    names = [body.name for body in cell.machine("press").bodies]
+    assert names == [f"frame.{k}" for k in range(1, len(divided.vertices) + 1)]
+    assert [contact.body_b for contact in cell.station("feed").allowed_contacts] == names
+    assert list(cell.machine("press").states[0].bodies) == names
+    written = cell_to_yaml(cell)
+    assert cell_to_yaml(cell_from_yaml(written)) == written
+
+
+def test_gltf_stands_upright_and_takes_buffers_of_its_folder_only(
+    folder: Path, divided: ConvexPieces
+) -> None:
+    triangles = c_frame()
+    points = (triangles.reshape(-1, 3)[:, [0, 2, 1]] * (1, 1, -1)).astype("<f4")
+    (folder / "frame.bin").write_bytes(points.tobytes())
+    outside = folder.parent / "outside.bin"
+    outside.write_bytes(points.tobytes())
+    (folder / "link.bin").symlink_to(outside)
+    gltf = folder / "frame.gltf"
+    gltf.write_text(json.dumps(gltf_of(triangles, "frame.bin")))
+    read = solid_mesh.read_solid(folder, "frame.gltf").triangles
+    np.testing.assert_allclose(read, triangles, atol=1e-6)
+    for uri in (
+        "../outside.bin",
+        "link.bin",
+        str(outside),
+        "http://127.0.0.1/frame.bin",
+        "file:///etc/passwd",
+    ):
+        gltf.write_text(json.dumps(gltf_of(triangles, uri)))
+        with pytest.raises(InvalidValueError, match="folder"):
+            solid_mesh.read_solid(folder, "frame.gltf")
+    for broken in (
+        "",
+        "[]",
+        "{}",
+        '{"buffers": 7}',
+        json.dumps({**gltf_of(triangles, "frame.bin"), "accessors": []}),
+    ):
+        gltf.write_text(broken)
+        with pytest.raises(InvalidValueError, match="glTF"):
+            solid_mesh.read_solid(folder, "frame.gltf")
+
+
+CUBE = c_frame()
+OPEN, NAN = CUBE[:-1], np.where(np.arange(3) == 0, np.nan, CUBE)
+
+
+@pytest.mark.parametrize(
+    ("line", "content", "sentence"),
+    [
+        ("mesh: x.obj, unit: mm", obj_of(OPEN), "is not closed"),
+        ("mesh: x.obj, unit: mm", obj_of(np.concatenate([CUBE, CUBE[:1]])), "is not closed"),
+        ("mesh: x.obj, unit: mm", obj_of(CUBE[:, ::-1]), "seen from outside"),
+        ("mesh: x.obj, unit: mm", obj_of(NAN), "not finite"),
+        ("mesh: x.obj, unit: m", obj_of(CUBE), "is its unit another"),
+        ("mesh: x.obj", obj_of(CUBE), "has no unit"),
+        ("mesh: x.obj, unit: miles", obj_of(CUBE), "must be one of"),
+        ("mesh: x.obj, unit: mm, pieces: 0", obj_of(CUBE), "pieces is 0"),
+        ("mesh: x.obj, unit: mm, kind: mesh", obj_of(CUBE), "unknown key"),
+        ("mesh: ../x.obj, unit: mm", obj_of(CUBE), "without '..'"),
+        ("mesh: /etc/passwd, unit: mm", "", "must be an .stl or .obj"),
+        ("mesh: y.obj, unit: mm", "", "can't be opened"),
+        ("mesh: x.obj, unit: mm", "", "no faces"),
+        ("mesh: x.obj, unit: mm", "v 0 0 0\nf 1 2 3\n", "line 2 of the OBJ"),
+        ("mesh: x.obj, unit: mm", "v 0 zero 0\n", "line 1 of the OBJ"),
+        ("mesh: x.obj, unit: mm", "v 0 0\n", "line 1 of the OBJ"),
+        ("mesh: x.glb, unit: m", "glTF", "can't be read"),
+        ("mesh: x.stl, unit: m", "solid", "0 triangles"),
+    ],
+)
+def test_what_is_no_machine_is_refused_by_a_sentence_at_its_line(
+    line: str, content: str, sentence: str, tmp_path: Path, cache: Path
+) -> None:
+    for suffix in ("obj", "glb", "stl"):
+        (tmp_path / f"x.{suffix}").write_text(content)
+    path = tmp_path / "press.yaml"
+    path.write_text(cell_text(f"{{name: frame, {line}}}"))
+    with pytest.raises(CellFileError, match=r"press\.yaml:7") as refused:
+        load_cell(path)
+    assert sentence in str(refused.value)
+
+
+def test_a_mesh_is_named_in_a_file_and_is_a_regular_one(tmp_path: Path) -> None:
+    with pytest.raises(CellFileError, match="this is a text"):
+        cell_from_yaml(cell_text("{name: frame, mesh: frame.obj, unit: mm}"))
+    os.mkfifo(tmp_path / "pipe.obj")
+    (tmp_path / "link.stl").symlink_to("/etc/passwd")
+    for name in ("pipe.obj", "link.stl"):
+        with pytest.raises(InvalidValueError):
+            solid_mesh.read_solid(tmp_path, name)
+
+
+def test_a_division_that_crashes_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(coacd_process, "PROGRAM", "import os; os.kill(os.getpid(), 11)")
+    with pytest.raises(InvalidValueError, match="code -11"):
+        coacd_process.decomposed(c_frame(), 4)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_containment_is_not_claimed_where_a_gap_is_left(gap: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(convex, "_CUTS", 11)  # until its pieces are as small as the margin
+    box = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    halves = [box * (0.5 - gap / 2.0, 1, 1), box * (0.5 - gap / 2.0, 1, 1) + (0.5 + gap / 2.0, 0, 0)]
+    wide = [1.005 * (each - each.mean(axis=0)) + each.mean(axis=0) for each in halves]
+    triangles = np.random.default_rng(3).uniform(0.05, 0.95, (4, 3, 3))
+    assert contains(wide, triangles) == (gap == 0.0)
+
+
+def test_the_bound_of_the_protrusion_holds_and_is_near() -> None:
+    triangles = c_frame()
+    box = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 0.5)])
+    bound = protrusion([box], triangles)  # the farthest point is in the middle of the opening
+    assert 0.3 <= bound <= 1.1 * 0.3 + 0.02
+    assert len(triangles_from_obj(obj_of(triangles).encode())) == len(triangles)
+
+
+def test_ir_cell_import_gives_the_line_to_paste(
+    folder: Path, divided: ConvexPieces, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["cell", "import", str(folder / "frame.obj"), "--unit", "mm"]) == 0
+    line, stated = capsys.readouterr().out.splitlines()
+    assert line == "- {name: frame, mesh: frame.obj, unit: mm}"
+    assert "convex pieces contain it" in stated
+    assert main(["cell", "import", str(folder / "frame.obj"), "--unit", "m"]) == 2
+    assert "is its unit another" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["cell", "import", str(folder / "frame.obj")])
+    assert "--unit" in capsys.readouterr().err
