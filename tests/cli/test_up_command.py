@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from rclpy.node import Node
 
-from ir_cli import up_command
+from ir_cli import alone
 from ir_cli.errors import CommandError
 from ir_cli.main import main
 from ir_cli.node_parameters import given_parameters
@@ -167,8 +167,8 @@ def ros_discovery_range() -> str:
 
 def test_nodes_that_are_there_already_are_listed(ros_context, ros_executor, monkeypatch) -> None:
     ros_executor.add_node(Node("ir_planner", context=ros_context, namespace="cell_7"))
-    monkeypatch.setattr(up_command, "DISCOVERY_SECONDS", 60.0)  # it ends as soon as they are seen
-    with pytest.raises(CommandError, match=r"there already: /cell_7/ir_planner\. .*another --namespace"):
-        up_command._refuse_beside("/cell_7")
-    monkeypatch.setattr(up_command, "DISCOVERY_SECONDS", 0.1)
-    up_command._refuse_beside("/cell_8")
+    monkeypatch.setattr(alone, "DISCOVERY_SECONDS", 60.0)  # it ends as soon as they are seen
+    with pytest.raises(CommandError, match=r"there already: /cell_7/ir_planner\. .*or --namespace"):
+        alone.refuse_beside("/cell_7")
+    monkeypatch.setattr(alone, "DISCOVERY_SECONDS", 0.1)
+    alone.refuse_beside("/cell_8")

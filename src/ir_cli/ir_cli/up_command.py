@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from pathlib import Path
@@ -14,15 +13,14 @@ from rclpy.validate_namespace import validate_namespace
 
 from ir_description import Cell, load_cell
 from ir_msgs_py.namespaces import NODES
-from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.network import DOMAIN, MOST_DOMAIN
 
+from .alone import alone
 from .environment import apply
 from .errors import CommandError
 from .node_parameters import given_parameters
 from .node_settings import parameters_of
 from .nodes import cell_nodes
-from .only_one import claim
 from .ports import TCP, UDP, free_port, is_free
 from .processes import NodeProcesses
 
@@ -30,9 +28,6 @@ Given = dict[str, dict[str, Any]]
 """Parameters of the nodes by node and name."""
 LOOK_SECONDS = 0.5
 """Between two looks at the processes: a node that ended is reported within this."""
-DISCOVERY_SECONDS = 1.0
-"""For nodes that are there already to be seen; discovery on one machine takes tenths of a second."""
-POLL_SECONDS = 0.05
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -62,16 +57,11 @@ def run_up(arguments: argparse.Namespace) -> int:
     cell = load_cell(arguments.cell)
     if arguments.domain is not None:
         apply({DOMAIN: str(arguments.domain)})
-    held = claim(os.environ.get(DOMAIN, ""), namespace)
-    try:
+    with alone(namespace):
         return _run(arguments, namespace, cell, parameters)
-    finally:
-        if held is not None:
-            held.close()
 
 
 def _run(arguments: argparse.Namespace, namespace: str, cell: Cell, parameters: Given) -> int:
-    _refuse_beside(namespace)
     for line in choose_ports(parameters):
         sys.stdout.write(f"{line}\n")
     planner, driver, runner, recorder = (parameters[name] for name in NODES)
@@ -116,20 +106,6 @@ def choose_ports(parameters: dict[str, dict[str, Any]]) -> list[str]:
             taker[name] = found
         lines.append(f"{what} port {found}: {port} is taken")
     return lines
-
-
-def _refuse_beside(namespace: str) -> None:
-    """CommandError with a list where nodes of the same names are in the graph."""
-    names = {f"{namespace}/{name}" for name in NODES}
-    with Client(node_name="ir_up") as client:
-        deadline, there = time.monotonic() + DISCOVERY_SECONDS, list[str]()
-        while not there and time.monotonic() < deadline:
-            time.sleep(POLL_SECONDS)
-            there = sorted(names & set(client.graph.nodes()))
-    if there:
-        raise CommandError(
-            f"there already: {', '.join(there)}. End them, or choose another --namespace or --domain"
-        )
 
 
 def absolute_namespace(namespace: str) -> str:

@@ -27,9 +27,12 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(arguments: argparse.Namespace) -> int:
     """Run the demonstration; 0 only when every step and every check of the recording held."""
     apply(own_domain())
+    from ir_cli.alone import alone
+
     from .story import Demonstration
 
     words = (arguments.cell, arguments.out, arguments.seed, arguments.plant)
-    outcome = Demonstration(*words, Progress()).run()
+    with alone(""):
+        outcome = Demonstration(*words, Progress()).run()
     sys.stdout.write(outcome.text() + "\n")
     return 0 if outcome.ok else 1

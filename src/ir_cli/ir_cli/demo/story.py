@@ -61,7 +61,8 @@ class Demonstration:
         self._cell = with_short_pauses(full, LONGEST_PAUSE)
         self._options = PlanOptions(seed=seed)
         self._link = LinkSettings(wake_port=free_port(UDP))
-        self._loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
+        loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
+        self._loads = loads if full.robot.controller.has_table else ()
 
     def run(self) -> Outcome:
         """Start the nodes, run the story, stop the nodes, examine the recording."""
@@ -133,6 +134,9 @@ class Demonstration:
         return plan
 
     def _tour(self, client: Client) -> None:
+        """Where the controller's modes are known; without a table there is none to rest in."""
+        if not self._loads:
+            return
         self._progress.begin("visit the power modes at machine home")
         tour(client, PowerWatch(client), self._loads, TOUR_STAY, self._wake, self._progress.update)
         self._progress.end("motors, brakes, Bus Power Off, hibernation, with and without the tool")

@@ -23,6 +23,7 @@ from ir_sim_driver.plant.plant_parameters import (
 )
 
 TYPICAL = "typical"
+UNMARKED = "L"  # of figures of a controller whose table nobody has: known least
 SPREAD: Mapping[str, float] = {"H": 0.01, "M": 0.05, "L": 0.2}
 """Standard deviation of a figure by its confidence mark, as a share of the figure."""
 CUT = 2.5
@@ -113,6 +114,11 @@ def _robot(robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> RobotMod
     )
 
 
+def _switching(nominal: Plant, n: int) -> float:
+    """Watts of each of n drives that are up, of those that the data give all of them."""
+    return min(SWITCHING, nominal.watts.drives / n)
+
+
 def _drives(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> DriveFigures:
     n, known = robot.n, nominal.drives
     copper = known.copper * draw.mark(marks["drives.copper_loss_w_per_nm2"], n)
@@ -123,7 +129,7 @@ def _drives(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _
         torque_constant=known.torque_constant * draw.mark("L", n),
         copper=copper * (1.0 - INVERTER_SHARE),
         inverter=INVERTER_SHARE * 50.0 / current * draw.mark("L", n),
-        switching=SWITCHING * draw.mark("L", n),
+        switching=_switching(nominal, n) * draw.mark("L", n),
         iron_linear=IRON[0] * size * draw.mark("L", n),
         iron_square=IRON[1] * size * draw.mark("L", n),
     )
@@ -151,23 +157,23 @@ def _gears(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _D
 def _link(nominal: Plant, data: PowerData, marks: Mapping[str, str], draw: _Draw) -> LinkFigures:
     threshold = float(draw.by(THRESHOLDS)[0])
     return LinkFigures(
-        capacitance=nominal.link.capacitance * draw.one(marks["dc_link.capacitance_f"]),
+        capacitance=nominal.link.capacitance * draw.one(marks.get("dc_link.capacitance_f", UNMARKED)),
         mains=nominal.link.mains * float(draw.by(SUPPLY)[0]),
         chopper_on=data.dc_link.chopper_on * threshold,
         chopper_off=data.dc_link.chopper_off * threshold,
-        resistor=nominal.link.resistor * draw.one(marks["dc_link.brake_resistor_ohm"]),
+        resistor=nominal.link.resistor * draw.one(marks.get("dc_link.brake_resistor_ohm", UNMARKED)),
         rectifier_drop=RECTIFIER[0] * draw.one("L"),
         rectifier_resistance=RECTIFIER[1] * draw.one("L"),
     )
 
 
 def _watts(nominal: Plant, marks: Mapping[str, str], n: int, draw: _Draw) -> StandingWatts:
-    known = nominal.watts
+    known, switching = nominal.watts, n * _switching(nominal, n)
     return StandingWatts(
         {
-            mode: watts * draw.one(marks[f"modes.{mode.name}.controller_w"])
+            mode: watts * draw.one(marks.get(f"modes.{mode.name}.controller_w", UNMARKED))
             for mode, watts in known.controller.items()
         },
-        known.drives * draw.one(marks["drives_and_brake_release_w"]) - n * SWITCHING,
+        known.drives * draw.one(marks.get("drives_and_brake_release_w", UNMARKED)) - switching,
         draw.one("M"),
     )
