@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
+from ir_msgs_py.one_sided import one_sided
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.report import report_html
 from ir_recorder.report.headline import source, tiles, verdict
@@ -48,3 +51,9 @@ def test_pauses_are_in_the_headline(analysis: Analysis) -> None:
     shown = tiles(analysis)
     for name in ("movements", "pauses", "waiting between steps"):
         assert f"<span>{name}</span>" in shown
+
+
+@pytest.mark.parametrize(("low", "said"), [(100.0, True), (98.0, True), (90.0, False)])
+def test_a_value_at_the_lower_end_of_its_interval_says_why(low: float, said: bool) -> None:
+    assert bool(one_sided(100.0, low, 120.0)) is said
+    assert one_sided(100.0, 100.0, 100.0) == ""

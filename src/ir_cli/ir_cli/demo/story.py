@@ -22,6 +22,7 @@ from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.one_sided import one_sided
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.answers import ProgramPlan
 from ir_msgs_py.ros.client import Client
@@ -124,10 +125,12 @@ class Demonstration:
         )
         report = plan.report
         proof = "certified" if report.certified else "NOT certified"
+        why = one_sided(report.energy, report.energy_low, report.energy_high)
+        why = f", {why}" if why else ""
         self._progress.end(
             f"{len(plan.movements)} steps, {report.duration:.1f} s, "
             f"predicted {report.energy / 1000.0:.1f} kJ "
-            f"(90 %: {report.energy_low / 1000.0:.1f} to {report.energy_high / 1000.0:.1f} kJ), "
+            f"(90 %: {report.energy_low / 1000.0:.1f} to {report.energy_high / 1000.0:.1f} kJ{why}), "
             f"clearance {report.min_clearance * 1000.0:.0f} mm, "
             f"{proof} ({plan.info.planning_time:.2f} s of planning)"
         )

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from ir_msgs_py.one_sided import one_sided
 from ir_msgs_py.report import TrajectoryReport
 
 from .asking import (
@@ -84,7 +85,8 @@ def predicted(report: TrajectoryReport) -> str:
     """The interval of an energy, and what it follows from."""
     low, high = report.energy_low, report.energy_high
     within = f"{low:.0f} to {high:.0f} J" if high < 1e5 else f"{low / 1e3:.1f} to {high / 1e3:.1f} kJ"
-    return f"90 % interval {within} by {report.power_parameters}"
+    why = one_sided(report.energy, low, high)
+    return f"90 % interval {within} by {report.power_parameters}{f', {why}' if why else ''}"
 
 
 def sentence_of(report: TrajectoryReport) -> str:

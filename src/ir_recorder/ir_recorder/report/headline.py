@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
+from ir_msgs_py.one_sided import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.report.costs import NAMES, Costs
@@ -127,7 +128,10 @@ def _planned(analysis: Analysis) -> list[Tile]:
         if found is None:
             continue
         spread = f"90 % interval {joules(within[0])} to {joules(within[1])}" if within is not None else ""
-        tiles.append(Tile(name, joules(found.energy), (f"in {seconds(found.seconds)}, predicted", spread)))
+        why = _says(one_sided(found.energy, *within)) if within is not None else ""
+        tiles.append(
+            Tile(name, joules(found.energy), (f"in {seconds(found.seconds)}, predicted", spread, why))
+        )
     near = millimetres(planned_clearance(steps))
     return [*tiles, Tile("least clearance", near, ("planned, without pairs that may touch",))]
 
@@ -147,17 +151,33 @@ def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
             f"{number(whole.energy / 3600.0, 'Wh')} in {seconds(whole.seconds)}",
             f"predicted {joules(planned)}{_within(analysis)}, "
             f"{_against(whole.energy, planned, analysis.recording.origin)}",
+            _why(analysis),
         ),
     )
 
 
 def _within(analysis: Analysis) -> str:
     """The interval of what was predicted: the sum of the steps', as what is unsure is so in all alike."""
+    _, low, high = _sums(analysis)
+    return f" (90 % interval {joules(low)} to {joules(high)})" if high > 0.0 else ""
+
+
+def _why(analysis: Analysis) -> str:
+    """Why the interval of what was predicted is one-sided, where it is."""
+    return _says(one_sided(*_sums(analysis)))
+
+
+def _says(why: str) -> str:
+    return f"the interval lies {why}" if why else ""
+
+
+def _sums(analysis: Analysis) -> tuple[float, float, float]:
     reports = [result.step.movement.report for result in analysis.steps]
-    high = sum(report.energy_high for report in reports)
-    if high <= 0.0:
-        return ""
-    return f" (90 % interval {joules(sum(report.energy_low for report in reports))} to {joules(high)})"
+    return (
+        sum(report.energy for report in reports),
+        sum(report.energy_low for report in reports),
+        sum(report.energy_high for report in reports),
+    )
 
 
 def _unshortened(program: ProgramTotals) -> Tile | None:
