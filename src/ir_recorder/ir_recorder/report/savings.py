@@ -31,8 +31,8 @@ def savings_section(analysis: Analysis) -> str:
     return (
         '<section id="savings"><h2>What the program saves</h2>'
         '<p class="hint">Predicted energies at the mains, over the same seconds, with the 90 % interval of '
-        "what is saved; nothing here is simulated or measured. Losses that the data sheet puts at zero can only "
-        "add; where the common program has more of them, the interval lies mostly above the value.</p>"
+        "what is saved; nothing here is simulated or measured. Losses that the data sheet puts at zero can "
+        "only add; where the common program has more of them, the interval lies mostly above the value.</p>"
         f"{table(heads, cells, 'What the program saves')}"
         f"<details><summary>In words</summary><p>{text(savings.sentence)}; program "
         f"{text(savings.program_id)}.</p></details></section>"

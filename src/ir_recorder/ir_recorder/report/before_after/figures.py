@@ -114,8 +114,8 @@ def assumptions(found: BeforeAfter, costs: Costs) -> str:
         "All energies are predicted at the mains by the same model, with 90 % intervals from the uncertainty "
         f"of the power parameters ({parameters}). What is saved has an interval of its own: the same drawn "
         "robots drive both programs. Intervals by the data sheet lie mostly above their values: losses that "
-        "it puts at zero can only add. A year has as many cycles for every program as today's can make, in the "
-        "column for the line as many as the line asks for; what is left of a shift counts nothing."
+        "it puts at zero can only add. A year has as many cycles for every program as today's can make, in "
+        "the column for the line as many as the line asks for; what is left of a shift counts nothing."
     )
     return f'<p class="hint">{text(said)}</p><p class="hint">{text(", ".join(items))}.</p>'
 
