@@ -20,7 +20,7 @@ from _truth_section import Asked, Found
 
 from ir_cli.excitation.programme import Asked as Excitation
 from ir_cli.excitation.programme import Programme, plan_programme
-from ir_cli.excitation.simulated_run import SimulatedRun
+from ir_studies.simulated_run import SimulatedRun
 from ir_description import Cell, Load, PowerParameters, data_sheet, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ir_studies import arena, layout
+from ir_studies import arena, layout, statistics
 from ir_studies.arena.settings import arena_settings
 from ir_studies.errors import SettingsError
 from ir_studies.work import Means, Placed, beside, read_text
@@ -64,6 +64,11 @@ def _run_layout(settings: layout.LayoutSettings, folder: Path, means: Means) -> 
     return Answer(found.summary, found.files, found.table)
 
 
+def _run_statistics(settings: statistics.StatisticsSettings, folder: Path, means: Means) -> Answer:
+    finished = statistics.run_statistics(settings, folder, means)
+    return Answer(finished.summary, finished.files, finished.summed_up)
+
+
 KINDS = {
     "layout": Kind(
         "where robot, machines, posture and tool should stand for least energy",
@@ -72,6 +77,12 @@ KINDS = {
         _run_layout,
     ),
     "arena": Kind("planners against each other", arena.EXAMPLE, arena_settings, _run_arena),
+    "statistics": Kind(
+        "time and energy over random movements, synchronous and asynchronous, predicted and measured",
+        statistics.EXAMPLE,
+        statistics.statistics_settings,
+        _run_statistics,
+    ),
 }
 
 

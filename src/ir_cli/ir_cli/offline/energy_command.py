@@ -200,8 +200,9 @@ def run_excite(arguments: argparse.Namespace) -> int:
 
 def run_drive(arguments: argparse.Namespace) -> int:
     """Drive a programme as fast as the plant can be stepped, write its readings, print where they are."""
+    from ir_studies.simulated_run import driven
+
     from ..excitation.programme_file import read_programme
-    from ..excitation.simulated_run import driven
     from .trace_file import write_readings
 
     cell, steps = read_programme(arguments.folder)

@@ -52,6 +52,9 @@ class Backend(Protocol):
     def saturated(self) -> bool:
         """Whether a motor could not give the torque that the command of the last step needed."""
 
+    def close(self) -> None:
+        """Let go of what this process holds for it."""
+
     def reset(self, q: FloatArray) -> None:
         """Stand still at q (n,), commanded to stay there."""
 

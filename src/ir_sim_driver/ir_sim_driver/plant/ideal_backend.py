@@ -34,6 +34,9 @@ class IdealBackend:
         self._driven: list[bool] = []
         self.reset(np.array(robot.machine_home))
 
+    def close(self) -> None:
+        """Nothing is held."""
+
     def reset(self, q: FloatArray) -> None:
         """Stand still at q."""
         self._settle()

@@ -18,6 +18,7 @@ READY = {"ready": True}
 MAKERS = {
     "arena": "ir_studies.arena.maker",
     "layout": "ir_studies.layout.maker",
+    "statistics": "ir_studies.statistics.maker",
 }
 """Modules by kind of study; each has `maker(settings)`, which loads what is loaded once and returns what
 makes a row from the words of a job."""

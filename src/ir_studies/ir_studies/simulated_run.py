@@ -5,22 +5,43 @@ trace.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 
-from ir_cli.errors import CommandError
-from ir_cli.excitation.programme import Step
 from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError, ErrorCode, TrajectoryGoal, carried, make_simulation
+from ir_studies.errors import DrivingError
 
 READING = 0.01  # s between readings of positions and meter
 _LATEST = 2.0  # times of a movement's duration until it must have ended
 _CHANGE = 600.0  # s until a mode must have come
+_REST, _LONGEST_REST = 0.5, 20.0  # s between looks at the capacitor, and until it counts as empty
 _BITS = {Mode.STAND_ON_BRAKES: "drives_off", Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib"}
+
+
+class Step(Protocol):
+    """Drive a trajectory with a load, or stand for some seconds in a mode."""
+
+    @property
+    def load(self) -> str:
+        """As "gripper+part"."""
+
+    @property
+    def trajectory(self) -> JointTrajectory | None:
+        """None: stand."""
+
+    @property
+    def mode(self) -> str:
+        """Name of the power mode."""
+
+    @property
+    def seconds(self) -> float:
+        """How long to stand."""
 
 
 class SimulatedRun:
@@ -45,6 +66,22 @@ class SimulatedRun:
         else:
             self._stay(Mode[step.mode], step.seconds)
 
+    def close(self) -> None:
+        """Let go of the physics server: tens of megabytes."""
+        self.simulation.backend.close()
+
+    def place(self, q: FloatArray) -> None:
+        """Stand at q (n,) as if driven there long ago: the loops have settled, the capacitor is empty."""
+        simulation, mains = self.simulation, self.simulation.mains
+        if simulation.stopped:
+            simulation.recover()
+        simulation.backend.reset(q)
+        simulation.executor.hold(q)
+        latest = simulation.time + _LONGEST_REST
+        self.advance(_REST)
+        while mains.meter.reading().capacitor_energy > 0.0 and simulation.time < latest:
+            self.advance(_REST)
+
     def hold(self, load: str) -> None:
         """Carry something else from now on: tool and parts are taken and put back by hand."""
         simulation = self.simulation
@@ -53,14 +90,14 @@ class SimulatedRun:
             simulation.cell_watch.stand_in(self.cell, simulation.load)
 
     def drive(self, trajectory: JointTrajectory) -> tuple[float, float]:
-        """Drive a trajectory; when it began and should have ended [s]. CommandError where it fails."""
+        """Drive a trajectory; when it began and should have ended [s]. DrivingError where it fails."""
         simulation = self.simulation
         began = simulation.time
         simulation.execute(simulation.vet(TrajectoryGoal(trajectory), 0), 0)
         self._until(lambda: not simulation.executor.active, _LATEST * trajectory.duration + 1.0)
         for outcome in simulation.take_outcomes():
             if outcome.code is not ErrorCode.SUCCESSFUL:
-                raise CommandError(f"{simulation.plant.name}: {outcome.sentence}")
+                raise DrivingError(f"{simulation.plant.name}: {outcome.sentence}")
         return began, began + trajectory.duration
 
     def advance(self, seconds: float) -> None:
@@ -107,15 +144,15 @@ class SimulatedRun:
         modes = self.simulation.modes
         self._until(lambda: modes.mode is mode, _CHANGE)
         if modes.mode is not mode:
-            raise CommandError(f"{mode.name} has not come within {_CHANGE:g} s, it is {modes.mode.name}")
+            raise DrivingError(f"{mode.name} has not come within {_CHANGE:g} s, it is {modes.mode.name}")
 
 
 def driven(cell: Cell, plant: str, steps: Sequence[Step]) -> Trace:
-    """What is read while the plant drives these steps. CommandError where it can't."""
+    """What is read while the plant drives these steps. DrivingError where it can't."""
     try:
         run = SimulatedRun(cell, plant, steps[0].load)
         for step in steps:
             run.follow(step)
     except DriverError as error:
-        raise CommandError(str(error)) from error
+        raise DrivingError(str(error)) from error
     return run.trace()

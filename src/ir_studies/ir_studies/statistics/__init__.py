@@ -1,0 +1,8 @@
+"""Statistics of section VI of the paper: time and energy of movements between random places of a cell, with
+synchronous and asynchronous joints, predicted, measured directly and measured indirectly.
+"""
+
+from ir_studies.statistics.runs import Finished, run_statistics
+from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
+
+__all__ = ["EXAMPLE", "Finished", "StatisticsSettings", "run_statistics", "statistics_settings"]

@@ -1,0 +1,64 @@
+"""A drawing of comparisons: a line for each, a dot per pair, a bar for the mean's interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ir_recorder.report.bars import tick_step
+from ir_recorder.report.words import text
+from ir_studies.statistics.figures import Comparison
+
+WIDTH, LINE = 720.0, 34.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 170.0, 20.0, 8.0, 34.0
+_INSIDE = (2.0, 98.0)  # percentiles that the axis holds; what lies outside is drawn at its edge
+_SPREAD = 9.0  # up and down that dots are moved apart
+
+
+def dots(comparisons: Sequence[Comparison], title: str) -> str:
+    """SVG; "" where nothing was compared."""
+    kept = [each for each in comparisons if each.count]
+    if not kept:
+        return ""
+    every = np.concatenate([each.values for each in kept])
+    low, high = np.percentile(every, _INSIDE)
+    low, high = min(float(low), -1.0), max(float(high), 1.0)
+    height = _TOP + LINE * len(kept) + _BOTTOM
+
+    def at(value: float) -> float:
+        inside = min(max(value, low), high)
+        return _LEFT + (inside - low) / (high - low) * (WIDTH - _LEFT - _RIGHT)
+
+    lines = "".join(_line(each, _TOP + LINE * (k + 0.5), at) for k, each in enumerate(kept))
+    said = "; ".join(f"{each.name}: mean {each.mean.value:+.1f} %" for each in kept)
+    return (
+        f'<div class="figure scroll"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" role="img" '
+        f'aria-label="{text(title)}: {text(said)}">{_axis(low, high, height, at)}{lines}</svg></div>'
+    )
+
+
+def _axis(low: float, high: float, height: float, at: Callable[[float], float]) -> str:
+    step = tick_step(high - low)
+    found = []
+    for k in range(math.ceil(low / step), math.floor(high / step) + 1):
+        x = at(k * step)
+        kind = "zero" if k == 0 else "grid"
+        bottom = height - _BOTTOM
+        found.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP:g}" y2="{bottom:g}"/>')
+        found.append(f'<text x="{x:.1f}" y="{height - 12:g}" text-anchor="middle">{k * step:+g} %</text>')
+    return "".join(found)
+
+
+def _line(each: Comparison, y: float, at: Callable[[float], float]) -> str:
+    marks = "".join(
+        f'<circle cx="{at(value):.1f}" cy="{y + _SPREAD * (2.0 * (0.618034 * k % 1.0) - 1.0):.1f}" r="2"/>'
+        for k, value in enumerate(each.values.tolist())
+    )
+    label = f'<text x="{_LEFT - 10:g}" y="{y + 4:.1f}" text-anchor="end">{text(each.name)}</text>'
+    if math.isnan(each.mean.low):
+        return label + marks
+    x, wide = at(each.mean.low), max(at(each.mean.high) - at(each.mean.low), 2.0)
+    bar = f'<rect x="{x:.1f}" y="{y - 12:.1f}" width="{wide:.1f}" height="24"/>'
+    return label + bar + marks

@@ -1,0 +1,153 @@
+"""Statistics of section VI: what is drawn, what is measured, what the figures say."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import bootstrap, ttest_1samp
+
+from ir_planner import Planner
+from ir_studies import Means, SettingsError, study_of
+from ir_studies.statistics.figures import findings_of
+from ir_studies.statistics.maker import maker
+from ir_studies.statistics.outputs import columns, page_html
+from ir_studies.statistics.places import NEAREST, pair_of, places_of
+from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
+from ir_studies.statistics.verdict import sentences
+
+shares = st.floats(-0.5, 0.5).map(lambda x: round(x, 4))
+
+
+def movement(duration: float, direct: float, timing: str, *, predicted: float = 100.0) -> dict[str, Any]:
+    """A row of one timing."""
+    return {
+        "solved": True, "timing": timing, "duration_s": duration, "direct_j": direct,
+        "indirect_j": 1.1 * direct, "predicted_j": predicted,
+        "predicted_low_j": 90.0, "predicted_high_j": 110.0,
+    }  # fmt: skip
+
+
+def pair(share: float, asynchronous: str = "asynchronous") -> dict[str, Any]:
+    """A pair whose asynchronous answer takes `share` more joules in the same time."""
+    return {
+        "synchronous": movement(2.0, 100.0, "synchronous"),
+        "asynchronous": movement(2.0, 100.0 * (1.0 + share), asynchronous),
+    }
+
+
+@given(st.lists(shares, min_size=2, max_size=60, unique=True))
+@settings(max_examples=30, deadline=None)
+def test_means_and_intervals_are_those_of_students_t(values: list[float]) -> None:
+    found = findings_of([pair(value) for value in values])
+    energy = next(each for each in found.comparisons if each.name == "energy, direct")
+    expected = ttest_1samp(100.0 * np.array(values), 0.0)
+    interval = expected.confidence_interval(0.90)
+    assert energy.mean.value == pytest.approx(100.0 * np.mean(values), abs=1e-9)
+    assert (energy.mean.low, energy.mean.high) == pytest.approx((interval.low, interval.high), abs=1e-6)
+    assert energy.less == np.mean(np.array(values) < 0.0)
+    assert energy.shown == bool(expected.pvalue < 0.10)
+
+
+def test_the_interval_agrees_with_a_bootstrap() -> None:
+    values = np.random.default_rng(3).normal(0.04, 0.1, 200)
+    found = findings_of([pair(float(value)) for value in values])
+    energy = next(each for each in found.comparisons if each.name == "energy, direct")
+    drawn = bootstrap((100.0 * values,), np.mean, confidence_level=0.90, rng=np.random.default_rng(5))
+    near = 0.15 * (energy.mean.high - energy.mean.low)
+    assert energy.mean.low == pytest.approx(drawn.confidence_interval.low, abs=near)
+    assert energy.mean.high == pytest.approx(drawn.confidence_interval.high, abs=near)
+
+
+def test_answers_that_are_the_synchronous_one_are_counted_apart() -> None:
+    rows = [pair(-0.1), pair(-0.2), pair(0.0, "synchronous"), {"synchronous": {"solved": False}}]
+    found = findings_of(rows)
+    assert (found.pairs, found.solved, found.same, found.driven) == (4, 3, 1, 5)
+    assert {each.count for each in found.comparisons if each.name == "duration"} == {2}
+    assert "1 of them the asynchronous answer is the synchronous one" in sentences(found)[0]
+
+
+def test_what_the_interval_holds_is_counted() -> None:
+    found = findings_of([pair(0.5), pair(0.05)])
+    assert found.covered == pytest.approx(3 / 4)
+
+
+def test_nothing_solved_is_said_and_breaks_nothing() -> None:
+    rows: list[dict[str, Any]] = [{"outcome": "cut", "message": "no answer"}, {}]
+    found = findings_of(rows)
+    assert found.solved == 0
+    assert sentences(found)[0].startswith("0 of 2 pairs")
+    assert "0 of 2 pairs" in page_html(found, StatisticsSettings("open"))
+    assert columns(rows)["message"][0] == "no answer"
+
+
+@pytest.mark.parametrize(
+    ("line", "word"),
+    [
+        ("cell: nowhere", "cell"),
+        ("pairs: 0", "pairs"),
+        ("pairs: .nan", "pairs"),
+        ("objective: cheap", "objective"),
+        ("planner: magic", "planner"),
+        ("plant: typical:-1", "plant"),
+        ("load: anvil", "cell"),
+        ("safety_distance: .inf", "safety_distance"),
+        ("unknown: 1", "unknown"),
+    ],
+)
+def test_settings_without_sense_name_the_key(line: str, word: str) -> None:
+    cell = "" if line.startswith("cell") else "cell: open\n"
+    with pytest.raises(SettingsError, match=word):
+        statistics_settings(f"format: ir_statistics/1\n{cell}{line}\n", str)
+
+
+def test_the_example_can_be_read() -> None:
+    assert study_of(EXAMPLE).settings == StatisticsSettings("demo")
+
+
+@pytest.mark.parametrize("name", ["table_columns", "demo"])
+def test_pairs_are_drawn_alike_and_keep_their_margin(name: str) -> None:
+    planner = Planner(lambda: 0.0)
+    planner.set_cell("", name)
+    places = places_of(planner, "")
+    limits = planner.cell.robot
+    for number in range(20):
+        drawn, again = (pair_of(places, 7, number, 0.02) for _ in range(2))
+        assert np.array_equal(drawn.start, again.start)
+        assert np.array_equal(drawn.goal, again.goal)
+        assert drawn.names[0] != drawn.names[1]
+        assert 0.0 < drawn.margin <= 0.02
+        for q in (drawn.start, drawn.goal):
+            state = planner.check_state(q, 0.0, 1, "", "")
+            assert state.min_distance >= max(drawn.margin, NEAREST)
+            assert ((q >= limits.position_min) & (q <= limits.position_max)).all()
+
+
+def test_a_pair_is_planned_driven_and_measured_in_two_ways() -> None:
+    asked = {"cell": "open", "pairs": 1, "plant": "nominal", "planner": ""}
+    row = maker(asked)({"number": 0})
+    again = maker(asked)({"number": 0})
+    assert row == again
+    for timing in ("synchronous", "asynchronous"):
+        one = row[timing]
+        assert one["message"] == ""
+        assert one["direct_j"] == pytest.approx(one["predicted_j"], rel=0.01, abs=10.0)
+        assert one["indirect_j"] == pytest.approx(one["direct_j"], rel=0.03, abs=20.0)
+        assert math.isfinite(one["peak_w"])
+
+
+def test_a_study_leaves_table_and_page(tmp_path: Path) -> None:
+    heard: list[tuple[str, int, int]] = []
+    study = study_of("format: ir_statistics/1\ncell: open\npairs: 1\nplant: nominal\n")
+    means = Means(1, progress=lambda phase, done, of, best: heard.append((phase, done, of)))
+    answer = study.run(tmp_path, means)
+    assert [path.name for path in answer.files] == ["table.csv", "index.html"]
+    assert len((tmp_path / "table.csv").read_text().splitlines()) == 3
+    assert heard[-1][1:] == (1, 1)
+    assert answer.table.startswith("comparison,")
+    assert study.run(tmp_path, Means(1)).summary == answer.summary  # nothing is left to make
