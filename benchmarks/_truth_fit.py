@@ -20,7 +20,6 @@ from _truth_section import Asked, Found
 
 from ir_cli.excitation.programme import Asked as Excitation
 from ir_cli.excitation.programme import Programme, plan_programme
-from ir_studies.simulated_run import SimulatedRun
 from ir_description import Cell, Load, PowerParameters, data_sheet, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
@@ -29,6 +28,7 @@ from ir_planner import Goal, Planner, PlannerSettings
 from ir_recorder.fit import fit
 from ir_recorder.measure import PowerModel, Samples, planned_samples, samples_of
 from ir_sim_driver.plant import typical_plant
+from ir_studies.simulated_run import SimulatedRun
 
 TITLE = "energy before and after a fit, on plants drawn at random"
 CELL = "demo"

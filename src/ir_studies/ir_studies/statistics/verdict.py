@@ -34,7 +34,8 @@ def _timings(found: Findings) -> Iterator[str]:
 def _measurements(found: Findings) -> Iterator[str]:
     for each in found.agreements:
         if each.count:
-            yield f"Energy, {each.name}: {difference(each)}; single movements spread by {each.spread:.1f} %."
+            said = difference(each, "movements")
+            yield f"Energy, {each.name}: {said}; single movements spread by {each.spread:.1f} %."
     if found.driven:
         yield (
             f"The predicted 90 % interval holds the directly measured energy of "
@@ -52,14 +53,14 @@ def _limits(found: Findings) -> Iterator[str]:
     )
 
 
-def difference(each: Comparison) -> str:
+def difference(each: Comparison, what: str = "pairs") -> str:
     """A mean with its interval, whether a difference is shown, and how large it is beside its spread."""
     if math.isnan(each.mean.low):
-        return f"{signed(each.mean.value)} in one pair"
+        return f"{signed(each.mean.value)}, one of the {what}"
     shown = "a difference" if each.shown else "no difference"
     size = f", {effect_words(each.effect)}" if each.shown and math.isfinite(each.effect) else ""
     interval = f"{signed(each.mean.low)} to {signed(each.mean.high)} with 90 % confidence"
-    return f"{signed(each.mean.value)} ({interval}, {each.count} pairs): {shown} is shown{size}"
+    return f"{signed(each.mean.value)} ({interval}, {each.count} {what}): {shown} is shown{size}"
 
 
 def signed(value: float) -> str:
