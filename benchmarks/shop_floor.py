@@ -4,8 +4,9 @@
 
 Every cell's program, or a random visit of its stations for each seed, is planned, written as KRL, read back,
 driven by the controller's model and certified again: what that costs, how near the ends come, and what Coal
-and limits at 10 kHz say of it. Three programs of today are held against the planner's. Motions of known
-energy are sampled with noise and judged from positions alone.
+at 0.0005 rad and limits at 10 kHz say of it. The programs of the tests' corpus make the same trip. Three
+programs of today are held against the planner's. Motions of known energy are sampled with noise and judged
+from positions alone.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from _results import at_least, at_most, command_line, finish, line_of
 from _second_opinion import SecondOpinion
 from _shop_baselines import baselines
+from _shop_corpus import corpus
 from _shop_traces import traces
 
 from ir_description import bundled_cells, load_cell
@@ -29,7 +31,6 @@ from ir_planner.krl.judged import contacts_at, scenes_of
 
 SEEDS, QUICK_SEEDS, VISITS = 3, 1, 3
 MARGIN = 0.02  # m, the default of a request
-COAL_STEP = 0.005  # rad of the fastest joint between two configurations
 PROOF_MM = -0.1  # what a proof may leave: its tolerance, and Coal's own
 CELLS = tuple(sorted(bundled_cells()))
 
@@ -119,7 +120,7 @@ def second_opinion(
     left, share = np.inf, 0.0
     for trajectory, (step, scene) in zip(driven, moving, strict=True):
         opinion = SecondOpinion(scene)
-        left = min(left, opinion.clearance_left(trajectory, MARGIN, contacts_at(step), COAL_STEP)[0])
+        left = min(left, opinion.clearance_left(trajectory, MARGIN, contacts_at(step))[0])
         share = max(share, opinion.largest_share(trajectory))
     return 1e3 * float(left), share
 
@@ -151,13 +152,9 @@ def main() -> None:
         at_least("by Coal, above what is kept", min(row.coal_left_mm for row in written), "mm", PROOF_MM),
         at_most("limits at 10 kHz", max(row.limit_share for row in written), "share", 1.0 + 1e-6),
     ]
-    more_rows, more_claims = baselines()
-    trace_rows, trace_claims = traces()
-    finish(
-        arguments.json,
-        [*(asdict(row) for row in rows), *more_rows, *trace_rows],
-        [*claims, *more_claims, *trace_claims],
-    )
+    found = [([asdict(row) for row in rows], claims), corpus(), baselines(), traces()]
+    everything = [row for of_one, _ in found for row in of_one]
+    finish(arguments.json, everything, [claim for _, of_one in found for claim in of_one])
 
 
 if __name__ == "__main__":

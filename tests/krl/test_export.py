@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ir_cli.main import main
+from ir_description import CellPath
 from ir_krl import follow, parse
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, RequestError, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl import DEVIATION_MAX
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+from _tool_path_judge import seen
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +46,55 @@ def test_an_exported_program_is_certified_and_near_the_plan(planned) -> None:
         for end in (0, -1):
             away = np.degrees(step.step.trajectory.positions[end] - movement.trajectory.positions[end])
             assert np.abs(away).max() < 1e-4
+
+
+def path_movement(planner: Planner, name: str, path: CellPath) -> PlannedMovement:
+    plan = planner.plan_cartesian(path, PlanOptions())
+    assert plan.trajectory is not None, plan.status.message
+    return PlannedMovement(
+        kind=MovementKind.CARTESIAN,
+        from_station=name,
+        to_station=name,
+        trajectory=plan.trajectory,
+        report=plan.report,
+        duration=plan.report.duration,
+    )
+
+
+@pytest.fixture(scope="module")
+def bench() -> Planner:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "kr6_bench")
+    return planner
+
+
+def test_a_path_of_the_tool_is_a_spline_at_its_speed(bench: Planner) -> None:
+    cell, path = bench.cell, replace(bench.cell.path("bead"), free_angle=0.0)
+    own = replace(cell.own_path("bead"), path=path)
+    export = export_krl(bench, [path_movement(bench, "bead", own)], "bead")
+    assert export.source.count("$VEL.CP=0.1000") == export.source.count("ENDSPLINE") == 3  # two corners
+    assert export.exported.certified
+    assert export.exported.duration == pytest.approx(export.planned.duration, rel=0.05)
+    texts = [parse(export.source, "bead.src"), parse(export.data, "bead.dat")]
+    program = follow(texts, cell.machine_home, tool_in_flange(cell.tcp))
+    steps = [one.step for one in evaluate_krl(bench, program).steps]
+    assert len(steps) == 3
+    bead = steps[1].trajectory
+    found = seen(bead, replace(path, approach=0.0, retract=0.0), bench.scene())
+    assert found.error <= 2e-4  # 0.1 mm of the plan, and as much of the export
+    tool = bench.scene().chain.tcp_poses(bead.sample(np.linspace(1.0, 4.0, 301)).q)[:, :3, 3]
+    speed = np.linalg.norm(np.diff(tool, axis=0), axis=1) / 0.01
+    assert speed == pytest.approx(path.tool_speed, rel=0.01)
+
+
+def test_a_path_whose_speed_changes_is_refused(bench: Planner) -> None:
+    path = bench.cell.path("bead")
+    first, *others = path.segments
+    other = replace(path, segments=(replace(first, tool_speed=0.04), *others), free_angle=0.0)
+    own = replace(bench.cell.own_path("bead"), path=other)
+    movement = path_movement(bench, "bead", own)
+    with pytest.raises(RequestError, match="along bead: the tool's speed changes along the path"):
+        export_krl(bench, [movement], "bead")
 
 
 def test_asynchronous_movements_are_refused(planned) -> None:

@@ -27,6 +27,18 @@ class WrittenSpline:
     seconds: float
 
 
+@dataclass(frozen=True, eq=False)
+class WrittenPath:
+    """A SPLINE of the tool: poses (M, 4, 4) [m] in the robot's foot after the start, at a speed [m/s] and an
+    acceleration [m/s^2] of the tool.
+    """
+
+    comment: str
+    poses: FloatArray
+    speed: float
+    acceleration: float
+
+
 @dataclass(frozen=True)
 class WrittenPause:
     """Standing for `seconds`; `ask`: the signal that asks for a power mode, "" for none."""
@@ -44,7 +56,7 @@ class WrittenSignals:
     set_signals: tuple[tuple[str, bool], ...] = ()
 
 
-Part: TypeAlias = WrittenSpline | WrittenPause | WrittenSignals
+Part: TypeAlias = WrittenSpline | WrittenPath | WrittenPause | WrittenSignals
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +140,8 @@ class _Body:
         match part:
             case WrittenSpline():
                 self._spline(part)
+            case WrittenPath():
+                self._path(part)
             case WrittenPause():
                 self._pause(part)
             case WrittenSignals():
@@ -151,6 +165,19 @@ class _Body:
         for name, share in zip(names[:-1], part.shares, strict=False):
             self.lines += [f"SPTP {name}", f"TIME_BLOCK PART={share:.9f}"]
         self.lines += [f"SPTP {names[-1]}", f"TIME_BLOCK END={part.seconds:.6f}", "ENDSPLINE"]
+
+    def _path(self, part: WrittenPath) -> None:
+        self._movements += 1
+        names = [f"XM{self._movements}_{k + 1}" for k in range(len(part.poses))]
+        self.points += [f"DECL E6POS {n}={_pose(pose)}" for n, pose in zip(names, part.poses, strict=True)]
+        self.lines += [
+            f"; {part.comment}",
+            f"$VEL.CP={part.speed:.6f}",
+            f"$ACC.CP={part.acceleration:.6f}",
+            "SPLINE",
+            *(f"SPL {name}" for name in names),
+            "ENDSPLINE",
+        ]
 
     def _pause(self, part: WrittenPause) -> None:
         self.lines.append(f"; {part.comment}")
@@ -179,6 +206,11 @@ def _axes(q: FloatArray) -> str:
         + ",".join(f"{name} {angle:.7f}" for name, angle in zip(AXIS_NAMES, np.degrees(q), strict=True))
         + "}"
     )
+
+
+def _pose(pose: FloatArray) -> str:
+    fields = frame(pose).fields
+    return "{" + ",".join(f"{name} {value:.7f}" for name, value in fields.items()) + "}"
 
 
 def _tool(attached: Attached) -> str:

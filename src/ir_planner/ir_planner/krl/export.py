@@ -4,6 +4,7 @@ A movement becomes a PTP_SPLINE through points of its trajectory with a TIME_BLO
 As many points are taken as the movement needs to stay certified and near to what was planned.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Evaluation, total_report
 from ir_planner.errors import RequestError
 from ir_planner.krl.driven import DrivenStep, drive
+from ir_planner.krl.export_path import deviation_along, fitted_path, one_after_the_other
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.scene import PlanningScene
 
@@ -67,20 +69,15 @@ def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, ju
     if not moving:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
     check_name(name)
-    for step in moving:
-        if step.kind == MovementKind.CARTESIAN:
-            raise RequestError(
-                StatusCode.INVALID_MOTION_PLAN,
-                f"along {step.to_station}: a path of the tool at a given speed isn't written as KRL yet",
-            )
-    fitted = {id(step): _fitted(step, scene, judge) for step in moving}
+    fitted = {id(step): _written_as(step, scene, judge) for step in moving}
     parts = [part for step in steps for part in _parts(step, fitted)]
     start = _points_of(moving[0]).positions[0]
     header = [f"{scene.cell.name}: {len(moving)} movements, points and times as planned"]
     source, data = written(name, start, parts, attached(scene), header)
-    driven = [step.trajectory for step in _driven(source, data, scene) if step.moves]
+    driven = (step.trajectory for step in _driven(source, data, scene) if step.moves)
     before, after, deviation = [], [], 0.0
-    for step, again in zip(moving, driven, strict=True):
+    for step in moving:
+        again = one_after_the_other(list(itertools.islice(driven, len(fitted[id(step)]))))
         found = judge(again, step)
         if not found.verification.certified:
             raise RequestError(
@@ -88,7 +85,7 @@ def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, ju
                 f"{_called(step)} isn't certified as the controller would drive it: "
                 f"{found.verification.status.message}",
             )
-        deviation = max(deviation, _deviation(again, _points_of(step)))
+        deviation = max(deviation, _deviation_of(step, again))
         before.append(step.report)
         after.append(found.report)
     return KrlExport(source, data, deviation, _together(before), _together(after))
@@ -103,6 +100,25 @@ def attached(scene: PlanningScene) -> Attached:
     turn = tool_in_flange(np.eye(4))[:3, :3]
     inertia = turn @ tool.inertia @ turn.T
     return Attached(tool_in_flange(cell.tcp), tool.mass, turn @ tool.com, np.diag(inertia).copy())
+
+
+def _written_as(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> list[Part]:
+    """The motions of a movement: a SPLINE for each stroke along a path, else one PTP_SPLINE."""
+    if step.kind != MovementKind.CARTESIAN:
+        return [_fitted(step, scene, judge)]
+    planned = _points_of(step)
+
+    def back(parts: list[Part]) -> list[JointTrajectory]:
+        source, data = written("M", planned.positions[0], parts, attached(scene), [])
+        return [step.trajectory for step in _driven(source, data, scene)]
+
+    return fitted_path(step, planned, scene, back)
+
+
+def _deviation_of(step: PlannedMovement, again: JointTrajectory) -> float:
+    planned = _points_of(step)
+    along = step.kind == MovementKind.CARTESIAN
+    return deviation_along(again, planned) if along else _deviation(again, planned)
 
 
 def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> WrittenSpline:
@@ -179,13 +195,13 @@ def _read_back(spline: WrittenSpline, start: FloatArray, scene: PlanningScene) -
     return step.trajectory
 
 
-def _parts(step: PlannedMovement, fitted: dict[int, WrittenSpline]) -> list[Part]:
+def _parts(step: PlannedMovement, fitted: dict[int, list[Part]]) -> list[Part]:
     parts: list[Part] = [WrittenSignals(wait_for=_signals(step.wait_for))] if step.wait_for else []
     if step.is_pause:
         mode = step.power_mode or "STAND_ON_MOTORS"
         parts.append(WrittenPause(f"pause {step.duration:g} s: {mode}", step.duration, _ASKS.get(mode, "")))
     else:
-        parts.append(fitted[id(step)])
+        parts.extend(fitted[id(step)])
     if step.set_signals:
         parts.append(WrittenSignals(set_signals=_signals(step.set_signals)))
     return parts
