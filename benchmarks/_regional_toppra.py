@@ -125,6 +125,10 @@ class PathTrajectory:
         """The same path, every instant later by the factor."""
         return PathTrajectory(self._legs, self._factor * factor)
 
+    def coefficients(self) -> tuple[FloatArray, FloatArray]:
+        """No polynomials: whoever asks for them samples."""
+        return np.zeros((0, self._legs[0].path.dof, 6)), np.zeros(0)
+
     def sample(self, t: FloatArray) -> Samples:
         """Motion at t (M,) [s]."""
         quick = np.asarray(t) / self._factor
