@@ -59,3 +59,16 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     assert "1 of 1 requests planned again with equal ids" in capsys.readouterr().out
     assert main(plan) == 1
     assert "is there already" in capsys.readouterr().err
+
+
+def test_a_plan_is_a_page_and_a_failed_one_says_which_pair_is_in_the_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = ["plan", "kr6_bench", "--stations", "pick", "--html"]
+    assert main([*asked, "found.html"]) == 0
+    assert "planned program" in (tmp_path / "found.html").read_text()
+    assert main([*asked, "failed.html", "--safety-distance", "0.05"]) == 1
+    sentence = capsys.readouterr().err.splitlines()[-1]
+    assert "base too near l2" in sentence
+    assert "base too near l2" in (tmp_path / "failed.html").read_text()

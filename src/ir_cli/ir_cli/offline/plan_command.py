@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from pathlib import Path
 
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, ProgramPlan
@@ -54,6 +57,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     words = "also write the plan as a recording, for ir report and ir replan (needs ROS's Python packages)"
     plan.add_argument("--record", default="", metavar="FILE.mcap", help=words)
+    words = "also write the report of the plan as a page; why, where it failed (needs these packages, too)"
+    plan.add_argument("--html", default="", metavar="FILE.html", help=words)
     add_options(plan)
     add_parameters(plan)
     add_formats(plan)
@@ -70,10 +75,12 @@ def run_plan(arguments: argparse.Namespace) -> int:
         plan = planner.plan_program(
             stations, arguments.cycle_time, options, start, line.show, savings=arguments.saving
         )
+    if arguments.html:
+        _page(arguments, plan, planner, options)
     if not plan.status.ok:
         return failed(plan.status.message)
     if arguments.record:
-        _record(arguments, plan, planner, options)
+        sys.stderr.write(f"ir: {_record(arguments.record, arguments, plan, planner, options)}\n")
     rows = rows_of(plan.movements)
     if arguments.json:
         saving = asdict(plan.savings) if plan.savings.available else None
@@ -86,14 +93,35 @@ def run_plan(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _record(arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, options: PlanOptions) -> None:
-    """Write the recording; only here ROS is imported."""
+def _record(
+    file: str,
+    arguments: argparse.Namespace,
+    plan: ProgramPlan,
+    planner: Planner,
+    options: PlanOptions,
+    roots: FileRoots | None = None,
+) -> Path:
+    """Write the recording below `roots`; only here ROS is imported."""
     from .plan_recording import ProgramRequest, write_plan
 
     stations = tuple(arguments.stations)
     request = ProgramRequest(stations, arguments.cycle_time, options, arguments.saving)
-    path = write_plan(arguments.record, plan, request, planner)
-    sys.stderr.write(f"ir: {path}\n")
+    return write_plan(file, plan, request, planner, roots)
+
+
+def _page(arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, options: PlanOptions) -> None:
+    """Write the report of the plan; of one that failed with the sentence that says why."""
+    from ir_recorder.analysis import analyse, findings
+    from ir_recorder.read import read_recording
+    from ir_recorder.report import write_report
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = str(Path(folder) / "plan.mcap")
+        recording = _record(file, arguments, plan, planner, options, ANYWHERE)
+        analysis = analyse(read_recording(recording))
+    reason = () if plan.status.ok else (plan.status.message,)
+    analysis = replace(analysis, problems=(*reason, *analysis.problems))
+    sys.stderr.write(f"ir: {write_report(analysis, findings(analysis), arguments.html)}\n")
 
 
 def rows_of(movements: Sequence[PlannedMovement]) -> list[Row]:
