@@ -1,23 +1,28 @@
 """How soon is one regional movement known: a coarse solution, and the certified answer?
 
-    python benchmarks/movement.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
+    python benchmarks/movement.py [--cell FILE]... [--variants N [--variant-seed N]] [--seeds N] [--quick]
+                                  [--json FILE]
 
 Every task of the cells, there and back, apart by whether its straight movement (PTP) is free. Processor time,
 the least of the repetitions (the seed stays). Coarse: an estimate from the straight segment where it is free,
 else from guesses of all classes; `first`: from the first free path alone. Their costs, with the penalties of
-a coarse solution, are held against J of the answer.
+a coarse solution, are held against J of the answer. --variants: instead of the cells, N of each that nobody
+tuned for.
 """
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 from _regional_ours import UNHURRIED, asked, planner_of
 from _regional_tasks import CELLS, Task, tasks_of
 from _results import Claim, at_least, at_most, command_line, finish, line_of
+from _variants import variant_files
 
 from ir_kernels.collision import FREE
 from ir_planner.checks import FreeSpace
@@ -29,6 +34,7 @@ from ir_planner.request.goals import Goal
 from ir_planner.search import Ends, guesses
 
 NEAR = 1.05  # of J of the answer
+VARIANTS = Path("out/variants")
 
 
 @dataclass(frozen=True)
@@ -116,12 +122,24 @@ def claims_of(rows: Sequence[Row]) -> list[Claim]:
     return claims
 
 
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = command_line(__doc__, CELLS, 10, "3 repetitions of every third task")
+    parser.add_argument("--variants", type=int, default=0, help="mirrored, turned and jittered ones per cell")
+    parser.add_argument("--variant-seed", type=int, default=0, help="what the variants are drawn from")
+    given = parser.parse_args()
+    given.cell = given.cell or CELLS
+    if given.variants:
+        given.cell = variant_files(given.cell, given.variants, given.variant_seed, VARIANTS)
+    return given
+
+
 def main() -> None:
     """Measure, print, write."""
-    given = command_line(__doc__, CELLS, 10, "3 repetitions of every third task").parse_args()
+    given = arguments()
     repetitions = min(given.seeds, 3) if given.quick else given.seeds
     rows = []
-    for cell in given.cell or CELLS:
+    for cell in given.cell:
         planner = planner_of(cell)
         for task in tasks_of(cell)[:: 3 if given.quick else 1]:
             rows.append(measured(planner, task, repetitions))

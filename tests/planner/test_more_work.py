@@ -78,3 +78,14 @@ def cost(plan: ProgramPlan, options: PlanOptions, longer: float) -> float:
         return plan.report.energy
     reports = [step.report for step in plan.movements if not step.is_pause]
     return sum(r.energy - r.base_energy + options.time_value * r.duration for r in reports)
+
+
+def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() -> None:
+    """Service lines, which are known without any work, leave it to the movements across."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "demo")
+    options = PlanOptions(max_iterations=1_000, planning_time=100.0)
+    plan = planner.plan_program((), 0.0, options, np.array(planner.cell.machine_home))
+    assert plan.status.ok, plan.status.message
+    assert not plan.info.truncated
+    assert plan.info.iterations <= 1_000 * len(planner.cell.program)

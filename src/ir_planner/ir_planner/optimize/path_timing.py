@@ -115,12 +115,14 @@ def _profile(
     s = path.places(count)
     for k, (stiffness, smoothing) in enumerate(effort.descents):
         context.work.check()
-        if k > 0 and context.work.exhausted:
+        finer = 2 * count if k > 0 else count
+        most = min(effort.evaluations, int(context.work.left / (EDGES_PER_INTERVAL * finer)))
+        if most < 1 or context.work.exhausted:
             break
         if k > 0:
-            s, count = path.finer(s), 2 * count
+            s, count = path.finer(s), finer
         s, total, evaluations = optimised_profile(
-            path, s, total, limits, (stiffness, smoothing, effort.evaluations), context
+            path, s, total, limits, (stiffness, smoothing, most), context
         )
         context.work.spend(int(np.ceil(evaluations * count * EDGES_PER_INTERVAL)))
     return never_back(s), total

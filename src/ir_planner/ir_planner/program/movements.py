@@ -20,6 +20,7 @@ from ir_planner.request import Context
 from ir_planner.service import timed_service
 from ir_planner.timing import Movement
 
+_PARTS = 3  # of a hop: out, across, in
 Key = tuple[int, str, tuple[str, str], tuple[bytes, bytes]]  # scene, kind, names of the stops, ends
 
 
@@ -88,12 +89,26 @@ class Movements:
             known.plan(lines, improvement)
         if near.across is not None:
             near.across.plan([part for part in new.values() if part.kind == ACROSS], improvement)
-        planned = mapped(self._planned, list(new.values()), self.context, improvement)
+        planned = self._shared(list(new.values()), improvement)
         for key, found in zip(new, planned, strict=True):
             self._found[key] = found
             if isinstance(found, Failure):
                 self.unreachable = found.status
         return [self._found[self._key(part)] for part in parts]
+
+    def _shared(self, parts: list[Part], improvement: int) -> list[Movement | Failure]:
+        """Movements of parts that share the work left: all the same, but those along service lines, which are
+        known without any, no more than if the whole program was still to plan. What isn't found with its
+        share gets the work that the others left.
+        """
+        left = self.context.work.left
+        of_one, of_line = left // max(len(parts), 1), left // (_PARTS * max(len(self.route), 1))
+        most = [of_one if part.kind == ACROSS else min(of_one, of_line) for part in parts]
+        planned = mapped(self._planned, parts, self.context, improvement, most)
+        for k, part in enumerate(parts):
+            if isinstance(planned[k], Failure) and most[k] < (left := self.context.work.left):
+                planned[k] = mapped(self._planned, [part], self.context, improvement, [left])[0]
+        return planned
 
     def movement(self, part: Part) -> Movement | None:
         """The movement of a part that was planned; None where none was found."""

@@ -18,14 +18,15 @@ def mapped(
     items: Sequence[Item],
     context: Context,
     improvement: int,
+    most: Sequence[int],
     threads: int = 0,
 ) -> list[Result]:
     """task(item, context of its own) for every item, in order; what each did is added to `context`'s journal.
 
-    improvement: work of each for better answers. threads: 0: as many as there are cores.
-    Raises what the first failing task raises, CancelledError when asked to stop.
+    improvement: work of each for better answers; most: of each at all. threads: 0: as many as there are
+    cores. Raises what the first failing task raises, CancelledError when asked to stop.
     """
-    own = [_own(context, improvement) for _ in items]
+    own = [_own(context, improvement, left) for left in most]
     count = min(threads or len(os.sched_getaffinity(0)), len(items))
     if count <= 1:
         results = [task(item, mine) for item, mine in zip(items, own, strict=True)]
@@ -40,9 +41,8 @@ def mapped(
     return results
 
 
-def _own(context: Context, improvement: int) -> Context:
-    """The context with work and a journal of its own, from what the request has left."""
+def _own(context: Context, improvement: int, left: int) -> Context:
+    """The context with so much work and a journal of its own."""
     work = context.work
-    left = max(work.max_iterations - work.iterations, 0)
     mine = Work(left, work.deadline, work.clock, work.cancelled, improvement)
     return Context(context.scene, context.options, Journal(mine, context.journal.seed), context.station)
