@@ -95,7 +95,11 @@ def measured(planner: Planner, task: Task, repetitions: int) -> Row:
     first_ms, first = least(repetitions, lambda: coarse(planner, task, alone=True))
     coarse_ms, cheapest = least(repetitions, lambda: coarse(planner, task, alone=False))
     free = bool(found.verdict[0] == FREE)
-    return Row(task.label, free, first_ms, first / J, coarse_ms, cheapest / J, answer_ms, J)
+    return Row(task.label, free, first_ms, _over(first, J), coarse_ms, _over(cheapest, J), answer_ms, J)
+
+
+def _over(cost: float, J: float) -> float:
+    return cost / J if J > 0.0 else float("inf")
 
 
 def claims_of(rows: Sequence[Row]) -> list[Claim]:
@@ -142,8 +146,9 @@ def main() -> None:
     for cell in given.cell:
         planner = planner_of(cell)
         for task in tasks_of(cell)[:: 3 if given.quick else 1]:
-            rows.append(measured(planner, task, repetitions))
-            print(line_of(asdict(rows[-1])), flush=True)
+            row = measured(planner, task, repetitions)
+            print(line_of(asdict(row)), flush=True)
+            rows += [row] if row.J > 0.0 else []  # a variant's task may have no solution
     finish(given.json, [asdict(row) for row in rows], claims_of(rows))
 
 

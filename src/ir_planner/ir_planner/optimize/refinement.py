@@ -7,6 +7,7 @@ ones then. The result is slowed until every limit holds exactly, and its clearan
 comes too near gets a larger clearance margin, and the descent continues.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -124,18 +125,21 @@ class Refinement:
                 return self._within_limits(path)
         return found
 
-    def near(self, known: Movement) -> Movement | None:
-        """The movement by descent from a known one, from its path and its own time scaling; None where that
-        can't be certified.
-        """
-        robot, path, own = self.context.scene.cell.robot, known.path, known.trajectory.duration
-        least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
-        count = int(np.clip(np.ceil(least / SPACING), FEWEST, MOST))
-        start = along_motion(known.trajectory, count, self.context.options.duration or max(own, least))
-        control = np.clip(start.control, robot.position_min, robot.position_max)
-        coarse = self.coarse_from(UniformSpline(control, start.interval), path, QUICK.coarse)
+    def near(self, known: Sequence[Movement]) -> Movement | None:
+        """By descent from the known one whose coarse solution costs least; None if it isn't certified."""
+        starts = [(self._coarse_near(one), one.path) for one in known]
+        coarse, path = min(starts, key=lambda start: start[0].cost)
         found = self.refined(coarse, path)
         return found if found is not None and found.certified else None
+
+    def _coarse_near(self, known: Movement) -> Solution:
+        robot, path = self.context.scene.cell.robot, known.path
+        least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
+        count = int(np.clip(np.ceil(least / SPACING), FEWEST, MOST))
+        own = max(known.trajectory.duration, least)
+        start = along_motion(known.trajectory, count, self.context.options.duration or own)
+        control = np.clip(start.control, robot.position_min, robot.position_max)
+        return self.coarse_from(UniformSpline(control, start.interval), path, QUICK.coarse)
 
     def _within_limits(self, path: FloatArray) -> Movement | None:
         """The movement near a path at a requested duration that hardly leaves joules to choose: the fastest
@@ -152,7 +156,9 @@ class Refinement:
             if duration <= requested * (1.0 + DURATION_SLACK):
                 movement = replace(found, context=self.context).stretched_by(max(requested / duration, 1.0))
                 if movement.clearance is None:
-                    cheaper = within_duration(found, self.context, _near)
+                    cheaper = within_duration(
+                        found, self.context, lambda one, asked: Refinement(asked).near([one])
+                    )
                     return min((m for m in (movement, cheaper) if m is not None), key=lambda m: m.cost)
             if duration > _WITHIN_REACH * requested:
                 break
@@ -291,7 +297,3 @@ class Refinement:
                 return None
             slowed = slowed.lasting(options.duration)
         return slowed.trajectory(self.context.joint_names)
-
-
-def _near(known: Movement, context: Context) -> Movement | None:
-    return Refinement(context).near(known)

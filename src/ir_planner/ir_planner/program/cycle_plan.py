@@ -125,7 +125,7 @@ def _fastest(best: _Tried, seconds: float, standing: float, progress: Progress) 
 def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None:
     """The chain that is cheapest at a value of a second; None where that has none."""
     try:
-        chain = cheapest_chain(choice.ladder.at(rung), choice.ladder.improvement, progress)
+        chain = cheapest_chain(choice.ladder.roughly(rung), choice.ladder.improvement, progress)
     except StageError:
         return None
     return choice.along(chain)

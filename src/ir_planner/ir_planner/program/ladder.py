@@ -2,8 +2,8 @@
 in their cycle time choose among the same movements.
 
 Movements are searched at the request's own value, at one in the middle of the ladder and for time alone; at
-the rungs beside these they are optimised again from the movements there. Along service lines, which hardly
-change with the value, they are those of the searched rungs, slowed down.
+the rungs beside these they are optimised again from the best of the movements there. Along service lines,
+which hardly change with the value, they are those of the searched rungs, slowed down.
 """
 
 from dataclasses import replace
@@ -27,7 +27,7 @@ class Ladder:
 
     def __init__(self, own: Movements, improvement: int) -> None:
         self.own, self.improvement = own, improvement
-        self._rungs: dict[int, Movements] = {}
+        self._rungs: dict[tuple[int, int], Movements] = {}
         rates = rates_of(own.context)
         value = rates.second / rates.joule if rates.joule else np.inf
         searched = own.context.options.objective != "movement_cost"
@@ -41,11 +41,20 @@ class Ladder:
 
     def at(self, rung: int) -> Movements:
         """Movements at a rung."""
-        if rung not in self._rungs:
-            self._rungs[rung] = self._made(rung)
-        return self._rungs[rung]
+        return self._kept(rung, len(LADDER))
 
-    def _made(self, rung: int) -> Movements:
+    def roughly(self, rung: int) -> Movements:
+        """The same from those searched at the nearest value alone: to choose among many chains."""
+        return self._kept(rung, 1)
+
+    def _kept(self, rung: int, most: int) -> Movements:
+        known = self._searched(rung)[:most]
+        key = rung, len(known)
+        if key not in self._rungs:
+            self._rungs[key] = self._made(rung, known)
+        return self._rungs[key]
+
+    def _made(self, rung: int, known: tuple[Movements, ...]) -> Movements:
         own = self.own
         if abs(rung - self._place) < _SAME:
             return own
@@ -54,16 +63,23 @@ class Ladder:
         else:
             asked = replace(own.context.asking("time_and_energy").options, time_value=LADDER[rung])
             context = replace(own.context, options=asked)
-        near = Near(self._beside(rung), self._lines(rung), self._scaling(rung))
+        near = Near(known, self._lines(rung), self._scaling(rung))
         return Movements(own.route, own.layers, context, own.searches, near)
 
-    def _beside(self, rung: int) -> Movements | None:
-        """Searched movements near which those of a rung are optimised; None where they are searched."""
-        if rung == FASTEST:
-            return None
-        if abs(rung - self._place) < _REACH:
-            return self.own
-        return self.at(_MIDDLE) if 0 < abs(rung - _MIDDLE) < _REACH else None
+    def _searched(self, rung: int) -> tuple[Movements, ...]:
+        """Searched movements, of the nearest value first, from which those of a rung are optimised; none
+        where these are searched. They are the same for every cycle time, so that a longer one knows what a
+        shorter one does: the local minimum of one value may be better at another than that one's own.
+        """
+        places: dict[float, Movements | None] = {FASTEST: None}
+        if abs(_MIDDLE - self._place) >= _REACH:
+            places[_MIDDLE] = None
+        places[self._place] = self.own
+        nearest = sorted(places, key=lambda place: abs(place - rung))
+        if rung in places or abs(nearest[0] - rung) >= _REACH:
+            return ()
+        searched = [place for place in nearest if np.isfinite(place)]
+        return tuple(places[place] or self.at(int(place)) for place in searched)
 
     def _lines(self, rung: int) -> tuple[Movements, ...]:
         """Movements along service lines that are slowed down at a rung; none where they are searched."""

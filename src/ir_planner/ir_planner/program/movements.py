@@ -46,11 +46,12 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """Known movements from which others are made, instead of searched: across, by descent from those of
-    `across`; along service lines, those of `lines` slowed down, or by descent from those of `scaling`.
+    """Known movements from which others are made, instead of searched: across, by descent from the best of
+    those of `across`; along service lines, those of `lines` slowed down, or by descent from those of
+    `scaling`.
     """
 
-    across: "Movements | None" = None
+    across: tuple["Movements", ...] = ()
     lines: tuple["Movements", ...] = ()
     scaling: "Movements | None" = None
 
@@ -87,8 +88,8 @@ class Movements:
         near, lines = self._near, [part for part in new.values() if part.kind != ACROSS]
         for known in (*near.lines, *([near.scaling] if near.scaling else [])):
             known.plan(lines, improvement)
-        if near.across is not None:
-            near.across.plan([part for part in new.values() if part.kind == ACROSS], improvement)
+        for known in near.across:
+            known.plan([part for part in new.values() if part.kind == ACROSS], improvement)
         planned = self._shared(list(new.values()), improvement)
         for key, found in zip(new, planned, strict=True):
             self._found[key] = found
@@ -158,9 +159,9 @@ class Movements:
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 
     def _across(self, part: Part, context: Context) -> Movement | Failure:
-        for known in _known((self._near.across,), part):
-            if (again := optimised_near(known, context)) is not None:
-                return again
+        known = _known(self._near.across, part)
+        if known and (again := optimised_near(known, context)) is not None:
+            return again
         first, second = self.ends(part)
         status, found = search_regional(first, second, context, self.searches)
         here, there = self.route.name(part.hop - 1), self.route.name(part.hop)

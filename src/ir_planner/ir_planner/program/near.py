@@ -1,5 +1,5 @@
-"""A movement that is known, made again for another value of a second: near its path, from its own time
-scaling.
+"""Movements that are known, made again for another value of a second: near the path of one, from its own
+time scaling.
 """
 
 from collections.abc import Sequence
@@ -9,19 +9,18 @@ from ir_planner.request import Context
 from ir_planner.timing import Movement, best_stretch, stretched
 
 
-def optimised_near(known: Movement, context: Context) -> Movement | None:
-    """The cheapest certified movement by descent from a known one, or that itself; None where neither is
-    certified.
+def optimised_near(known: Sequence[Movement], context: Context) -> Movement | None:
+    """The cheapest certified movement by descent from known ones, at least one, or the cheapest of them
+    slowed down; None where neither is certified.
     """
-    same = Movement(known.path, known.trajectory, context, known.note)
-    found = optimize.optimised_near(known, context)
-    certified = [movement for movement in (found, same) if movement is not None and movement.certified]
+    found = (optimize.optimised_near_best(known, context), slowed_near(known, context))
+    certified = [movement for movement in found if movement is not None and movement.certified]
     return min(certified, key=lambda movement: movement.cost, default=None)
 
 
 def slowed_near(known: Sequence[Movement], context: Context) -> Movement | None:
-    """The cheapest of known movements along one line, each slowed down evenly as far as that pays; None where
-    none is certified.
+    """The cheapest of known movements between the same ends, each slowed down evenly as far as that pays;
+    None where none is certified.
     """
     slower = [
         Movement(
