@@ -26,6 +26,8 @@ class Controller:
         motors are asked for at `wake`.
         """
         orders = [(at, k) for k, at in plan if at < wake]
+        if not orders and wake <= self.timer:
+            wake = end  # asked for on motors, motors change nothing, and the timer goes on
         if (not orders or orders[0][0] > self.timer) and wake > self.timer:
             orders = [(self.timer, 0), *((at, k) for at, k in orders if k != 0)]
         now = energy = 0.0
