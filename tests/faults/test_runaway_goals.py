@@ -159,6 +159,14 @@ def test_a_first_velocity_at_rest_is_reached_by_a_bridge(simulation: Simulation)
     assert within(excesses(ride(simulation, 1.5), simulation))
 
 
+def test_a_first_velocity_at_rest_beyond_the_bridge_is_refused(simulation: Simulation) -> None:
+    q, v = simulation.backend.q, np.zeros((2, 6))
+    v[0] = 0.021 * simulation.robot.acceleration_max
+    goal = TrajectoryGoal(trajectory(simulation, [0.0, 1.0], [q, q + 0.5 * v[0]], v))
+    with pytest.raises(DriverError, match="against the command"):
+        simulation.execute(simulation.vet(goal, 1), 1)
+
+
 def test_a_movement_that_is_replaced_by_a_later_one_does_not_stop_dead(simulation: Simulation) -> None:
     q, rest = simulation.backend.q, np.zeros((2, 6))
     assert execute(simulation, trajectory(simulation, [0.0, 2.0], [q, q + 0.5], rest, rest))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -19,7 +21,9 @@ from ir_sim_driver import (
     make_simulation,
 )
 from ir_sim_driver.controller.diagnostics import report
+from ir_sim_driver.controller.supervision import Command, Supervision, SupervisionSettings
 from ir_sim_driver.notices import Level
+from ir_sim_driver.plant import Backend
 
 BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
 
@@ -48,6 +52,33 @@ def simulation() -> Simulation:
 
 def pushed(torque: float) -> np.ndarray:
     return np.array([torque, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def seen(looks: list[tuple[np.ndarray, np.ndarray, bool]], deviation: float = 0.0) -> str:
+    """What the supervision alone says of positions, speeds (n,) and saturation, look by look."""
+    watch, fault = Supervision(BARE.robot, 1e-3, SupervisionSettings()), None
+    for q, qd, saturated in looks:
+        backend = cast(Backend, SimpleNamespace(q=q.copy(), qd=qd, saturated=saturated))
+        fault = fault or watch.look(backend, Command(q, deviation, 5e-3), braking=False)
+    return fault.sentence if fault is not None else ""
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_each_bound_of_the_supervision_counts_alone(sign: float, share: float) -> None:
+    """One percent within and beyond 0.02 rad, 10 %, twice the acceleration over 20 ms, 5 mm and 0.3 s."""
+    robot, home, rest = BARE.robot, np.array(BARE.machine_home), np.zeros(6)
+    one, beyond = sign * np.eye(6)[3], share > 1.0
+    edge = home.copy()
+    edge[3] = (robot.position_max if sign > 0 else robot.position_min)[3] + share * 0.02 * sign
+    fast = share * 1.1 * robot.velocity_max[3] * one
+    harder = [(home, share * k * 0.008 * robot.acceleration_max[3] * one, False) for k in range(7)]
+    long = [(home, rest, True)] * round(share * 76)
+    assert ("is at" in seen([(edge, rest, False)])) is beyond
+    assert ("moves at" in seen([(home, fast, False)])) is beyond
+    assert ("accelerates at" in seen(harder)) is beyond
+    assert ("mm from its command" in seen([(home, rest, False)], share * 5e-3)) is beyond
+    assert ("all the torque" in seen(long)) is beyond
 
 
 def test_a_robot_that_is_pushed_away_while_it_holds_is_stopped(simulation: Simulation) -> None:
