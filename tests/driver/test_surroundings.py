@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ir_description import cell_hash, load_cell
+from ir_description import Body, cell_hash, load_cell
 from ir_sim_driver.controller import Driver, PlannedCell
 from ir_sim_driver.controller.moving_in import take_offered_cell
 from ir_sim_driver.errors import TrajectoryRefusedError
@@ -55,6 +55,20 @@ def test_the_cell_is_taken_with_its_tool_tcp_and_postures(make):
     if OPEN.tool is not None:
         assert simulation.load.text == DEMO.tool.name
         assert simulation.load.mass == DEMO.tool.mass
+
+
+def test_bodies_that_are_placed_are_not_placed_again_while_the_plant_waits(make, monkeypatch):
+    """A cell may have ten thousand, which would hold up everybody for seconds."""
+    simulation = make(load="none")
+    for machine in DEMO.equipment:
+        machine.world_bodies()
+    simulation.surroundings.offer(planned(DEMO))
+    placed, place = [], Body.placed
+    monkeypatch.setattr(Body, "placed", lambda body, pose: (placed.append(body.name), place(body, pose))[1])
+    take_offered_cell(simulation)
+    assert simulation.cell is DEMO
+    of_parts = {body.name for part in DEMO.parts for body in part.lying(np.eye(4))}
+    assert set(placed) <= of_parts
 
 
 def test_a_robot_that_moves_takes_no_cell_until_it_stands(make, plan, run_out):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -20,7 +21,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import report_from_msg, trajectory_from_msg
 from ir_msgs_py.ros.quality import COMMANDS, LATCHED
 from ir_planner.node.node import PlannerNode
-from ir_sim_driver.node import SimDriver
+from ir_sim_driver.node import SimDriver, announcements
 
 DEMO = load_cell("demo")
 
@@ -64,6 +65,32 @@ def test_a_change_of_load_has_the_time_of_the_plant_which_may_lag(
         return heard if heard.load == "none" else None
 
     assert wait_for(changed).header.stamp.nanosec % 2_000_000 == 0  # the grid of joint_states
+
+
+def test_of_a_flood_of_cells_the_newest_is_read_and_none_waits(
+    make_driver: Any, wait_for: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Reading a large one takes longer than sending it; whatever it raises is a warning."""
+    read: list[str] = []
+    go_on = threading.Event()
+
+    def slow(text: str) -> Any:
+        read.append(text)
+        go_on.wait(60.0)
+        raise MemoryError(text)
+
+    driver, warnings = make_driver(), []
+    monkeypatch.setattr(announcements, "cell_from_yaml", slow)
+    monkeypatch.setattr(driver._driver, "warn", warnings.append)
+    driver._announcements._heard(CellState(cell_yaml="first"))
+    wait_for(lambda: read == ["first"], what="the first is read")
+    for k in range(50):
+        driver._announcements._heard(CellState(cell_yaml=str(k)))
+    assert len(driver._announcements._offered) == 1
+    go_on.set()
+    wait_for(lambda: len(warnings) == 2, what="the newest is read")
+    assert read == ["first", "49"]
+    assert warnings[1] == "the planner's cell is not taken: unexpected MemoryError: 49"
 
 
 @pytest.mark.parametrize("latched", [True, False])

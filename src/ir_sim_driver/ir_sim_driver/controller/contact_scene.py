@@ -61,7 +61,11 @@ class ContactScene:
         """The scene of the cell as its machines and parts are now."""
         floor = tuple(body for body in cell.bodies() if body.name == "floor") if cell.floor else ()
         states = machines.present_states()
-        around = (body for each in cell_in(cell, states).equipment for body in each.world_bodies())
+        elsewhere = {
+            each.name: states[each.name] for each in cell.equipment if states[each.name] != (each.state,)
+        }
+        # machines as the file has them keep their placed bodies, which take long to make
+        around = (body for each in cell_in(cell, elsewhere).equipment for body in each.world_bodies())
         speeds = {
             name: speed
             for machine in cell.equipment

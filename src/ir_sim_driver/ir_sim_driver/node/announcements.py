@@ -5,6 +5,7 @@ Load, robot, timers and states of machines are latched; contacts are not.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -32,6 +33,7 @@ from ir_msgs_py.ros.conversions import (
     machine_states_to_msg,
 )
 from ir_msgs_py.ros.quality import LATCHED
+from ir_msgs_py.ros.refusals import ANY, unexpected
 from ir_sim_driver.controller import Driver, PlannedCell
 from ir_sim_driver.plant import Carried, plant_to_yaml
 
@@ -48,6 +50,7 @@ class Announcements:
         self._node, self._driver, self._load_changed = node, driver, load_changed
         self._load: Carried | None = None
         self._cells = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cells")
+        self._offered: deque[CellState] = deque(maxlen=1)  # a flood of large cells waits nowhere
         self._loads = node.create_publisher(CarriedLoadMsg, names.CARRIED_LOAD, LATCHED)
         self._description = node.create_publisher(String, names.ROBOT_DESCRIPTION, LATCHED)
         self._timers = node.create_publisher(ControllerTimersMsg, names.CONTROLLER_TIMERS, LATCHED)
@@ -111,15 +114,25 @@ class Announcements:
         return Time(nanoseconds=stamp).to_msg() if stamp else self._node.get_clock().now().to_msg()
 
     def _heard(self, msg: CellState) -> None:
-        self._cells.submit(self._read, msg)
+        self._offered.append(msg)
+        self._cells.submit(self._read)
 
-    def _read(self, msg: CellState) -> None:
+    def _read(self) -> None:
+        """Read the newest cell, where it has not been read."""
+        try:
+            msg = self._offered.pop()
+        except IndexError:
+            return
         try:
             cell = cell_from_yaml(msg.cell_yaml)
+            for machine in cell.equipment:
+                machine.world_bodies()  # placed here, and not while the plant waits
         except DescriptionError as error:
             self._driver.warn(f"the planner's cell is not taken: {error}")
-            return
-        self._driver.offer_cell(PlannedCell(cell, msg.hash))
+        except ANY as error:
+            self._driver.warn(f"the planner's cell is not taken: {unexpected(error).message}")
+        else:
+            self._driver.offer_cell(PlannedCell(cell, msg.hash))
 
 
 def announced(load: Carried) -> CarriedLoad:
