@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import socket
 import threading
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.wake_on_lan import magic_packet, wakes
+from ir_msgs_py.wake_on_lan import magic_packet, send_packet, wakes
+from ir_sim_driver.errors import LinkError
+from ir_sim_driver.plc import Controller, WakeOnLan
+from ir_sim_driver.plc.modbus_link import ModbusTcp
 from ir_sim_driver.plc.wake_on_lan import WakeListener
 
 MAC = "02:00:00:c4:02:10"
 PACKET = magic_packet(MAC)
+NOBODY = cast(Controller, SimpleNamespace(wake=lambda: None))
 
 
 def test_the_packet_has_102_bytes():
@@ -63,3 +69,16 @@ def test_the_listener_hears_its_own_packet_among_others():
             WakeListener("127.0.0.1", listener.port, MAC, woken.release)
     finally:
         listener.close()
+
+
+@pytest.mark.parametrize("host", ["a\x00b", "x" * 20_000, "\udcff"])
+def test_a_host_that_is_no_name_is_a_sentence_of_each_link(host):
+    links = (
+        lambda: WakeOnLan(wake_host=host, wake_port=0).open(NOBODY),
+        lambda: ModbusTcp(modbus=True, modbus_host=host, modbus_port=0).open(NOBODY),
+    )
+    for link in links:
+        with pytest.raises(LinkError, match="can't be opened"):
+            link()
+    with pytest.raises(OSError, match=r"is no address|Errno"):
+        send_packet(PACKET, host, 9)

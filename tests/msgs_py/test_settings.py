@@ -30,6 +30,10 @@ class Oven:
         ({"heat": float("nan")}, "heat is nan: it must be finite"),
         ({"racks": 0}, "racks is 0: it must be at least 1"),
         ({"program": "fry"}, 'program is "fry": known are bake, grill'),
+        (
+            {"program": "\x1b[2J" + "x" * 20_000},
+            'program is "\\x1b[2J' + "x" * 70 + '...": known are bake, grill',
+        ),
         ({"steps": (1.0, -1.0)}, "steps is -1 s: it must be at least 0 s"),
     ],
 )

@@ -31,12 +31,14 @@ def command(**parameters):
         ({"joint_state_rate": 300}, "must divide 1000 Hz"),
         ({"backend": "ode"}, "known are pybullet, ideal"),
         ({"load": "anvil"}, "anvil"),
+        ({"plc.owner": r'"\e[2Jme"'}, 'owner is "\\x1b[2Jme": known are any'),
     ],
 )
 def test_a_parameter_that_makes_no_sense_ends_the_start_with_a_sentence(parameters, sentence):
     answer = subprocess.run(command(**parameters), capture_output=True, text=True, timeout=180, check=False)
     assert answer.returncode == 1
     assert sentence in answer.stderr
+    assert "\x1b" not in answer.stderr
     assert "Traceback" not in answer.stderr
 
 

@@ -12,11 +12,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any, TypeVar, get_type_hints
 
+from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import ParameterError
 
 T = TypeVar("T")
 _KEY = "setting"
 _STAGE = "stage"
+_SHOWN = 80  # characters of a value that is no choice
 SETTING_TYPES = (bool, int, float, str, tuple[float, ...], tuple[str, ...])
 
 
@@ -52,7 +54,8 @@ class Setting:
             if isinstance(element, float) and not math.isfinite(element):
                 raise ParameterError(f"{self.name} is {element}: it must be finite")
             if self.choices and element not in self.choices:
-                raise ParameterError(f'{self.name} is "{element}": known are {self.bounds}')
+                shown = one_line(str(element), _SHOWN)
+                raise ParameterError(f'{self.name} is "{shown}": known are {self.bounds}')
             below = self.minimum is not None and element < self.minimum
             above = self.maximum is not None and element > self.maximum
             if below or above:

@@ -40,4 +40,7 @@ def send_packet(packet: bytes, address: str, port: int) -> None:
     """Send it to an address, which may be a broadcast. Raises OSError where the network is not there."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        sender.sendto(packet, (address, port))
+        try:
+            sender.sendto(packet, (address, port))
+        except (ValueError, TypeError) as error:
+            raise OSError(f"{address[:80]!a} is no address: {error}") from error

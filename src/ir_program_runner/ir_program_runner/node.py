@@ -12,7 +12,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from ir_description import DescriptionError, load_cell
 from ir_msgs.action import RunProgram
@@ -39,7 +39,7 @@ from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
-from ir_program_runner.checks import check_program, check_request
+from ir_program_runner.checks import MOST_STEPS, check_program, check_request
 from ir_program_runner.diagnose.node import RunnerDiagnostics
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
@@ -50,7 +50,8 @@ from ir_program_runner.progress import Progress
 from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings
 
-_KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_KEPT = QoSProfile(depth=5 * MOST_STEPS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""The longest program is kept for a recorder that comes late; a runner that works for weeks stays small."""
 _SIGNALS = COMMANDS[0]  # a driver that starts later hears them too
 _FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
 _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has

@@ -102,7 +102,8 @@ def run_node(
         finally:
             node.destroy_node()
     except expected as error:
-        sys.stderr.write(f"{name}: {error}\n")
+        sentence = "\n".join(one_line(line) for line in str(error).splitlines())
+        sys.stderr.write(f"{name}: {sentence}\n")
         return 1
     finally:
         rclpy.try_shutdown()

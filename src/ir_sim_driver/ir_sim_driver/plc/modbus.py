@@ -49,7 +49,7 @@ class ModbusServer:
         self._loop.set_exception_handler(lambda loop, context: None)
         try:
             self._server = self._loop.run_until_complete(asyncio.start_server(self._serve, host, port))
-        except OSError as error:
+        except (OSError, ValueError, TypeError) as error:  # the last two: a host that is no name
             self._loop.close()
             raise OSError(f"TCP {host}:{port} can't be opened ({error})") from error
         self.port = int(self._server.sockets[0].getsockname()[1])

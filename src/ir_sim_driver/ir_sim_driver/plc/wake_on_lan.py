@@ -55,7 +55,7 @@ class WakeOnLan:
 class WakeListener:
     """Listens on a UDP port and calls `wake` for every packet that is for us; `close` ends it.
 
-    port 0 takes a free one; `port` says which. Raises OSError when the port is taken.
+    port 0 takes a free one; `port` says which. Raises OSError when the port is taken or the host is no name.
     """
 
     def __init__(self, host: str, port: int, mac: str, wake: Callable[[], None]) -> None:
@@ -64,9 +64,9 @@ class WakeListener:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((host, port))
-        except OSError:
+        except (OSError, ValueError, TypeError) as error:  # the last two: a host that is no name
             self._socket.close()
-            raise
+            raise OSError(str(error)) from error
         self._socket.settimeout(_POLL)
         self.port = int(self._socket.getsockname()[1])
         self._closing = threading.Event()
