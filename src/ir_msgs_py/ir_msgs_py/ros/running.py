@@ -102,12 +102,16 @@ def run_node(
         finally:
             node.destroy_node()
     except expected as error:
-        sentence = "\n".join(one_line(line) for line in str(error).splitlines())
-        sys.stderr.write(f"{name}: {sentence}\n")
+        sys.stderr.write(f"{name}: {_printable(error)}\n")
         return 1
     finally:
         rclpy.try_shutdown()
     return 0
+
+
+def _printable(error: Exception) -> str:
+    """What it says, line by line."""
+    return "\n".join(one_line(line) for line in str(error).splitlines())
 
 
 def spin(
