@@ -131,6 +131,7 @@ def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(view: Vie
     assert "/machines/table/top" not in view.browser.nodes
 
 
+@pytest.mark.long
 def test_a_file_that_is_wrong_from_the_start_is_shown_as_soon_as_it_can_be_read(tmp_path: Path) -> None:
     path = tmp_path / "small.yaml"
     path.write_text(CELL.replace("robot: kr6_r900_2", "robot: kr6_r900_3 # <img src=x onerror=alert(1)>"))
@@ -184,6 +185,7 @@ def test_a_machine_is_dragged_checked_planned_and_saved_with_its_comments(view: 
     view.shows("can&#x27;t stand there")
 
 
+@pytest.mark.long
 def test_a_station_is_dragged_in_its_machine(view: View) -> None:
     view.shows("at the mains")
     view.change("drag", "station pick")
@@ -193,6 +195,7 @@ def test_a_station_is_dragged_in_its_machine(view: View) -> None:
     view.shows("# station pick", "pose: {xyz: [-0.05, 0.1, 0.5], abc_deg: [0, 90, 0]}", "at the mains")
 
 
+@pytest.mark.long
 def test_planning_is_cancelled_and_asked_for_again(view: View) -> None:
     view.change("Cancel planning", True)
     view.shows("planning was cancelled")
@@ -204,6 +207,7 @@ def test_planning_is_cancelled_and_asked_for_again(view: View) -> None:
     view.shows("at the mains")
 
 
+@pytest.mark.long
 def test_the_motion_is_played_with_power_and_nearest_pair(view: View) -> None:
     view.shows("at the mains")
     view.change("Play", True)
@@ -213,6 +217,7 @@ def test_the_motion_is_played_with_power_and_nearest_pair(view: View) -> None:
     view.until(lambda: not view.session._playback.runs)
 
 
+@pytest.mark.long
 def test_viewers_come_and_go(view: View) -> None:
     view.shows("at the mains")
     others = [FakeBrowser(view.port) for _ in range(5)]

@@ -31,8 +31,8 @@ SECTIONS = (
     Section(
         "How to",
         _docs(
-            "mistakes", "robot_guide", "compare", "krl", "cartesian", "library", "studies", "arena",
-            "measuring", "recording", "report", "network", "extending",
+            "mistakes", "view", "cad", "robot_guide", "compare", "krl", "cartesian", "library", "studies",
+            "arena", "measuring", "recording", "report", "network", "extending",
         ),
     ),
     Section(

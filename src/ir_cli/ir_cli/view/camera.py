@@ -10,7 +10,7 @@ from ir_description import Cell
 
 DIRECTION = np.array([0.72, -0.78, 0.55])
 """Of the eye from the middle of the cell."""
-DISTANCE = 1.25
+DISTANCE = 0.95
 """Of the eye, per diagonal of the cell."""
 LEAST = 2.0  # m: of a diagonal, for a robot alone
 
