@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ir_cli.main import _parser
 from ir_cli.view.moved import Target, cell_with, edited, pose_in, snippet, targets
 from ir_cli.view.poses import meant
 from ir_cli.view.saving import SavingError, save
@@ -103,3 +104,12 @@ def test_nothing_is_overwritten_and_a_changed_file_is_not_mixed(tmp_path: Path) 
     path.unlink()
     with pytest.raises(SavingError):
         save(watched, cell, moves)
+
+
+@pytest.mark.parametrize("page", ["view", "cad"])
+def test_commands_of_the_pages_are_understood(page: str) -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    commands = [line.split()[1:] for line in text.splitlines() if line.startswith("    ir ")]
+    assert commands
+    for words in commands:
+        assert _parser(words[0]).parse_args(words).run is not None
