@@ -17,6 +17,7 @@ OTHERS = {
     "compare": {"--before", "--after", "--quick", "--json"},  # its requests name cells and seeds
     "soak": {"--minutes", "--quick", "--json"},  # one cell for an hour
     "recording": {"--seconds", "--minutes", "--kills", "--demo", "--quick", "--json"},
+    "walk": {"--quick", "--json"},  # one page, followed
     "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
 }
 
