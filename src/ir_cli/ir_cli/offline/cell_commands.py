@@ -26,6 +26,7 @@ from ..errors import InputError
 from ..suggestions import unknown_name
 from ..terminal import table
 from .cell_import import add_import
+from .cell_worlds import add_export
 from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ CELLS: Columns = {
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add cell new, cell check, cell import and cell list."""
+    """Add cell new, cell check, cell import, cell export and cell list."""
     cell = commands.add_parser("cell", help="begin and check cell files, list the bundled cells")
     verbs = cell.add_subparsers(dest="verb", required=True)
     check = verbs.add_parser("check", help="everything that is wrong with a cell file, and its stations")
@@ -66,6 +67,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     new.add_argument("--robot", default="kr210_r2700_extra", metavar="ROBOT", help="ir robot list, or a file")
     new.set_defaults(run=run_new)
     add_import(verbs)
+    add_export(verbs)
     listing = verbs.add_parser("list", help="the bundled cells")
     add_formats(listing)
     listing.set_defaults(run=run_list)

@@ -1,4 +1,4 @@
-"""`ir cell import`: a mesh from CAD as the line of a cell file, with what its convex pieces cost."""
+"""`ir cell import`: a mesh from CAD as the line of a cell file, with what its pieces cost, or a world."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from ir_description.files.piece_cache import pieces_of
 from ir_description.files.solid_mesh import UNITS
 from ir_description.files.solid_reader import PIECES, PIECES_MAX, SolidReader
 
+from ..errors import InputError
 from .asking import sentences
+from .cell_worlds import WORLDS, run_world
 from .output import print_json
 
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
@@ -19,17 +21,22 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 
 def add_import(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add cell import."""
-    command = verbs.add_parser("import", help="a mesh from CAD (STL, OBJ, glTF) as a line to paste")
-    command.add_argument("file", metavar="FILE", help="press.stl, .obj, .glb or .gltf")
-    command.add_argument("--unit", required=True, choices=tuple(UNITS), help="of the file; never guessed")
+    command = verbs.add_parser("import", help="a mesh from CAD as a line to paste, or a world as a cell")
+    command.add_argument("file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf")
+    command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh; never guessed")
     command.add_argument("--pieces", type=_pieces, default=PIECES, help=f"at most so many ({PIECES})")
+    command.add_argument("--robot", default="kr210_r2700_extra", metavar="ROBOT", help="of a world's cell")
     command.add_argument("--json", action="store_true", help="print the answer as JSON")
     command.set_defaults(run=run_import)
 
 
 def run_import(arguments: argparse.Namespace) -> int:
-    """Divide the mesh and print its line."""
+    """Divide the mesh and print its line, or print the cell of a world."""
     path = Path(arguments.file)
+    if path.suffix.lower() in WORLDS:
+        return run_world(path, arguments.robot)
+    if arguments.unit is None:
+        raise InputError(f"say the unit of {path.name[:60]!a}: --unit {' or '.join(UNITS)}")
     with sentences():
         triangles = SolidReader(path.parent).triangles(path.name, arguments.unit)
         found = pieces_of(triangles, arguments.pieces)

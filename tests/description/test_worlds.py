@@ -1,0 +1,86 @@
+"""Machines out to SDF and URDF and back, and worlds that are hostile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_cli.main import main
+from ir_description import bundled_cells, cell_from_yaml, load_cell
+
+SHAPE = "<geometry><box><size>1 2 3</size></box></geometry>"
+BOX = f"<collision name='c'><pose>0 0 1 0 0 0</pose>{SHAPE}</collision>"
+MESH = (
+    "<robot><link name='a'><collision><geometry><mesh filename='{}'/></geometry></collision></link></robot>"
+)
+
+
+@pytest.mark.parametrize("form", ["sdf", "urdf"])
+@pytest.mark.parametrize("name", [*bundled_cells(), "meshes"])
+def test_what_is_written_is_read_back_the_same(
+    form: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = name
+    if name == "meshes":
+        given = str(tmp_path / "cell.yaml")
+        Path(given).write_text(
+            "format: ir_cell/1\nname: meshes\nrobot: kr6_r900_2\nequipment:\n"
+            "  - {name: wedge_m, pose: {xyz: [1, 0, 0.5], abc_deg: [30, 20, 10]}, bodies: [\n"
+            "      {name: wedge, kind: mesh, vertices: [[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]},\n"
+            "      {name: rod, kind: capsule, radius: 0.1, length: 0.4, abc_deg: [0, 90, 0]}]}\n"
+        )
+    cell = load_cell(given)
+    assert main(["cell", "export", given, str(tmp_path / f"world.{form}")]) == 0
+    capsys.readouterr()
+    assert main(["cell", "import", str(tmp_path / f"world.{form}"), "--robot", cell.robot.name]) == 0
+    out, err = capsys.readouterr()
+    back = cell_from_yaml(out)
+    assert err == ""
+    assert [machine.name for machine in back.equipment] == [machine.name for machine in cell.equipment]
+    for machine, other in zip(cell.equipment, back.equipment, strict=True):
+        np.testing.assert_allclose(other.pose, machine.pose, atol=1e-9)
+        for body, same in zip(machine.present_bodies(), other.bodies, strict=True):
+            assert (same.name, same.kind) == (body.name, body.kind)
+            np.testing.assert_allclose(same.size, body.size, rtol=1e-12)
+            np.testing.assert_allclose(same.pose, body.pose, atol=1e-9)
+            np.testing.assert_allclose(same.vertices, np.unique(body.vertices, axis=0), atol=0.0)
+    assert main(["cell", "export", given, str(tmp_path / f"world.{form}")]) == 1  # nothing is overwritten
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("<sdf>", "not XML"),
+        ("<!DOCTYPE a [<!ENTITY b 'c'>]><sdf/>", "entities"),
+        ("<html/>", "must be sdf or robot"),
+        (f"<sdf><model><link>{BOX.replace('1 2 3', '1 2')}</link></model></sdf>", "must be 3 numbers"),
+        (f"<sdf><model><link>{BOX.replace('1 2 3', '1 nan 3')}</link></model></sdf>", "must be 3 numbers"),
+        (f"<sdf><model><link>{BOX.replace('1 2 3', '1 -2 3')}</link></model></sdf>", "size of c"),
+        (f"<sdf><model><link><pose relative_to='x'>1</pose>{BOX}</link></model></sdf>", "write them"),
+        (MESH.format("../a.obj"), "without '..'"),
+        (MESH.format("package://b/a.obj"), "folder"),
+    ],
+)  # fmt: skip
+def test_hostile_worlds_are_refused_by_a_sentence(
+    text: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "world.sdf"
+    path.write_text(text)
+    assert main(["cell", "import", str(path)]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_what_moves_or_is_elsewhere_is_left_out_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "world.sdf"
+    arm = f"<model name='arm'><link name='a'>{BOX}</link><joint name='j' type='revolute'/></model>"
+    two = f"<model name='2 tables'><link>{BOX}{BOX}</link></model>"
+    path.write_text(f"<sdf><world name='w'>{arm}{two}<include><uri>model://sun</uri></include></world></sdf>")
+    assert main(["cell", "import", str(path)]) == 0
+    out, err = capsys.readouterr()
+    assert [body.name for body in cell_from_yaml(out).machine("tables").bodies] == ["c", "tables_c"]
+    assert "model arm" in err
+    assert "model://sun" in err
