@@ -2,12 +2,15 @@
 
 import numpy as np
 
+from ir_msgs_py.arrays import FloatArray
 from ir_planner.curves import UniformSpline
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
 from ir_planner.timing import lasting_longer
 
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
-_ROUNDS = 25  # gravity doesn't fall with speed: a load near the envelope takes several
+_ROUNDS = 25
+_PLAIN = 8  # rounds as if all of the torque fell with the speed: nearly always enough
+_CREEPING = 1e-6  # of the speed: weight and dry friction are left of the torque
 _BELOW = 1.0005  # a little slower than asked for, so that few rounds end it
 
 
@@ -28,11 +31,30 @@ def slowed_to_limits(
     """The spline at its own duration or longer, within the limits; torque at samples. None where no duration
     carries it.
     """
-    for _ in range(_ROUNDS):
-        top = spline.extremes()
-        torque = torque_use(scene.dynamics, *spline.samples(_TORQUE_SAMPLES)).max(axis=0)
-        longer = float(lasting_longer(limits, top.velocity, top.acceleration, top.jerk, torque))
+    for k in range(_ROUNDS):
+        top, samples = spline.extremes(), spline.samples(_TORQUE_SAMPLES)
+        torque = torque_use(scene.dynamics, *samples)
+        share = torque.max(axis=0)
+        longer = float(lasting_longer(limits, top.velocity, top.acceleration, top.jerk, share))
         if longer <= 1.0:
             return spline
+        if k >= _PLAIN:
+            longer = max(longer, _longer_by_inertia(torque, samples, limits, scene))
         spline = UniformSpline(spline.control, spline.interval * longer * _BELOW)
     return None
+
+
+def _longer_by_inertia(
+    torque: FloatArray,
+    samples: tuple[FloatArray, FloatArray, FloatArray],
+    limits: MotionLimits,
+    scene: PlanningScene,
+) -> float:
+    """By what factor a motion should last longer, as weight and dry friction don't fall with its speed; 1
+    where they alone are more than the joints may give. torque: share (N, n) of the samples q, qd, qdd.
+    """
+    q, qd, _ = samples
+    still = torque_use(scene.dynamics, q, _CREEPING * qd, np.zeros_like(q))
+    left = limits.torque_share - still
+    over = (torque > limits.torque_share) & (left > 0.0)
+    return float(np.sqrt(np.max((torque - still)[over] / left[over], initial=1.0)))
