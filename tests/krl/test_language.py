@@ -90,6 +90,9 @@ REFUSED = {
         "1:4",
         "$IN[4] decides something here",
     ),
+    "an output of number 0": ("$OUT[0]=TRUE", "1:1", "$OUT[0]: outputs have whole numbers from 1 to 8192"),
+    "an output beyond the last": ("PULSE($OUT[9000],TRUE,0.5)", None, "$OUT[9000]: outputs have"),
+    "a wait without end": ("WAIT SEC 1E30", "1:1", "a wait is read up to 604800 s, a week"),
     "an output that isn't a truth value": ("$OUT[1]=5", "1:1", "$OUT[1] is set to the number 5"),
     "a motion to a number": ("PTP 5", "1:5", "a motion can't go to the number 5"),
     "LIN to axis angles": ("LIN {A1 0}", "1:1", "LIN goes to a frame"),
@@ -142,6 +145,13 @@ def test_what_is_no_krl_is_named_with_line_and_column(name: str) -> None:
 def test_what_is_nested_too_deeply_ends_with_a_sentence(lines: str, followed: Follow) -> None:
     with pytest.raises((KrlSyntaxError, KrlRunError), match="nested too deeply"):
         followed(lines)
+
+
+@pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
+def test_files_are_read_as_editors_leave_them(ends: str) -> None:
+    text = "\ufeffDEF T( )\n; Öffnen\nPTP {A1 1}\nPTP NOBODY\nEND\n".replace("\n", ends)
+    with pytest.raises(KrlRunError, match=r"t\.src:4:5: NOBODY has no value"):
+        follow([parse(text, "t.src")], np.zeros(6), np.eye(4))
 
 
 def test_damaged_programs_end_with_a_sentence() -> None:

@@ -90,7 +90,7 @@ def same(one: Layouts, other: Layouts) -> None:
 
 
 @pytest.mark.long
-def test_two_workers_of_which_one_is_killed_half_way_give_the_same_bytes(
+def test_two_workers_of_which_one_is_killed_meanwhile_give_the_same_bytes(
     processes: list[subprocess.Popen[bytes]], tmp_path: Path, wait_for: Any
 ) -> None:
     alone = run_layout(SETTINGS, tmp_path / "alone", Means(2))

@@ -109,6 +109,7 @@ def parse(text: str, file: str) -> Source:
     """
     if len(text) > TEXT_MAX:
         raise KrlSyntaxError(f"{len(text)} characters: at most {TEXT_MAX} are read", Place(file))
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")  # as editors leave them
     try:
         units = _tree(_parser().parse(_prepared(text) + "\n")).children
     except RecursionError:

@@ -14,6 +14,7 @@ from ir_krl.run.values import Value, integer
 
 STATEMENTS_MAX = 200_000
 """Statements that one run may take: a loop that never ends is named instead of followed for ever."""
+WAIT_MAX = 604_800.0  # s
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,10 @@ class Control:
 
     def _wait_seconds(self, tree: Tree) -> None:
         seconds = self.expressions.number(tree.children[0], "the time of WAIT SEC")
+        if seconds > WAIT_MAX:
+            raise KrlRunError(
+                f"WAIT SEC {seconds:g}: a wait is read up to {WAIT_MAX:g} s, a week", self.place(tree)
+            )
         if seconds > 0.0:  # negative times are passed at once, as on the controller
             self.commands.append(Wait(seconds, self.place(tree)))
 

@@ -21,6 +21,8 @@ from ir_msgs_py.arrays import FloatArray
 NESTED = "brackets, signs or blocks are nested too deeply"
 DEPTH_MAX = 60
 """Calls within calls."""
+OUTPUTS = 8192
+"""A KR C4 has $OUT[1] to $OUT[8192]."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ class _Run(Control):
         if name == "$OUT" and index is not None:
             if not isinstance(value, bool):
                 raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", self.place(tree))
-            self.commands.append(SetOutput(index[0], value, self.place(tree)))
+            self.commands.append(SetOutput(_output(index[0], self.place(tree)), value, self.place(tree)))
         elif name == "$IPO_MODE" and value != Symbol("BASE"):
             raise KrlRunError(
                 f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", self.place(tree)
@@ -193,7 +195,7 @@ class _Run(Control):
             raise KrlRunError(f"PULSE sets outputs, not {name}", place)
         seconds = self.expressions.number(trees[2], "the time of PULSE")
         level = self.expressions.truth(trees[1], "the value of PULSE")
-        self.commands.append(SetOutput(index[0], level, place, seconds))
+        self.commands.append(SetOutput(_output(index[0], place), level, place, seconds))
         return 0
 
     # interrupts
@@ -279,3 +281,10 @@ class _Run(Control):
         axis = str(word) == "PTP_SPLINE"
         blend = self._motions.blend(approximation)
         return SplineBlock(axis, tuple(motions), tuple(times), self.place(tree), blend)
+
+
+def _output(number: float, place: Place) -> int:
+    """The number of an output. Raises KrlRunError for one that no controller has."""
+    if number != int(number) or not 1 <= number <= OUTPUTS:
+        raise KrlRunError(f"$OUT[{number:g}]: outputs have whole numbers from 1 to {OUTPUTS}", place)
+    return int(number)
