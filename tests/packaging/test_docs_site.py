@@ -6,12 +6,12 @@ import importlib.util
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from types import ModuleType
 from urllib.parse import unquote
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.long  # links are checked by test_documentation.py as well
 
 
 class _Reader(HTMLParser):
@@ -28,22 +28,38 @@ class _Reader(HTMLParser):
         self.anchors |= {str(given["id"])} if given.get("id") else set()
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+def loaded() -> ModuleType:
+    """The tool."""
     spec = importlib.util.spec_from_file_location("docs_site", ROOT / "tools" / "docs_site.py")
     assert spec is not None
     assert spec.loader is not None
     tool = importlib.util.module_from_spec(spec)
     sys.modules["docs_site"] = tool
     spec.loader.exec_module(tool)
+    return tool
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    tool = loaded()
     out = tmp_path_factory.mktemp("site")
     return out, tool.build(out).warnings
 
 
+def test_every_page_is_in_a_list() -> None:
+    tool = loaded()
+    named = {source for section in tool.SECTIONS for source in section.named}
+    pages = {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").glob("*.md")}
+    assert pages - named == set()
+    assert {name for name in named if not (ROOT / name).exists()} == set()
+
+
+@pytest.mark.long
 def test_it_is_built_without_a_warning(site: tuple[Path, list[str]]) -> None:
     assert site[1] == []
 
 
+@pytest.mark.long
 def test_every_link_leads_to_a_file_of_the_site_and_to_its_anchor(site: tuple[Path, list[str]]) -> None:
     read: dict[Path, _Reader] = {}
     for path in site[0].rglob("*.html"):
@@ -62,6 +78,7 @@ def test_every_link_leads_to_a_file_of_the_site_and_to_its_anchor(site: tuple[Pa
     assert broken == []
 
 
+@pytest.mark.long
 def test_a_page_asks_nobody_else_for_anything(site: tuple[Path, list[str]]) -> None:
     text = (site[0] / "tutorial.html").read_text("utf-8")
     assert 'src="http' not in text
