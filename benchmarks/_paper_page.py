@@ -1,0 +1,124 @@
+"""docs/reproduction.md, written from what the experiments on the claims of the paper have stored."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from _paper_result import JUDGED, Experiment, Row, Statement
+
+HEAD = """# The paper on trial
+
+M. Bogdanovskyi, J. Cernohorsky, "Industrial Robots Trajectories Planning for Flexible Manufacturing Systems": what it claims, what
+is measured here, and what follows. The statements are given in our words; how its equations are read stands in [the paper map](paper_map.md).
+This page is written by `python benchmarks/paper.py`; no figure in it is typed by hand. `--only NAME` repeats one claim, `--quick` all of
+them with small samples in about two minutes; rows as JSON and CSV are in `out/paper`.
+
+A statement **holds** where the whole 95 % interval (bootstrap over what was drawn independently; shares after Wilson) keeps its bound, it
+**does not hold** where none of the interval does, else it **cannot be decided**. All of it is done with {seeds} seeds that share nothing:
+where one seed alone says otherwise, it cannot be decided either, and the page says so. `measured` claims nothing, `calibration` is no
+evidence: the data were made to fit. All energies are predicted by the planner's model of robot and drives, no robot was measured;
+times are processor times{machine}.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Chapter:
+    """An experiment with what it found; picture: relative to the page, "" for none; seconds of processor time."""
+
+    experiment: Experiment
+    statements: list[Statement]
+    rows: list[Row]
+    picture: str
+    seconds: float
+
+
+def page(chapters: Sequence[Chapter], missing: Sequence[str], seeds: int, machine: str, quick: bool) -> str:
+    """The whole page."""
+    parts = [HEAD.format(seeds=seeds, machine=f" on {machine}" if machine else "")]
+    if quick:
+        parts.append("**Short version**: small samples; nothing here is to be quoted.\n")
+    parts.append(_summary(chapters))
+    if missing:
+        parts.append(f"Not run: {', '.join(f'`{name}`' for name in missing)}.\n")
+    parts += [_chapter(chapter) for chapter in chapters]
+    total = sum(chapter.seconds for chapter in chapters)
+    parts.append(f"All experiments together took {total / 60.0:.1f} minutes of processor time.\n")
+    return "\n".join(parts)
+
+
+def _summary(chapters: Sequence[Chapter]) -> str:
+    rows: list[Row] = []
+    for chapter in chapters:
+        counted = Counter(one.verdict for one in chapter.statements)
+        anchor = chapter.experiment.title.lower()
+        anchor = "".join(c for c in anchor if c.isalnum() or c in " -_").replace(" ", "-")
+        line: Row = {"claim": f"[{chapter.experiment.title}](#{anchor})"}
+        line |= {verdict: counted[verdict] or "" for verdict in JUDGED}
+        rows.append(line | {"no claim": sum(counted.values()) - sum(counted[v] for v in JUDGED) or ""})
+    return table(rows) + "\n"
+
+
+def _chapter(chapter: Chapter) -> str:
+    experiment = chapter.experiment
+    rows = [
+        {
+            "statement": one.says,
+            "figure": one.figure,
+            "ours, 95 % interval": measured(one),
+            "bound": bound(one),
+            "verdict": f"**{one.verdict}**" + (f" ({one.note})" if one.note else ""),
+        }
+        for one in chapter.statements
+    ]
+    lines = [f"## {experiment.title}", "", f"**The paper.** {experiment.paper}", ""]
+    lines += [f"**Experiment** (`{experiment.name}`). {experiment.asked}", "", table(rows), ""]
+    for title, more in experiment.tables(chapter.rows).items():
+        lines += [f"{title}:", "", table(more), ""]
+    if chapter.picture:
+        lines += [f"![{experiment.caption}]({chapter.picture})", "", f"*{experiment.caption}*", ""]
+    lines += [f"**What follows.** {experiment.follows(chapter.statements)}", ""]
+    return "\n".join(lines)
+
+
+def measured(one: Statement) -> str:
+    """The figure with interval and sample size."""
+    unit = f" {one.unit}" if one.unit else ""
+    inside = f" [{number(one.low)}, {number(one.high)}]" if math.isfinite(one.low) else ""
+    count = f", {one.count} {one.what}" if one.count else ""
+    return f"{number(one.value)}{inside}{unit}{count}"
+
+
+def bound(one: Statement) -> str:
+    """The bound as a person writes it."""
+    if math.isnan(one.bound):
+        return ""
+    return f"{'≥' if one.at_least else '≤'} {one.bound:g}{f' {one.unit}' if one.unit else ''}"
+
+
+def number(x: float) -> str:
+    """Three digits, and no more than needed."""
+    if not math.isfinite(x):
+        return "none"
+    if abs(x) >= 1000.0:
+        return f"{x:.0f}"
+    return f"{x:.3g}" if abs(x) < 100.0 else f"{x:.0f}"
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Rows as a Markdown table."""
+    if not rows:
+        return ""
+    keys = list(rows[0])
+    lines = [f"| {' | '.join(keys)} |", f"|{' --- |' * len(keys)}"]
+    lines += [f"| {' | '.join(str(row.get(key, '')).replace('|', '/') for key in keys)} |" for row in rows]
+    return "\n".join(lines)
+
+
+def write(page_text: str, file: Path) -> None:
+    """Write it as it is."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(page_text.rstrip("\n") + "\n", "utf-8")

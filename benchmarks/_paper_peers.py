@@ -1,0 +1,116 @@
+"""One search, alone: what a planner needs until its first certified path, in checks and processor time.
+
+Planners of OMPL run in a process forked for each search, on the same kernel and with the same counting as
+behind `planner_id`; it is that process whose processor time counts. The project's own searches run here.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from typing import cast
+
+import numpy as np
+
+from ir_msgs_py.arrays import FloatArray
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.scene import PlanningScene, path_cost
+from ir_planner.search import SEARCHES, Ends, fewest_corners, pulled
+from ir_planner.search.with_ompl import worker
+from ir_planner.search.with_ompl.ompl_search import OmplSearch
+from ir_planner.search.with_ompl.problem import Parameters, Problem
+
+LATE_S = 60.0  # of wall time: a search that hangs is ended
+_FORK = multiprocessing.get_context("fork")  # the scene is large, and OMPL is loaded only once
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """From start to goal (n,) where every pair keeps `margin` [m]."""
+
+    scene: PlanningScene
+    start: FloatArray
+    goal: FloatArray
+    margin: float
+
+    def space(self, edges: int) -> FreeSpace:
+        """Free space with so many certified edges to spend."""
+        return FreeSpace.of(self.scene, self.margin, Work(edges, np.inf, time.monotonic))
+
+    def straight_is_free(self) -> bool:
+        """Whether nothing has to be searched."""
+        return bool(self.space(1).edges_free(self.start[None], self.goal[None])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Whether a path was found, checks in edges, seconds of processor time, W of the path when shortened."""
+
+    solved: bool
+    edges: int
+    seconds: float
+    W: float
+
+
+def searched(name: str, question: Question, seed: int, edges: int, cell: float | None = None) -> Found:
+    """One search by the planner of that name with `edges` to spend. cell [rad]: of KPIECE's grid, None: its
+    default.
+    """
+    search = SEARCHES[name]
+    if isinstance(search, OmplSearch):
+        cells = search.cells() if cell is None else cell
+        parameters = Parameters(search.planner, search.parameters(), cells)
+        return _forked(question, parameters, seed, edges)
+    space, _ = question.space(edges), question.scene.weights  # the models are there before the clock starts
+    space.states_free(question.start[None])
+    begin = time.process_time()
+    found = search.find(Ends(question.start, question.goal[None]), space, seed, space.work)
+    seconds = time.process_time() - begin
+    path = found.paths[0] if found.paths else None
+    return Found(path is not None, space.work.iterations, seconds, _W(path, question))
+
+
+def _W(path: FloatArray | None, question: Question) -> float:
+    if path is None:
+        return float("nan")
+    space, weights = question.space(100_000), question.scene.weights
+    try:
+        path = pulled(fewest_corners(path, space, weights), space, weights)
+    except ValueError:
+        pass
+    return path_cost(weights, path)
+
+
+def _forked(question: Question, parameters: Parameters, seed: int, edges: int) -> Found:
+    threshold = question.space(1).threshold
+    goals = question.goal[None]
+    problem = Problem(
+        question.scene, threshold, question.start, goals, parameters, seed, edges, LATE_S
+    )
+    question.scene.collision.is_free(goals, threshold)  # the models are there before the fork
+    ours, theirs = _FORK.Pipe()
+    process = _FORK.Process(target=_solve, args=(problem, theirs))
+    process.start()
+    theirs.close()
+    try:
+        if not ours.poll(LATE_S):
+            return Found(False, edges, LATE_S, float("nan"))
+        path, spent, seconds = cast(tuple[FloatArray | None, int, float], ours.recv())
+    except EOFError:
+        return Found(False, edges, LATE_S, float("nan"))
+    finally:
+        process.kill()
+        process.join()
+        ours.close()
+    return Found(path is not None, spent, seconds, _W(path, question))
+
+
+def _solve(problem: Problem, connection: Connection) -> None:
+    worker.util.setLogLevel(worker.util.LOG_NONE)
+    begin = time.process_time()
+    outcome = worker.solved(replace(problem), connection)
+    connection.send((outcome.path, outcome.edges, time.process_time() - begin))
+    connection.recv()  # until it is killed: OMPL's destructors complain
