@@ -15,6 +15,7 @@ from ir_description import Body, Cell, PowerData, load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks.evaluation import evaluate_trajectory
+from ir_planner.checks.free_space import FreeSpace
 from ir_planner.configurations.inverse_kinematics import free_configurations
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
@@ -107,6 +108,14 @@ def test_the_modified_ga_leaves_over_certified_steps_while_d_grows(
         total = problem.area.total_distance(path)
         assert total[-1] > total[0]
         assert problem.area.zone_distance(path[-1:])[0] > 0.02
+
+
+def test_a_walk_whose_candidates_all_collide_ends_without_a_path(demo_scene: PlanningScene) -> None:
+    problem = problem_at(demo_scene, "lathe_work", a_budget())
+    nowhere = replace(problem, inside=FreeSpace.of(demo_scene, 100.0, problem.inside.work, "lathe_work"))
+    walk = withdraw(nowhere, ModifiedGa(generations=3), np.random.default_rng(0), 1)
+    assert walk.paths == []
+    assert walk.candidates == sum(walk.rejected.values())
 
 
 def test_d_counts_only_what_moves_and_this_machine(demo_scene: PlanningScene) -> None:

@@ -61,7 +61,7 @@ class WorkArea:
 
     def total_distance(self, q: FloatArray) -> FloatArray:
         """D (N,) [m] at q (N, n): the sum of all metric distances to the machine's bodies."""
-        if self._machine is None:
+        if self._machine is None or len(q) == 0:
             return np.zeros(len(q))
         return np.asarray(self._machine.distances(q).sum(axis=1))
 
