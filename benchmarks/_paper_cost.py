@@ -10,7 +10,7 @@ import numpy as np
 from _paper_pairs import CELL, Pair, pairs
 from _paper_plots import finished, panels
 from _paper_result import Experiment, Row, Statement
-from _paper_statistics import interval, rank_correlation
+from _paper_statistics import interval, percent, rank_correlation
 from _regional_ours import planner_of
 from scipy.stats import kendalltau
 
@@ -30,7 +30,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed):
         trajectory = pair.common()
         assert trajectory is not None
-        row = {"kind": "movement", "W": _W(pair), "joules": pair.drive_energy(trajectory)}
+        row = {"kind": "movement", "W": _cost(pair), "joules": pair.drive_energy(trajectory)}
         row |= {"seconds": trajectory.duration, "load": pair.load, "direction": pair.direction}
         rows.append(row | {"rise_m": pair.rise})
         if pair.number % EVERY == 0:
@@ -38,15 +38,15 @@ def measure(seed: int, quick: bool) -> list[Row]:
     return rows
 
 
-def _W(pair: Pair) -> float:
+def _cost(pair: Pair) -> float:
     return float(movement_cost(pair.scene.weights, pair.q0, pair.q1))
 
 
 def _choice(pair: Pair) -> list[Row]:
-    """What the choice by W costs among the configurations at the goal's pose; none where there is no choice."""
+    """What the choice by W costs among the configurations at the goal's pose; none without a choice."""
     goals = pair.scene.inverse_kinematics.solve(pair.scene.chain.tcp_poses(pair.q1[None])).q
     others = [one for one in (replace(pair, q1=goal) for goal in goals) if one.straight_is_free()]
-    movements = [(_W(one), trajectory, one) for one in others if (trajectory := one.common()) is not None]
+    movements = [(_cost(one), trajectory, one) for one in others if (trajectory := one.common()) is not None]
     if len(movements) < 2:
         return []
     W = [w for w, _, _ in movements]
@@ -79,7 +79,7 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
     W, joules, seconds = (np.array([row[key] for row in moved]) for key in ("W", "joules", "seconds"))
     chosen, least, mean = (np.array([row[key] for row in choices]) for key in ("chosen", "least", "mean"))
     some = slice(None, 300)  # the count of all pairs grows with the square
-    order = [100.0 * x for x in interval(concordant, W[some], joules[some])]
+    order = percent(interval(concordant, W[some], joules[some]))
     return [
         *found,
         Statement("two movements are put in the order of their joules", "pairs in the same order", *order,
@@ -107,12 +107,12 @@ def follows(statements: Sequence[Statement]) -> str:
     choice = statements[-3]
     loads = [one.value for name, one in by.items() if name.startswith("load")]
     return (
-        f"Within one load the ranks agree ({min(loads):.2f} to {max(loads):.2f}), for W knows masses and speeds; "
-        f"over all movements only {by['all movements'].value:.2f}, upwards {by['movements up'].value:.2f}, "
-        f"downwards {by['movements down'].value:.2f}: W knows neither gravity nor the counterbalance, so that "
-        "lifting and lowering cost the same. Where it chooses the configuration at a pose the energy lies "
-        f"{choice.value:.0f} % above the least. It serves as a cheap first ranking; what is reported and "
-        "minimised here are joules of the full dynamics."
+        f"Within one load the ranks agree ({min(loads):.2f} to {max(loads):.2f}), for W knows masses and "
+        f"speeds; over all movements only {by['all movements'].value:.2f}, upwards "
+        f"{by['movements up'].value:.2f}, downwards {by['movements down'].value:.2f}: W knows neither "
+        "gravity nor the counterbalance, so that lifting and lowering cost the same. Where it chooses "
+        f"the configuration at a pose the energy lies {choice.value:.0f} % above the least. It serves as "
+        "a cheap first ranking; what is reported and minimised here are joules of the full dynamics."
     )
 
 
@@ -134,9 +134,10 @@ EXPERIMENT = Experiment(
     "W of eq. (9) against joules",
     "A movement is chosen by the cost W, the sum over the joints of the mass that they carry, their largest "
     "speed squared and their travel: the least W takes the least energy.",
-    "Random free straight movements in the cell `open`, half of them with the 155 kg tool and half empty, each "
-    "as the fastest common S-curve PTP. W and drive energy (full dynamics, shared DC bus) are ranked; the "
-    f"claim needs a rank correlation of {RANKS} (about four of five pairs in the right order).",
+    "Random free straight movements in the cell `open`, half of them with the 155 kg tool and half "
+    "empty, each as the fastest common S-curve PTP. W and drive energy (full dynamics, shared DC bus) "
+    f"are ranked; the claim needs a rank correlation of {RANKS} (about four of five pairs in the right "
+    "order).",
     measure,
     judge,
     follows,

@@ -12,22 +12,24 @@ from _paper_result import JUDGED, Experiment, Row, Statement
 
 HEAD = """# The paper on trial
 
-M. Bogdanovskyi, J. Cernohorsky, "Industrial Robots Trajectories Planning for Flexible Manufacturing Systems": what it claims, what
-is measured here, and what follows. The statements are given in our words; how its equations are read stands in [the paper map](paper_map.md).
-This page is written by `python benchmarks/paper.py`; no figure in it is typed by hand. `--only NAME` repeats one claim, `--quick` all of
-them with small samples in about two minutes; rows as JSON and CSV are in `out/paper`.
+M. Bogdanovskyi, J. Cernohorsky, "Industrial Robots Trajectories Planning for Flexible Manufacturing Systems":
+what it claims, what is measured here, and what follows. The statements are given in our words; how its
+equations are read stands in [the paper map](paper_map.md). This page is written by
+`python benchmarks/paper.py`; no figure in it is typed by hand. `--only NAME` repeats one claim, `--quick` all
+of them with small samples; rows as JSON and CSV are in `out/paper`.
 
-A statement **holds** where the whole 95 % interval (bootstrap over what was drawn independently; shares after Wilson) keeps its bound, it
-**does not hold** where none of the interval does, else it **cannot be decided**. All of it is done with {seeds} seeds that share nothing:
-where one seed alone says otherwise, it cannot be decided either, and the page says so. `measured` claims nothing, `calibration` is no
-evidence: the data were made to fit. All energies are predicted by the planner's model of robot and drives, no robot was measured;
-times are processor times{machine}.
+A statement **holds** where the whole 95 % interval (bootstrap over what was drawn independently; Wilson's for
+shares that never vary) keeps its bound, it **does not hold** where none of the interval does, else it
+**cannot be decided**. All of it is done with {seeds} seeds that share nothing: where one seed alone says
+otherwise, it cannot be decided either, and the row says so. `measured` claims nothing; `calibration` is no
+evidence, the data were made to fit. All energies are predicted by the planner's model of robot and drives, no
+robot was measured; times are processor times{machine}.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Chapter:
-    """An experiment with what it found; picture: relative to the page, "" for none; seconds of processor time."""
+    """An experiment with what it found; picture: relative to the page, "" for none; seconds: of processor."""
 
     experiment: Experiment
     statements: list[Statement]

@@ -13,15 +13,16 @@ from multiprocessing.connection import Connection
 from typing import cast
 
 import numpy as np
+from ompl import util
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search import SEARCHES, Ends, fewest_corners, pulled
-from ir_planner.search.with_ompl import worker
 from ir_planner.search.with_ompl.ompl_search import OmplSearch
 from ir_planner.search.with_ompl.problem import Parameters, Problem
+from ir_planner.search.with_ompl.worker import solved as solved_by_ompl
 
 LATE_S = 60.0  # of wall time: a search that hangs is ended
 _FORK = multiprocessing.get_context("fork")  # the scene is large, and OMPL is loaded only once
@@ -70,26 +71,20 @@ def searched(name: str, question: Question, seed: int, edges: int, cell: float |
     found = search.find(Ends(question.start, question.goal[None]), space, seed, space.work)
     seconds = time.process_time() - begin
     path = found.paths[0] if found.paths else None
-    return Found(path is not None, space.work.iterations, seconds, _W(path, question))
+    return Found(path is not None, space.work.iterations, seconds, _cost(path, question))
 
 
-def _W(path: FloatArray | None, question: Question) -> float:
+def _cost(path: FloatArray | None, question: Question) -> float:
     if path is None:
         return float("nan")
     space, weights = question.space(100_000), question.scene.weights
-    try:
-        path = pulled(fewest_corners(path, space, weights), space, weights)
-    except ValueError:
-        pass
-    return path_cost(weights, path)
+    return path_cost(weights, pulled(fewest_corners(path, space, weights), space, weights))
 
 
 def _forked(question: Question, parameters: Parameters, seed: int, edges: int) -> Found:
     threshold = question.space(1).threshold
     goals = question.goal[None]
-    problem = Problem(
-        question.scene, threshold, question.start, goals, parameters, seed, edges, LATE_S
-    )
+    problem = Problem(question.scene, threshold, question.start, goals, parameters, seed, edges, LATE_S)
     question.scene.collision.is_free(goals, threshold)  # the models are there before the fork
     ours, theirs = _FORK.Pipe()
     process = _FORK.Process(target=_solve, args=(problem, theirs))
@@ -105,12 +100,12 @@ def _forked(question: Question, parameters: Parameters, seed: int, edges: int) -
         process.kill()
         process.join()
         ours.close()
-    return Found(path is not None, spent, seconds, _W(path, question))
+    return Found(path is not None, spent, seconds, _cost(path, question))
 
 
 def _solve(problem: Problem, connection: Connection) -> None:
-    worker.util.setLogLevel(worker.util.LOG_NONE)
+    util.setLogLevel(util.LogLevel.LOG_NONE)
     begin = time.process_time()
-    outcome = worker.solved(replace(problem), connection)
+    outcome = solved_by_ompl(replace(problem), connection)
     connection.send((outcome.path, outcome.edges, time.process_time() - begin))
     connection.recv()  # until it is killed: OMPL's destructors complain

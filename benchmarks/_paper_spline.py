@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from _paper_pairs import CELL, Pair, pairs
@@ -22,7 +23,6 @@ SLOWER = 1.5  # times the fastest common PTP, so that no curve exceeds a limit b
 VIAS, ASIDE = 2, 0.15  # of a path with vias, as the genetic correction has; how far [rad] they lie aside
 SAME = 1.0
 SPLINE, CUBIC, QUINTIC, COMMON = "spline (10)", "cubic", "quintic", "common S-curve"
-Ends = list[tuple[int, FloatArray]]
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
@@ -59,8 +59,7 @@ def curve(pair: Pair, points: FloatArray, duration: float, name: str) -> JointTr
         return JointTrajectory.from_seconds(
             names, found.times, found.positions, found.velocities, found.accelerations
         )
-    speed: Ends = [(1, rest)]
-    ends = speed if name == CUBIC else [(1, rest), (2, rest)]
+    ends: Any = [(1, rest)] if name == CUBIC else [(1, rest), (2, rest)]
     spline = make_interp_spline(times, points, k=3 if name == CUBIC else 5, bc_type=(ends, ends))
     return JointTrajectory.from_seconds(names, times, *(spline(times, order) for order in range(3)))
 
@@ -101,20 +100,22 @@ def follows(statements: Sequence[Statement]) -> str:
                                 for name in (CUBIC, QUINTIC))  # fmt: skip
     return (
         f"Between two points the spline needs {100 * (quintic - 1):+.1f} % of the quintic's joules and "
-        f"{100 * (cubic - 1):+.1f} % of the cubic's; through {VIAS} vias {100 * (quintic_vias - 1):+.1f} % and "
-        f"{100 * (cubic_vias - 1):+.1f} %. What is cheaper than eq. (10) here is a single polynomial: the cubic "
-        "accelerates at once, with a jump that no controller drives, the quintic needs none. So eq. (10) is kept "
-        "as a curve, but the time scaling and the path that the planner optimises decide the joules."
+        f"{100 * (cubic - 1):+.1f} % of the cubic's; through {VIAS} vias {100 * (quintic_vias - 1):+.1f} "
+        f"% and {100 * (cubic_vias - 1):+.1f} %. What is cheaper than eq. (10) here is a single "
+        "polynomial: the cubic accelerates at once, with a jump that no controller drives, the quintic "
+        "needs none. So eq. (10) is kept as a curve, but the time scaling and the path that the planner "
+        "optimises decide the joules."
     )
 
 
 def draw(rows: Sequence[Row], file: Path) -> None:
     """Ratios as bars."""
     figure, (axes,) = panels(1, width=7.0, height=2.8)
-    values = {}
+    values: dict[str, tuple[float, float, float]] = {}
     for one in judge(rows):
         shown = one.says.replace(" the spline costs no more than", ":")
-        values[shown] = tuple(100.0 * (x - 1.0) for x in (one.value, one.low, one.high))
+        low, high = (100.0 * (x - 1.0) for x in (one.low, one.high))
+        values[shown] = 100.0 * (one.value - 1.0), low, high
     bars(axes, values, color="tab:blue", alpha=0.7)
     axes.axvline(0.0, color="0.3", lw=1.0)
     axes.set_xlabel("E_drive of the spline (10) over that of the other curve [%], same duration")
@@ -124,11 +125,12 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 EXPERIMENT = Experiment(
     "spline",
     "The spline of eq. (10) against cubic and quintic",
-    "Trajectories are composed of five cubic segments per joint with continuous speed and acceleration, which "
-    "begin and end at rest without acceleration, as the smooth curve of low degree.",
-    f"Random free movements in `open`, half with 155 kg and half empty, at {SLOWER} times the duration of the "
-    f"fastest common PTP: straight ones, and ones through {VIAS} vias {ASIDE} rad aside (then eq. (10) has its five "
-    "cubics). All curves pass the same points at the same times; limits of torque are not asked for.",
+    "Trajectories are composed of five cubic segments per joint with continuous speed and acceleration, "
+    "which begin and end at rest without acceleration, as the smooth curve of low degree.",
+    f"Random free movements in `open`, half with 155 kg and half empty, at {SLOWER} times the duration of "
+    f"the fastest common PTP: straight ones, and ones through {VIAS} vias {ASIDE} rad aside (then eq. "
+    "(10) has its five cubics). All curves pass the same points at the same times; limits of torque are "
+    "not asked for.",
     measure,
     judge,
     follows,

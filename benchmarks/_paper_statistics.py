@@ -27,20 +27,23 @@ def interval(
     data = [np.asarray(column, dtype=float) for column in columns]
     if len(data[0]) == 0:
         return math.nan, math.nan, math.nan
-    members = _members(groups if groups is not None else range(len(data[0])))
+    members = _members(groups) if groups is not None else None
+    count = len(members) if members is not None else len(data[0])
     value, rng = float(statistic(*data)), np.random.default_rng(_SEED)
-    if len(members) < 2:
+    if count < 2:
         return value, math.nan, math.nan
     drawn = np.empty(RESAMPLES)
     for k in range(RESAMPLES):
-        rows = np.concatenate([members[j] for j in rng.integers(0, len(members), len(members))])
+        rows = rng.integers(0, count, count)
+        if members is not None:
+            rows = np.concatenate([members[j] for j in rows])
         drawn[k] = statistic(*(column[rows] for column in data))
     tail = (100.0 - LEVEL) / 2.0
     low, high = np.nanpercentile(drawn, [tail, 100.0 - tail])
     return value, float(low), float(high)
 
 
-def _members(groups: Sequence[Hashable] | range) -> list[IntArray]:
+def _members(groups: Sequence[Hashable]) -> list[IntArray]:
     rows: dict[Hashable, list[int]] = {}
     for k, group in enumerate(groups):
         rows.setdefault(group, []).append(k)
@@ -73,6 +76,22 @@ def rank_correlation(x: FloatArray, y: FloatArray) -> float:
 def variation(x: FloatArray) -> float:
     """Coefficient of variation: standard deviation over mean."""
     return float(np.std(x, ddof=1) / np.mean(x)) if len(x) > 1 and np.mean(x) > 0.0 else math.nan
+
+
+def share(successes: Sequence[float], groups: Sequence[Hashable] | None = None) -> tuple[float, float, float]:
+    """The mean of successes or chances (N,) in [0, 1] with its interval; where all are equal nothing can be
+    resampled, and the interval is Wilson's for so many groups.
+    """
+    found = interval(mean, successes, groups=groups)
+    if found[1] < found[2] or not len(successes):
+        return found
+    count = len(set(groups)) if groups is not None else len(successes)
+    return wilson(round(found[0] * count), count)
+
+
+def percent(found: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The same in percent."""
+    return 100.0 * found[0], 100.0 * found[1], 100.0 * found[2]
 
 
 def wilson(successes: int, count: int) -> tuple[float, float, float]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from _paper_peers import Question
 from _regional_tasks import scene_of_cell
 
 from ir_description import Body, Cell, Equipment, Zone, load_cell
+from ir_description.cell.equipment import ZoneKind
 from ir_description.poses import pose_of
 from ir_msgs_py.arrays import FloatArray
 
@@ -17,7 +19,11 @@ MOST = 100
 NEAR, FAR, HIGH = 1.1, 2.6, 1.4  # m: around the base, and up to where machines stand on pedestals
 EDGES = (0.3, 0.6)  # m of a machine
 WALL = 0.03  # m
-MARGIN, CLEARANCE, APART = 0.01, 0.015, 0.8  # m: S_m, what ends keep at least, and how far the tools are apart
+MARGIN, CLEARANCE, APART = (
+    0.01,
+    0.015,
+    0.8,
+)  # m: S_m, what ends keep at least, and how far the tools are apart
 _DRAWN = 2048  # configurations at a time
 # Walls of a machine by its type, as the axis that they are normal to and the side: a solid block is reached
 # from everywhere; one with an open front from one side; a bin from above alone.
@@ -53,7 +59,7 @@ def _machine(name: str, kind: str, pose: FloatArray, size: FloatArray) -> Equipm
             walls, middle = size.copy(), np.zeros(3)
             walls[axis], middle[axis] = WALL, 0.5 * side * (size[axis] - WALL)
             bodies.append(Body(f"{name}_wall_{axis}{'-+'[side > 0]}", "box", pose_of(middle), walls))
-    return Equipment(name, pose, tuple(bodies), Zone(kind, np.eye(4), size))
+    return Equipment(name, pose, tuple(bodies), Zone(cast("ZoneKind", kind), np.eye(4), size))
 
 
 def _about_z(angle: float) -> FloatArray:
@@ -68,7 +74,8 @@ def questions(kind: str, sizes: tuple[int, ...], count: int, seed: int) -> list[
     """
     scenes = {size: scene_of_cell(zones_cell(kind, size, seed)) for size in sizes}
     crowded, rng = scenes[max(sizes)], np.random.default_rng([seed, 2])
-    robot, found = crowded.cell.robot, []
+    robot = crowded.cell.robot
+    found: list[dict[int, Question]] = []
     kept = np.full(len(crowded.collision.pairs), CLEARANCE)
     while len(found) < count:
         q = rng.uniform(robot.position_min, robot.position_max, (_DRAWN, robot.n))

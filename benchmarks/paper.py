@@ -4,9 +4,9 @@
                                [--quick] [--json FILE]
 
 Every claim is an experiment of its own (`_paper_<claim>.py`). What one has found is stored as JSON and CSV in
---out; the next run goes on with those that are missing, --only measures the named ones anew, --again all. Then
-the page is written from everything that is stored: docs/reproduction.md, or with --quick a page of its own. A
-claim `holds` here where all of what the paper states holds.
+--out; the next run goes on with those that are missing, --only measures the named ones anew, --again all.
+Then the page is written from everything that is stored: docs/reproduction.md, or with --quick a page of its
+own. Printed are the statements with their intervals, and those with a bound as claims.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ SEEDS = 2
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     names = ", ".join(EXPERIMENTS)
     parser.add_argument("--only", action="append", choices=list(EXPERIMENTS), metavar="NAME", help=names)
     parser.add_argument("--seeds", type=int, default=SEEDS, help=f"independent repetitions; default: {SEEDS}")
@@ -105,7 +107,9 @@ def main() -> None:
     """Measure what is missing, write the page, print the claims."""
     given = arguments()
     for experiment in EXPERIMENTS.values():
-        asked = experiment.name in given.only if given.only else given.again or stored(experiment, given) is None
+        asked = (
+            experiment.name in given.only if given.only else given.again or stored(experiment, given) is None
+        )
         print(f"{experiment.name}: {'measured' if asked else 'as it is stored'}", flush=True)
         if asked:
             run(experiment, given)

@@ -18,6 +18,7 @@ OTHERS = {
     "soak": {"--minutes", "--quick", "--json"},  # one cell for an hour
     "recording": {"--seconds", "--minutes", "--kills", "--demo", "--quick", "--json"},
     "walk": {"--quick", "--json"},  # one page, followed
+    "paper": {"--only", "--again", "--seeds", "--quick", "--json"},  # each claim names its cells
     "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
 }
 

@@ -1,0 +1,155 @@
+"""The claims of the paper: verdicts follow from intervals and seeds, the page from what is stored."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import _paper_claims
+import _paper_statistics as statistics
+import numpy as np
+import pytest
+from _paper_page import Chapter, bound, number, page
+from _paper_result import CALIBRATED, FAILS, HOLDS, MEASURED, OPEN, Experiment, Row, Statement, judged
+
+ROOT = Path(__file__).parents[2]
+CHEAP = ("spline", "modes")  # seconds of processor time
+
+
+def statement(value: float, low: float, high: float, **more: object) -> Statement:
+    return Statement("it helps", "how much", value, low, high, 10, "tasks", **{"bound": 1.0, **more})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "at_least", "verdict"),
+    [
+        (1.0, 2.0, True, HOLDS),
+        (0.5, 0.9, True, FAILS),
+        (0.9, 1.1, True, OPEN),
+        (0.5, 1.0, False, HOLDS),
+        (1.1, 2.0, False, FAILS),
+        (math.nan, math.nan, True, OPEN),
+    ],
+)
+def test_a_verdict_follows_from_the_whole_interval(
+    low: float, high: float, at_least: bool, verdict: str
+) -> None:
+    assert statement(1.0, low, high, at_least=at_least).alone == verdict
+
+
+def test_what_has_no_bound_is_measured_and_what_was_fitted_is_no_evidence() -> None:
+    assert statement(1.0, 0.5, 2.0, bound=math.nan).alone == MEASURED
+    assert statement(1.0, 0.5, 2.0, verdict=CALIBRATED).alone == CALIBRATED
+
+
+def experiment(judge: object) -> Experiment:
+    return Experiment(
+        "one", "One claim", "It helps.", "It is tried.", lambda seed, quick: [], judge, lambda found: "So."
+    )  # type: ignore[arg-type]
+
+
+def means(rows: Sequence[Row]) -> list[Statement]:
+    return [statement(*statistics.interval(statistics.mean, [row["x"] for row in rows]))]
+
+
+def test_a_seed_that_says_otherwise_leaves_it_open() -> None:
+    rng = np.random.default_rng(1)
+    high = [{"seed": 0, "x": float(x)} for x in rng.normal(5.0, 0.1, 50)]
+    low = [{"seed": 1, "x": float(x)} for x in rng.normal(0.5, 0.1, 20)]
+    assert judged(experiment(means), high)[0].verdict == HOLDS
+    (found,) = judged(experiment(means), high + low)
+    assert found.verdict == OPEN
+    assert "seed by seed: holds, does not hold" in found.note
+
+
+def test_an_interval_of_95_percent_holds_the_mean_about_so_often() -> None:
+    rng, inside, count = np.random.default_rng(12), 0, 30
+    for _ in range(count):
+        _, low, high = statistics.interval(statistics.mean, rng.normal(3.0, 1.0, 20))
+        inside += low <= 3.0 <= high
+    assert inside >= 0.8 * count  # a bootstrap of few rows is somewhat narrow
+
+
+def test_rows_of_one_group_are_no_independent_sample() -> None:
+    rng = np.random.default_rng(2)
+    x = np.repeat(rng.normal(0.0, 1.0, 10), 20)
+    groups = np.repeat(np.arange(10), 20).tolist()
+    alone = statistics.interval(statistics.mean, x)
+    grouped = statistics.interval(statistics.mean, x, groups=groups)
+    assert grouped[2] - grouped[1] > 2.0 * (alone[2] - alone[1])
+
+
+def test_shares_that_never_vary_still_have_an_interval() -> None:
+    value, low, high = statistics.share([1.0] * 20)
+    assert value == 1.0
+    assert 0.8 < low < 0.95
+    assert high == pytest.approx(1.0)
+    assert statistics.share([1.0] * 20, [0, 1] * 10)[1] < low  # of two groups little follows
+
+
+def test_ranks_are_those_of_spearman() -> None:
+    x = np.array([1.0, 2.0, 3.0, 4.0])
+    assert statistics.rank_correlation(x, x**3) == pytest.approx(1.0)
+    assert statistics.rank_correlation(x, -x) == pytest.approx(-1.0)
+    assert math.isnan(statistics.rank_correlation(x, np.ones(4)))
+
+
+def test_the_page_shows_verdict_interval_bound_and_what_is_missing() -> None:
+    one = experiment(means)
+    rows = [{"seed": 0, "x": 2.0}, {"seed": 0, "x": 2.5}]
+    text = page([Chapter(one, judged(one, rows), rows, "", 60.0)], ["other"], 2, "a machine", quick=False)
+    assert "| it helps | how much | 2.25 [2, 2.5], 10 tasks | ≥ 1 | **holds** |" in text
+    assert "[One claim](#one-claim)" in text
+    assert "Not run: `other`" in text
+    assert number(math.nan) == "none"
+    assert bound(statement(1.0, 1.0, 1.0, at_least=False, unit="%")) == "≤ 1 %"
+
+
+def test_the_page_in_the_documentation_has_every_claim_and_its_picture() -> None:
+    text = (ROOT / "docs" / "reproduction.md").read_text()
+    for name, one in _paper_claims.EXPERIMENTS.items():
+        assert f"## {one.title}\n" in text
+        assert f"(`{name}`)" in text
+        assert (one.draw is not None) == (f"images/paper_{name}.png" in text)
+    assert "Not run" not in text
+    assert "Short version" not in text
+    for file in (ROOT / "docs" / "images").glob("paper_*.png"):
+        assert file.stat().st_size < 200_000
+
+
+def run(folder: Path, *words: str) -> str:
+    """What a short run prints."""
+    script = str(ROOT / "benchmarks" / "paper.py")
+    command = [sys.executable, script, "--quick", "--out", str(folder), *words]
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_claim_is_measured_stored_and_kept(tmp_path: Path) -> None:
+    asked = [word for name in CHEAP for word in ("--only", name)]
+    printed = run(tmp_path, *asked, "--json", str(tmp_path / "all.json"))
+    assert "spline: measured" in printed
+    folder = tmp_path / "quick"
+    text = (folder / "reproduction.md").read_text()
+    for part in ("Short version", "## The spline", "Not run: "):
+        assert part in text
+    assert json.loads((folder / "spline.json").read_text())["rows"]
+    assert (folder / "spline.csv").read_text().startswith("seed,")
+    result = json.loads((tmp_path / "all.json").read_text())
+    assert {row["claim"] for row in result["rows"]} == set(CHEAP)
+    assert "spline: as it is stored" in run(tmp_path, "--only", "modes")
+
+
+@pytest.mark.long
+def test_every_claim_has_a_short_version(tmp_path: Path) -> None:
+    run(tmp_path)
+    text = (tmp_path / "quick" / "reproduction.md").read_text()
+    assert "Not run" not in text
+    for one in _paper_claims.EXPERIMENTS.values():
+        assert f"## {one.title}\n" in text
