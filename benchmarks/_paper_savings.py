@@ -96,8 +96,8 @@ def follows(statements: Sequence[Statement]) -> str:
         f"{highest:+.1f} % or more, for the PTP itself is among the answers. Free in time the median is "
         f"{free:+.1f} % for least J; the fastest movements take {time:+.1f} %. So the range of section V "
         "mixes durations and objectives: at an equal duration neither of its ends is what a user should "
-        "expect. Savings of more than 40 % at equal time are movements that lower a load: they give "
-        "energy back, which the optimised time scaling keeps on the bus."
+        "expect. The large savings at equal time come from lowering the load (table): that gives energy "
+        "back, which the optimised time scaling keeps on the bus."
     )
 
 
@@ -129,7 +129,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 
 EXPERIMENT = Experiment(
     "savings",
-    "Energy of optimised movements, -80 to +20 %",
+    "Energy of optimised movements against the common PTP",
     "Section V: optimised trajectories take between 80 % less and 20 % more energy than the common ones.",
     "Random free straight movements in `open`, half with the 155 kg tool and half empty. Reference: the "
     "fastest common S-curve PTP between the same configurations. Answers of the planner: of the same "

@@ -198,7 +198,7 @@ EXPERIMENT = Experiment(
     "weighted by the mass from the tool to the joint and ranked by the total metric distance D, leads "
     "out of semi-closed and closed zones.",
     f"Stations of {', '.join(CELLS)} and of {VARIANTS} mirrored, turned and jittered variants of each per "
-    f"seed, from their cheapest free configuration, {DRAWS} searches each, at most {EDGES} certified "
+    f"seed, from their cheapest free configuration, {DRAWS} per station, at most {EDGES} certified "
     "steps. Readings: weights proportional to the mass (as printed) or inverse; the mean with its drift "
     f"outwards, without (the first step of {1e3 * NO_DRIFT:g} mm), or as printed (proportional to D, "
     "equal for all joints); two bidirectional trees as the rival. Left: outside the zone and free "

@@ -1,6 +1,6 @@
 """Which of the paper's claims hold?
 
-    python benchmarks/paper.py [--only NAME]... [--seeds N] [--again] [--out FOLDER] [--page FILE]
+    python benchmarks/paper.py [--only NAME]... [--seeds N] [--again] [--write] [--out FOLDER] [--page FILE]
                                [--quick] [--json FILE]
 
 Every claim is an experiment of its own (`_paper_<claim>.py`). What one has found is stored as JSON and CSV in
@@ -40,6 +40,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--only", action="append", choices=list(EXPERIMENTS), metavar="NAME", help=names)
     parser.add_argument("--seeds", type=int, default=SEEDS, help=f"independent repetitions; default: {SEEDS}")
     parser.add_argument("--again", action="store_true", help="measure also what is stored")
+    parser.add_argument("--write", action="store_true", help="measure nothing: the page from what is stored")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "paper", help="where rows are stored")
     parser.add_argument("--page", type=Path, help="default: docs/reproduction.md; --quick: in --out")
     add_ending(parser, "small samples, one seed, a page of its own")
@@ -106,19 +107,18 @@ def claims_of(statements: Sequence[Statement]) -> list[Claim]:
 def main() -> None:
     """Measure what is missing, write the page, print the claims."""
     given = arguments()
-    for experiment in EXPERIMENTS.values():
-        asked = (
-            experiment.name in given.only if given.only else given.again or stored(experiment, given) is None
-        )
+    for experiment in [] if given.write else EXPERIMENTS.values():
+        missing = stored(experiment, given) is None
+        asked = experiment.name in given.only if given.only else given.again or missing
         print(f"{experiment.name}: {'measured' if asked else 'as it is stored'}", flush=True)
         if asked:
             run(experiment, given)
     there = {name: found for name, one in EXPERIMENTS.items() if (found := stored(one, given)) is not None}
     folder = given.page.parent
     chapters = [chapter(EXPERIMENTS[name], found, folder / "images", folder) for name, found in there.items()]
-    missing = [name for name in EXPERIMENTS if name not in there]
+    left = [name for name in EXPERIMENTS if name not in there]
     machines = {found["machine"].split(", load")[0] for found in there.values()}
-    text = page(chapters, missing, given.seeds, ", ".join(sorted(machines)), given.quick)
+    text = page(chapters, left, given.seeds, ", ".join(sorted(machines)), given.quick)
     write(text, given.page)
     claims, rows = [], []
     for one in chapters:
