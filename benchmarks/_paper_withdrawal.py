@@ -117,14 +117,8 @@ def _success(rows: Sequence[Row], zones: str, kinds: tuple[str, ...]) -> Stateme
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """Success by type of zone, what each part adds, and trees instead."""
-    found = [
-        _success(rows, name, kinds)
-        for name, kinds in (
-            ("open", ("OPEN",)),
-            ("semi-closed", ("SEMI_CLOSED",)),
-            ("closed", ("CLOSED",)),
-        )
-    ]
+    types = (("open", ("OPEN",)), ("semi-closed", ("SEMI_CLOSED",)), ("closed", ("CLOSED",)))
+    found = [_success(rows, name, kinds) for name, kinds in types]
     for says, one, other in (
         ("weights proportional to the mass do better than inverse ones", DEFAULT, "inverse weights"),
         ("the drift of the mean is needed", DEFAULT, "no drift"),

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 import _paper_claims
 import _paper_statistics as statistics
 import numpy as np
+import paper
 import pytest
 from _paper_page import Chapter, bound, number, page
 from _paper_result import CALIBRATED, FAILS, HOLDS, MEASURED, OPEN, Experiment, Row, Statement, judged
@@ -122,33 +121,35 @@ def test_the_page_in_the_documentation_has_every_claim_and_its_picture() -> None
         assert file.stat().st_size < 200_000
 
 
-def run(folder: Path, *words: str) -> str:
-    """What a short run prints."""
-    script = str(ROOT / "benchmarks" / "paper.py")
-    command = [sys.executable, script, "--quick", "--out", str(folder), *words]
-    done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def run(monkeypatch: pytest.MonkeyPatch, folder: Path, *words: str) -> None:
+    """A short run."""
+    monkeypatch.setattr(sys, "argv", ["paper.py", "--quick", "--out", str(folder), *words])
+    paper.main()
 
 
-def test_a_claim_is_measured_stored_and_kept(tmp_path: Path) -> None:
+def test_a_claim_is_measured_stored_and_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     asked = [word for name in CHEAP for word in ("--only", name)]
-    printed = run(tmp_path, *asked, "--json", str(tmp_path / "all.json"))
-    assert "spline: measured" in printed
+    run(monkeypatch, tmp_path, *asked, "--json", str(tmp_path / "all.json"))
+    assert "spline: measured" in capsys.readouterr().out
     folder = tmp_path / "quick"
     text = (folder / "reproduction.md").read_text()
     for part in ("Short version", "## The spline", "Not run: "):
         assert part in text
-    assert json.loads((folder / "spline.json").read_text())["rows"]
+    before = (folder / "spline.json").read_text()
+    assert json.loads(before)["rows"]
     assert (folder / "spline.csv").read_text().startswith("seed,")
     result = json.loads((tmp_path / "all.json").read_text())
     assert {row["claim"] for row in result["rows"]} == set(CHEAP)
-    assert "spline: as it is stored" in run(tmp_path, "--only", "modes")
+    run(monkeypatch, tmp_path, "--only", "modes")
+    assert "spline: as it is stored" in capsys.readouterr().out
+    assert (folder / "spline.json").read_text() == before
 
 
 @pytest.mark.long
-def test_every_claim_has_a_short_version(tmp_path: Path) -> None:
-    run(tmp_path)
+def test_every_claim_has_a_short_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run(monkeypatch, tmp_path)
     text = (tmp_path / "quick" / "reproduction.md").read_text()
     assert "Not run" not in text
     for one in _paper_claims.EXPERIMENTS.values():
