@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_recorder.format.definition import definitions_of
+from ir_recorder.read.raw_values import RawChannel
+
+
+def decoder_of(channel: RawChannel) -> Callable[[bytes], Any] | None:
+    """What decodes the channel's messages, None where nothing does; raises nearly anything for a damaged
+    schema. The library prints what it can't read, which may be anything: that stays out of the terminal.
+    """
+    schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
+    definitions_of(channel.type, channel.schema_text)
+    with contextlib.redirect_stderr(io.StringIO()):
+        decode: Callable[[bytes], Any] | None = DecoderFactory().decoder_for(channel.message_encoding, schema)
+    return decode
 
 
 def movement_from(message: Any) -> PlannedMovement:

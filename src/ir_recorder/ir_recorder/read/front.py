@@ -12,8 +12,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from mcap.records import Schema
-from mcap_ros2.decoder import DecoderFactory
 
 from ir_msgs_py import names
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
@@ -23,6 +21,7 @@ from ir_recorder.format.definition import SEPARATOR, fields_of
 from ir_recorder.format.schemas import SchemaLibrary, installed_prefixes
 from ir_recorder.read.cdr import Columns
 from ir_recorder.read.cells import chosen_namespace
+from ir_recorder.read.decoded import decoder_of
 from ir_recorder.read.raw import RawChannel, read_raw
 
 ACTION = "ir_msgs/action/Plan"
@@ -50,9 +49,8 @@ def recorded_front(
 
 def answers(channel: RawChannel, kinds: tuple[str, ...] = (ACTION,)) -> Iterator[bytes]:
     """Results and answers of these types, the last one first; what can't be decoded is left out."""
-    schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
     try:
-        decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
+        decode = decoder_of(channel)
     except Exception:  # a damaged schema makes the parser raise nearly anything
         return
     for data in reversed(channel.messages):

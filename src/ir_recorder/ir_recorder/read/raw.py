@@ -16,6 +16,7 @@ from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
+from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import FileRefusedError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.errors import ReadError
@@ -110,9 +111,10 @@ def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecordin
     if not found.complete:
         found.problems.append(f"the file ends early; {messages} messages were read up to there")
     if not messages and not found.attachments and not found.facts:
-        raise ReadError(f"{path} holds no messages" + "".join(f"; {p}" for p in found.problems))
+        raise ReadError(one_line(f"{path} holds no messages" + "".join(f"; {p}" for p in found.problems)))
+    problems = tuple(map(one_line, found.problems))
     return RawRecording(
-        path, tuple(found.raw_channels()), tuple(found.attachments), tuple(found.facts), tuple(found.problems)
+        path, tuple(found.raw_channels()), tuple(found.attachments), tuple(found.facts), problems
     )
 
 

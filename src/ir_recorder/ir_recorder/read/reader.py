@@ -10,23 +10,21 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from mcap.records import Schema
-from mcap_ros2.decoder import DecoderFactory
 
 from ir_msgs_py import names
 from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.namespaces import owns_diagnostic, owns_logger
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
-from ir_recorder.format.definition import definitions_of
 from ir_recorder.read.around import contacts, machine_states
 from ir_recorder.read.cdr import Columns
 from ir_recorder.read.cells import chosen_namespace
 from ir_recorder.read.chunks import ReadLimits
-from ir_recorder.read.decoded import movement_from, savings_from
+from ir_recorder.read.decoded import decoder_of, movement_from, savings_from
 from ir_recorder.read.planned import planned_steps
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
@@ -107,7 +105,7 @@ class _Reader:
             power_yaml=self._attached(contents.POWER),
             plant_yaml=self._text(names.PLANT),
             facts=raw.facts,
-            problems=tuple(self._problems),
+            problems=tuple(map(one_line, self._problems)),
         )
         if found.joints is not None or found.power is not None or found.events:
             return found
@@ -269,10 +267,8 @@ class _Reader:
 
     def _decoded(self, channel: RawChannel) -> Iterator[tuple[float, Any]]:
         """Messages one by one with their log time [s]; undecodable ones are counted."""
-        schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
         try:
-            definitions_of(channel.type, channel.schema_text)
-            decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
+            decode = decoder_of(channel)
         except Exception as error:  # a damaged schema makes the parser raise nearly anything
             self._problems.append(f"{channel.topic}: definition of {channel.type} can't be read ({error})")
             return
