@@ -84,3 +84,23 @@ def test_what_moves_or_is_elsewhere_is_left_out_by_name(
     assert [body.name for body in cell_from_yaml(out).machine("tables").bodies] == ["c", "tables_c"]
     assert "model arm" in err
     assert "model://sun" in err
+
+
+def test_the_glb_holds_every_body_where_it_stands(tmp_path: Path) -> None:
+    import trimesh
+
+    path = tmp_path / "demo.glb"
+    assert main(["cell", "export", "demo", str(path)]) == 0
+    assert main(["cell", "export", "demo", str(path)]) == 1
+    cell, scene = load_cell("demo"), trimesh.load_scene(path)
+    upright = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+    bodies = [body for machine in cell.equipment for body in machine.world_bodies()]
+    assert len(scene.graph.nodes_geometry) == len(bodies)
+    found = []
+    for node in scene.graph.nodes_geometry:  # a machine and its body may have one name
+        pose, geometry = scene.graph[node]
+        points = trimesh.transform_points(scene.geometry[geometry].vertices, upright @ pose)
+        found.append([*points.min(axis=0), *points.max(axis=0)])
+    for body in bodies:
+        bounds = np.concatenate(body.bounds())
+        assert np.abs(np.array(found) - bounds).max(axis=1).min() < 0.02, body.name  # round ones have corners

@@ -21,9 +21,9 @@ WORLDS = (".sdf", ".world", ".urdf")
 
 def add_export(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add cell export."""
-    command = verbs.add_parser("export", help="the machines of a cell as a world: SDF or URDF")
+    command = verbs.add_parser("export", help="the machines of a cell as SDF, URDF or glTF")
     add_cell(command)
-    command.add_argument("file", metavar="FILE", help="world.sdf or world.urdf, and meshes beside it")
+    command.add_argument("file", metavar="FILE", help="world.sdf, world.urdf or world.glb")
     command.set_defaults(run=run_export)
 
 
@@ -31,10 +31,18 @@ def run_export(arguments: argparse.Namespace) -> int:
     """Write the world; files that are there are not overwritten."""
     path = Path(arguments.file)
     form = path.suffix.lower().removeprefix(".")
-    if form not in WRITERS:
-        raise InputError(f"{path.name[:60]!a} must end with .sdf or .urdf")
+    if form not in (*WRITERS, "glb"):
+        raise InputError(f"{path.name[:60]!a} must end with .sdf, .urdf or .glb")
     with sentences():
-        text, files = WRITERS[form](load_cell(arguments.cell))
+        cell = load_cell(arguments.cell)
+    if form == "glb":
+        from .cell_glb import cell_glb  # draws bodies as the report does
+
+        with path.open("xb") as binary:
+            binary.write(cell_glb(cell))
+        sys.stdout.write(f"{path}\n")
+        return 0
+    text, files = WRITERS[form](cell)
     for name, content in ((path.name, text), *files.items()):
         with (path.parent / name).open("x", encoding="utf-8") as file:
             file.write(content)
