@@ -1,4 +1,5 @@
-"""Does every planner solve what it is asked, certified, and is an arena that was killed the same afterwards?
+"""Does every planner solve what it is asked, certified? Is an arena that was killed the same afterwards? Do
+layout studies find the best?
 
     python benchmarks/studies.py [--cell NAME]... [--seeds N] [--planner NAME]... [--coal N] [--quick]
                                  [--json FILE]
@@ -7,7 +8,8 @@ Every planner is asked for every task of the cells, there and back, until it has
 seeds; Coal looks at its answers every 0.0005 rad, at so many per planner and cell. Then `ir arena` runs the
 cells with one request per run, is killed with SIGKILL once it has made a third, and goes on; its table is
 held against that of an arena which ran through, without the columns of times and without planners that can't
-promise the same bytes.
+promise the same bytes. Layout studies of the demonstration: the bounds against an exhaustive grid, at least
+1,000 placements against the given one, and how many programs are planned per second.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from _layout_study import layout_claims
 from _regional_ours import asked, planner_of
 from _regional_tasks import Task, tasks_of
 from _results import Claim, at_least, at_most, command_line, finish, line_of
@@ -35,8 +38,8 @@ from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
 from ir_planner.search import SEARCHES, repeatable
 from ir_studies.arena import PORTFOLIO
-from ir_studies.arena.results import NAME
 from ir_studies.arena.table import TIMES
+from ir_studies.work.results import NAME
 
 CELLS = ("open",)
 PLANNERS = (PORTFOLIO, "genetic", "tree", "sbl", "kpiece", "bkpiece", "lbkpiece", "prm", "rrt", "rrt_connect",
@@ -179,6 +182,7 @@ def main() -> None:
     both = [name for name in planners if name in IN_BOTH] or planners
     claims = claims_of(rows) if "open" in cells else []
     claims += killed_and_resumed(cells[:1], both, 1 if given.quick else given.seeds)
+    claims += layout_claims("demo", quick=given.quick)
     finish(given.json, rows, claims)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 
 from ir_description import load_cell
-from ir_studies import LayoutSettings, Means, run_layout
+from ir_studies import LayoutSettings, Means, read_layout, run_layout
 from ir_studies.errors import FolderError, StoppedError
 from ir_studies.layout import Layouts
 from ir_studies.work.results import NAME
@@ -112,6 +113,36 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     assert float(least["saved_j"]) == pytest.approx(saved, abs=2e-3)
     # robots add 10 % of the joules at most: of a difference 10 % of the difference
     assert float(least["saved_high_j"]) == pytest.approx(1.09 * saved, rel=0.02)
+
+
+FULL = """
+import sys
+sys.path[:0] = {path!r}
+from ir_studies import Means, StudyError, read_layout, run_layout
+try:
+    run_layout(read_layout({settings!r}), {folder!r}, Means(1, command={command!r}))
+except StudyError as error:
+    sys.exit(str(error))
+"""
+
+
+def test_a_full_disk_ends_it_with_a_sentence_and_it_goes_on_when_there_is_room(
+    laid: Laid, tmp_path: Path
+) -> None:
+    settings = tmp_path / "layout.yaml"
+    settings.write_text(
+        "format: ir_layout/1\ncell: demo\nbase: {x: [-0.5, 0.5]}\nplacements: 40\nrounds: 1\n"
+    )
+    command = (sys.executable, "-S", str(WORKER), str(tmp_path))
+    places = {"settings": str(settings), "folder": str(tmp_path / "full"), "command": command}
+    script = FULL.format(path=sys.path, **places)
+    words = ["sh", "-c", 'ulimit -f 4; exec "$@"', "sh", sys.executable, "-c", script]  # blocks of 512 bytes
+    ended = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert "results.jsonl can't be written: File too large" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    whole = laid(read_layout(settings), "whole")
+    assert laid(read_layout(settings), "full").summary == whole.summary
 
 
 def test_where_nothing_is_possible_the_study_says_why(laid: Laid) -> None:

@@ -66,6 +66,13 @@ def test_workers_are_kept_from_batch_to_batch_until_the_pool_closes() -> None:
     assert not Path(f"/proc/{pids.pop()}").exists()
 
 
+def test_who_takes_one_row_only_gets_the_next_ones_later() -> None:
+    with Pool(TASK, 1, (sys.executable, "-S", "-c", ECHO)) as pool:
+        for _ in range(3):
+            job, row = next(pool.rows([Job("a")]))
+            assert (job.key, row["outcome"]) == ("a", "answered")
+
+
 def test_a_worker_that_died_while_it_waited_is_replaced() -> None:
     with Pool(TASK, 1, (sys.executable, "-S", "-c", ECHO, "x")) as pool:
         for _ in range(3):

@@ -23,7 +23,7 @@ from ir_recorder.report.words import DASH, joules, millimetres, percent, text
 from ir_studies.layout.finals import Final
 from ir_studies.layout.freedom import Variable
 from ir_studies.layout.placement import Known
-from ir_studies.layout.plan_view import PlanView, colour, legend, mark, shown_range
+from ir_studies.layout.plan_view import PlanView, colour, estimates, legend, mark, shown_range
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import LayoutSettings
 from ir_studies.layout.summary import ends, of_condition, sentences
@@ -95,14 +95,15 @@ def _maps(
     _, best = ends(finals)
     star = settings.placing.cell(cell, best[0].placement.values) if best else None
     view = PlanView(cell, star)
+    limits, costs = shown_range(known), dict(zip(map(id, known), estimates(known), strict=True))
     owners = [v.owner for v in settings.variables if v.part in ("x", "y") and v.owner != "tool"]
     for owner in dict.fromkeys(owners):
         at = place_of(owner, cell)
         prefix = "base" if owner == "base" else f"equipment.{owner}"
         marks = []
-        for one in sorted(known, key=_drawn_last):
+        for one in sorted(known, key=lambda one: _drawn_last(one, costs[id(one)])):
             shift = [one.placement.values.get(f"{prefix}.{axis}", 0.0) for axis in "xy"]
-            marks.append((at + shift, *_mark_of(one, known)))
+            marks.append((at + shift, *_mark_of(one, costs[id(one)], limits)))
         marks.append((at, "given", "", "as given"))
         if star is not None:
             marks.append((place_of(owner, star), "best", "", "best"))
@@ -115,18 +116,17 @@ def place_of(owner: str, cell: Cell) -> FloatArray:
     return np.array(pose[:2, 3])
 
 
-def _drawn_last(one: Known) -> tuple[int, float]:
-    """The best is drawn over the others."""
-    return (2, -one.cost) if math.isfinite(one.cost) else (0 if one.cost == math.inf else 1, 0.0)
+def _drawn_last(one: Known, cost: float) -> tuple[int, float]:
+    """The best is drawn over the others, and what was planned over what was estimated."""
+    return (2 if math.isfinite(one.cost) else 1, -cost) if math.isfinite(cost) else (0, 0.0)
 
 
-def _mark_of(one: Known, known: Sequence[Known]) -> tuple[str, str, str]:
+def _mark_of(one: Known, cost: float, limits: tuple[float, float]) -> tuple[str, str, str]:
     """Kind, colour and words of a placement's mark."""
     if one.cost == math.inf:
         return "cross", "", f"{one.placement.key}: {one.reason[0]}"
-    if math.isnan(one.cost):
-        return "open", "", f"{one.placement.key}: not planned"
-    return "dot", colour(one.cost, *shown_range(known)), f"{one.placement.key}: {joules(one.cost)}"
+    kind, words = ("dot", "") if math.isfinite(one.cost) else ("open", "about ")
+    return kind, colour(cost, *limits), f"{one.placement.key}: {words}{joules(cost)}"
 
 
 def _charts(
@@ -142,7 +142,7 @@ def _chart(variable: Variable, known: Sequence[Known], low: float, high: float) 
     """Cost over one variable; what is dearer than shown stands at the upper edge."""
     width = max(variable.high - variable.low, 1e-9)
     marks = []
-    for one in sorted(known, key=_drawn_last):
+    for one in sorted(known, key=lambda one: _drawn_last(one, one.cost)):
         value = one.placement.values.get(variable.name, 0.0)
         if not math.isfinite(one.cost):
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +22,7 @@ class Placement:
 
     values: Values
 
-    @property
+    @cached_property
     def key(self) -> str:
         """What it is known by."""
         return text_of(self.values)

@@ -20,14 +20,25 @@ _COLOURS = ("#1a7f5a", "#5aa02c", "#b5a900", "#e08a00", "#d1495b")  # from least
 
 
 def colour(cost: float, low: float, high: float) -> str:
-    """Of a cost between the least and the most that are shown."""
+    """Of a cost between the least and the most that are shown; "" where it isn't known."""
+    if not math.isfinite(cost):
+        return ""
     share = (cost - low) / (high - low) if high > low else 0.0
     return _COLOURS[int(np.clip(share * len(_COLOURS), 0, len(_COLOURS) - 1))]
 
 
+def estimates(known: Sequence[Known]) -> list[float]:
+    """Costs of placements; of those that were looked at only, what coarse movements cost, with the median of
+    what plans cost above them. Inf where a placement is impossible, NaN where nothing was planned.
+    """
+    above = [one.cost - one.coarse for one in known if math.isfinite(one.cost)]
+    more = float(np.median(above)) if above else math.nan
+    return [one.coarse + more if math.isnan(one.cost) else one.cost for one in known]
+
+
 def shown_range(known: Sequence[Known]) -> tuple[float, float]:
-    """Least cost, and the one that nine of ten planned placements stay below; NaN where none was planned."""
-    costs = [one.cost for one in known if math.isfinite(one.cost)]
+    """Least cost, and the one that nine of ten placements stay below; NaN where none was planned."""
+    costs = [cost for cost in estimates(known) if math.isfinite(cost)]
     return (min(costs), float(np.quantile(costs, 0.9))) if costs else (math.nan, math.nan)
 
 
@@ -38,7 +49,7 @@ def legend(low: float, high: float) -> str:
         f'<span><span class="key" style="background:{one}"></span>{text(joules(float(at)))} …</span>'
         for one, at in zip(_COLOURS, steps, strict=False)
     )
-    rest = ("○ not planned: it can't be the best", "× impossible", "◆ as given", "★ best")
+    rest = ("○ looked at only: estimated", "× impossible", "◆ as given", "★ best")
     return f'<p class="key-row">{"".join(keys)}{"".join(f"<span>{one}</span>" for one in rest)}</p>'
 
 
@@ -79,7 +90,7 @@ def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
         return f'<path class="given" d="M{x:.1f} {y - 7:.1f}l7 7l-7 7l-7 -7z">{title}</path>'
     if kind == "best":
         return f'<text class="star" x="{x:.1f}" y="{y + 6:.1f}">★{title}</text>'
-    style = f'style="fill:{fill}"' if kind == "dot" else ""
+    style = f'style="{"fill" if kind == "dot" else "stroke"}:{fill}"'
     return f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="3" {style}>{title}</circle>'
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict
 from importlib import import_module
 from itertools import islice
+from queue import Empty, Queue
 from types import ModuleType, TracebackType
 from typing import Any
 
@@ -58,7 +59,7 @@ class Cluster:
 
     def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
         """Each job with its row, as they are made."""
-        left, running = iter(jobs), dict[Any, Job]()
+        left, running, done = iter(jobs), dict[Any, Job](), Queue[Any]()
         build = computed_with()
         try:
             while True:
@@ -66,9 +67,11 @@ class Cluster:
                     # not by its content: what is asked again is made again
                     submitted = self._client.submit(made, self._task, dict(job.words), build, pure=False)
                     running[submitted] = job
+                    submitted.add_done_callback(done.put)
                 if not running:
                     return
-                for future in self._done(running):
+                future = self._next(done)
+                if future in running:
                     yield running.pop(future), self._row(future)
         finally:
             self._client.cancel(list(running))
@@ -77,15 +80,14 @@ class Cluster:
         threads = sum(int(count) for count in self._client.nthreads().values())
         return max(_AHEAD * max(threads, 1) - running, 0)
 
-    def _done(self, running: Mapping[Any, Job]) -> Iterable[Any]:
+    def _next(self, done: Queue[Any]) -> Any:
+        """What was done next; None where nothing was for a while."""
         if self._stopped is not None and self._stopped():
             raise StoppedError("stopped")
         try:
-            found = self._dask.wait(list(running), timeout=_LOOK_S, return_when="FIRST_COMPLETED")
-        except TimeoutError:
-            return ()
-        done: Iterable[Any] = found.done
-        return done
+            return done.get(timeout=_LOOK_S)
+        except Empty:
+            return None
 
     def _row(self, future: Any) -> Row:
         """What a job gave; a row of its own where its workers died again and again."""
@@ -126,9 +128,8 @@ def made(task: str, words: Mapping[str, Any], build: str) -> Row:
     """In a worker of the cluster: the row of a job. WorkerError where it would compute other bits."""
     if computed_with() != build:
         raise WorkerError(f"a worker of the cluster computes with {computed_with()}, not with {build}")
-    for _, row in _pool(task).rows([Job("", words)]):
-        return row
-    raise WorkerError("a job had no row")
+    [(_, row)] = _pool(task).rows([Job("", words)])
+    return row
 
 
 def _pool(task: str) -> Pool:

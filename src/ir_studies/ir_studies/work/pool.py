@@ -153,10 +153,10 @@ class Pool:
                 yield from self._replaced(worker, "died")
                 continue
             for row in rows:
-                if worker.turn is not None:
-                    yield worker.turn.job, {"outcome": "answered", **row}
-                worker.ready, self._failed_starts = True, 0
-                self._give(worker)
+                turn, worker.ready, self._failed_starts = worker.turn, True, 0
+                self._give(worker)  # before the row is handed on: who takes it may not come back
+                if turn is not None:
+                    yield turn.job, {"outcome": "answered", **row}
         now = time.monotonic()
         for worker in [worker for worker in self._workers if worker.late <= now]:
             yield from self._replaced(worker, "cut")

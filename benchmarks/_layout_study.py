@@ -1,0 +1,122 @@
+"""Layout studies for studies.py: bounds against an exhaustive grid, the demonstration, programs a second."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from _results import Claim, at_least, at_most, line_of
+
+from ir_studies import LayoutSettings, Means, run_layout
+from ir_studies.layout import Layouts
+from ir_studies.layout.summary import ends
+
+EVERYTHING = 1000.0  # a margin that excludes nothing
+SMALL = LayoutSettings(
+    cell="demo",
+    base={"x": (-0.4, 0.4), "y": (-0.4, 0.4)},
+    method="grid",
+    steps=7,
+    keep=1,
+    seeds=3,
+    margin=0.0,
+)
+DEMONSTRATION = LayoutSettings(
+    cell="demo",
+    base={"x": (-0.5, 0.5), "y": (-0.5, 0.5), "z": (0.0, 0.4), "turn_deg": (-30.0, 30.0)},
+    equipment={
+        "infeed": {"x": (-0.4, 0.4), "y": (-0.3, 0.5)},
+        "gauge": {"x": (-0.6, 0.4), "y": (-0.6, 0.6), "turn_deg": (-45.0, 45.0)},
+        "outfeed": {"x": (-0.4, 0.5), "y": (-0.5, 0.4)},
+    },
+    park={"a1_deg": (-60.0, 60.0), "a2_deg": (-10.0, 60.0)},
+    placements=1100,
+    rounds=4,
+    margin=0.003,
+)
+
+
+def layout_claims(cell: str, *, quick: bool) -> list[Claim]:
+    """All claims about layout studies; quick: without the demonstration's, and fewer programs."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        small = replace(SMALL, cell=cell, steps=4 if quick else 7)
+        claims = bounded_against_exhaustive(small, folder)
+        claims += speed(small, folder, 8 if quick else 24)
+        if not quick:
+            claims += demonstration(folder)
+    return claims
+
+
+def bounded_against_exhaustive(settings: LayoutSettings, folder: Path) -> list[Claim]:
+    """What bounds lose of the best of a grid, free and in a cycle time; the spread is that over seeds."""
+    free = run_layout(settings, folder / "given")
+    cycle = math.ceil(free.finals[0][0].mean("duration_s") * 1.002)
+    claims = []
+    for name, asked in (("free", settings), ("cycle time", replace(settings, cycle_times=(float(cycle),)))):
+        bounded = run_layout(asked, folder / "given")  # rows are the same whoever asks: they are made once
+        whole = run_layout(replace(asked, margin=EVERYTHING), folder / "given")
+        lost = 100.0 * (least(bounded) / least(whole) - 1.0)
+        spread = max(one.spread("cost_j") / one.mean("cost_j") for own in whole.finals for one in own)
+        plans = [sum(math.isfinite(one.cost) for one in found.known) for found in (bounded, whole)]
+        row = {"layout": name, "best_j": least(bounded), "grid_j": least(whole), "lost_percent": lost}
+        print(line_of({**row, "plans": plans[0], "grid_plans": plans[1], "spread_percent": 100.0 * spread}))
+        bound = 1.0 + 100.0 * spread
+        claims.append(at_most(f"layout, {name}: best above an exhaustive grid's", lost, "%", bound))
+        claims.append(at_most(f"layout, {name}: share planned of the grid", plans[0] / plans[1], "", 1.0))
+    return claims
+
+
+def least(found: Layouts) -> float:
+    """Cost of the best placement."""
+    return min(one.cost for one in found.known if math.isfinite(one.cost))
+
+
+def demonstration(folder: Path) -> list[Claim]:
+    """The layout of the demonstration."""
+    begun = time.monotonic()
+    found = run_layout(DEMONSTRATION, folder / "demonstration")
+    print(found.summary)
+    given, best = ends(found.finals)
+    assert given is not None  # the bundled cell has its program
+    assert best is not None
+    saved, within = best[0].saving(given[0])
+    print(f"{time.monotonic() - begun:.0f} s; spread over seeds {best[0].spread():.0f} J")
+    return [
+        at_least("layout of the demonstration: placements", len(found.known), "", 1000.0),
+        at_least("layout of the demonstration: joules saved per cycle", saved, "J", 0.0),
+        at_least("layout of the demonstration: low end of their 90 % interval", within.low, "J", 0.0),
+    ]
+
+
+def speed(settings: LayoutSettings, folder: Path, programs: int) -> list[Claim]:
+    """Programs per second: one process on one core, two and four on two. Wall clock."""
+    cores = sorted(os.sched_getaffinity(0))
+    asked = replace(settings, margin=EVERYTHING, plans=programs, seeds=1)
+    rate = {}
+    for workers, used in ((1, cores[:1]), (2, cores[:2]), (4, cores[:2])):
+        os.sched_setaffinity(0, used)
+        rate[workers] = programs_per_second(asked, folder / f"{workers} workers", workers)
+        os.sched_setaffinity(0, cores)
+    print(line_of({f"programs_per_s_{workers}_workers": one for workers, one in rate.items()}))
+    return [
+        at_least("programs per second and core", rate[1], "1/s", 1.0),
+        at_least("scaling from one worker on one core to two on two", rate[2] / rate[1], "x", 1.8),
+        at_most("overhead of four workers on two cores", 100.0 * (rate[2] / rate[4] - 1.0), "%", 15.0),
+    ]
+
+
+def programs_per_second(settings: LayoutSettings, folder: Path, workers: int) -> float:
+    """Of a study's plans in full; the time until workers have started doesn't count."""
+    instants: list[float] = []
+
+    def note(phase: str, done: int, of: int, best: str) -> None:
+        if "plans" in phase and done:
+            instants.append(time.monotonic())
+
+    run_layout(settings, folder, Means(workers, progress=note))
+    return (len(instants) - 1) / (instants[-1] - instants[0])
