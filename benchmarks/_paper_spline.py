@@ -118,7 +118,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
         values[shown] = 100.0 * (one.value - 1.0), low, high
     bars(axes, values, color="tab:blue", alpha=0.7)
     axes.axvline(0.0, color="0.3", lw=1.0)
-    axes.set_xlabel("E_drive of the spline (10) over that of the other curve [%], same duration")
+    axes.set_xlabel("extra E_drive of the spline (10) at the same duration [%]")
     finished(figure, file)
 
 
