@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description import Cell
+from ir_description import Body, Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.report.robot_shapes import robot_parts
 from ir_recorder.report.series import Json, indices, quantised
@@ -65,11 +65,20 @@ def _bodies(cell: Cell) -> list[dict[str, Json]]:
     bodies = []
     for machine in cell.equipment:
         for body in machine.world_bodies():
-            mesh = body_mesh(body)
-            if mesh is not None:
-                pose = matrix(body.pose)
-                bodies.append({"name": body.name, "owner": machine.name, "pose": pose, **_mesh(mesh)})
+            shape = body_shape(body, machine.name)
+            if shape is not None:
+                bodies.append(shape)
     return bodies
+
+
+def body_shape(body: Body, owner: str) -> dict[str, Json] | None:
+    """A body of a machine as motion.js draws it; None for a plane."""
+    mesh = body_mesh(body)
+    return (
+        None
+        if mesh is None
+        else {"name": body.name, "owner": owner, "pose": matrix(body.pose), **_mesh(mesh)}
+    )
 
 
 def _labels(cell: Cell) -> list[dict[str, Json]]:

@@ -9,6 +9,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import places_after
 from ir_recorder.report.cell_scene import cell_scene, matrix, part_meshes
+from ir_recorder.report.door_bodies import door_bodies
 from ir_recorder.report.series import Json, floats, indices, quantised
 
 RATE = 50.0  # Hz: between two frames the fastest axis turns 4 degrees, and the page stays small
@@ -33,6 +34,7 @@ def scene(analysis: Analysis) -> dict[str, Json] | None:
         "angles": quantised(q, ANGLE_STEP),
         "power": quantised(_power(analysis, time), POWER_STEP),
         **cell_scene(cell),
+        "bodies": door_bodies(cell, analysis.recording.machines),
         "parts": _part_places(analysis, cell),
         "loads": [[round(t, 3), load] for t, load in _load_changes(analysis)],
         "nearest": _nearest(analysis),

@@ -146,6 +146,12 @@ class Motion {
     for (const [from, where] of part.lies) if (from <= time + 1e-3) pose = where;
     return pose;
   }
+  /* Whether a body of a machine is there at that time: a door comes and goes with its states. */
+  there(shown, time) {
+    let there = true;
+    for (const [from, now] of shown || []) if (from <= time + 1e-3) there = now;
+    return there;
+  }
   draw() {
     const scale = Math.min(window.devicePixelRatio || 1, 2), box = this.canvas.getBoundingClientRect();
     const width = Math.max(Math.round(box.width * scale), 1), height = Math.max(Math.round(box.height * scale), 1);
@@ -186,7 +192,9 @@ class Motion {
   }
   items(time, frame) {
     const poses = this.linkPoses(frame), load = this.load(time).split("+"), items = [];
-    for (const { mesh, pose } of this.bodies) items.push({ mesh, model: pose, tint: this.tints.machine });
+    for (const { mesh, pose, shown, sweep } of this.bodies) {
+      if (this.there(shown, time)) items.push({ mesh, model: pose, tint: sweep ? this.tints.zone : this.tints.machine });
+    }
     const look = this.show.capsules ? "robot" : "capsules";
     for (const { mesh, link, kind, owner, look: own } of this.shapes) {
       if (own === look) continue;
