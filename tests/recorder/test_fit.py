@@ -23,6 +23,7 @@ from ir_description import (
 )
 from ir_recorder.errors import FitError
 from ir_recorder.fit import Fit, fit, sentences
+from ir_recorder.fit.plausible import check_range
 from ir_recorder.measure import PowerModel, Samples, movements
 
 CELL, PRIOR, STEP = load_cell("demo"), data_sheet(), 0.01
@@ -132,6 +133,23 @@ def test_too_little_data_are_refused() -> None:
     samples = programme(1, 1, 0)
     with pytest.raises(FitError, match=r"at least 5\.0 s are needed"):
         fit(samples, MODEL, PRIOR)
+
+
+@pytest.mark.parametrize("factor", [0.0, 1.0 / 3600.0, -1.0, 1000.0])
+def test_a_meter_that_no_parameters_explain_is_refused(factor: float) -> None:
+    """A meter that stands, Wh or kW for J and W, a current transformer that is turned round."""
+    samples = metered(programme(4, 4, 0), PRIOR.drawn(4), 4)
+    with pytest.raises(FitError, match="no parameters explain the meter"):
+        fit(replace(samples, watts=factor * samples.watts), MODEL, PRIOR)
+
+
+def test_degrees_without_their_unit_and_other_robots_are_refused() -> None:
+    q = programme(4, 2, 0).q
+    check_range("run.csv", CELL.robot, q)
+    with pytest.raises(
+        FitError, match=r"run\.csv: joint_a. is .* rad, .* reaches .*_deg; or is it another robot"
+    ):
+        check_range("run.csv", CELL.robot, np.degrees(q))
 
 
 def test_a_meter_with_a_clock_of_its_own_is_fitted_from_csv(

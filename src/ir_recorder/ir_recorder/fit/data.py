@@ -14,6 +14,7 @@ from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import FitError
 from ir_recorder.fit.cells import attached_cell
+from ir_recorder.fit.plausible import check_range
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.on_one_grid import LoadRuns
 from ir_recorder.read.reader import read_recording
@@ -58,6 +59,9 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
     if source.load or not runs:
         runs = [(-np.inf, np.inf, carried(cell, source.load))]
     joints = _with(traces, cell.robot.joint_names)
+    positions = joints.joints(cell.robot.joint_names)
+    assert positions is not None  # the trace was chosen for them
+    check_range(joints.source, cell.robot, positions)
     meter = _metered(traces)
     model = PowerModel(cell.robot, cell.robot.controller.dc_link, cell.base_pose, prior)
     notes = [problem for trace in traces for problem in trace.problems]

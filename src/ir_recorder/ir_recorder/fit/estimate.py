@@ -15,6 +15,7 @@ from scipy.optimize import lsq_linear
 from ir_description import PowerParameters, physical_bounds
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import FitError
+from ir_recorder.fit.plausible import check_explained
 from ir_recorder.fit.residuals import (
     FOLDS,
     WINDOW,
@@ -123,6 +124,7 @@ class _Estimate:
             sources=tuple(str(source) for source in sources),
         )
         before, after = (self._model.watts(each, self._prepared) for each in (self._prior.mean, mean))
+        check_explained(self._watts, self._reduced(after), self._moving)
         return Fit(
             found,
             np.asarray(determined),
