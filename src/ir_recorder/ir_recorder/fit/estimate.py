@@ -31,7 +31,8 @@ from ir_recorder.measure import PowerModel, Samples, movements
 
 DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
 LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
-_ROUNDS = 20
+_ROUNDS = 30
+_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)  # of a step: the DC link makes kinks
 _DONE = 1e-4  # of a deviation: the largest change of a last step
 _REWEIGHTED = 3  # times that the noise is estimated anew
 _MOST_WIDENED = 1e4  # of the variance of the noise
@@ -157,7 +158,7 @@ class _Estimate:
         cost, residual, slopes = self._at(mean, weight)
         for _ in range(_ROUNDS):
             step = self._step(mean, residual, slopes, free)
-            for share in (1.0, 0.5, 0.25, 0.1):
+            for share in _SHARES:
                 trial = np.clip(mean + share * step, self._low, self._high)
                 better = self._at(trial, weight)
                 if better[0] <= cost:
