@@ -24,7 +24,7 @@ SWEEPS = {"open": 3, "table_columns": 3, "cnc_door": 2}  # of them so many per c
 DRAWS, QUICK_DRAWS = 2, 1  # searches of each setting per task
 PLANNING_S = 60.0
 PLANNERS = ("genetic", "tree", "")
-SURE = 90.0  # % of the solvable tasks: as much as a seed's forty can show
+SURE = 95.0  # % of the solvable tasks
 DEFAULT = "default"
 SWEPT: dict[str, tuple[dict[str, Any], ...]] = {
     "shape": ({"shape": "spline"},),

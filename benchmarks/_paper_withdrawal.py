@@ -25,7 +25,7 @@ from ir_planner.service.modified_ga import ModifiedGa
 CELLS = ("cnc_door", "deep_box", "demo")
 VARIANTS, DRAWS, QUICK_DRAWS = 12, 1, 1  # of each cell and seed; searches per station and reading
 EDGES, SECONDS = 8_000, 20.0  # certified edges of a search, and its ceiling
-SURE = 90.0  # % of the searches: as much as a seed's 36 closed stations can show
+SURE = 95.0  # % of the searches
 POINTS = 2.0  # percentage points of searches from which on a difference is worth having
 SOONER = 0.9  # of the time
 NO_DRIFT = 0.001  # m: the least first step, so that the mean hardly moves the tool

@@ -7,6 +7,7 @@ drag the pointer, take a picture, print; with every console error and every requ
 from __future__ import annotations
 
 import base64
+import ctypes
 import json
 import re
 import shutil
@@ -29,12 +30,18 @@ FLAGS = (
     *("--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--remote-debugging-port=0", "about:blank"),
 )
 START_SECONDS = 30.0
+_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 ANSWER_SECONDS = 60.0  # a busy machine draws 3D in software
 
 
 def chromium() -> str | None:
     """The browser that is installed, None without one."""
     return next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
+def _end_with_parent() -> None:
+    """Whatever ends this process, SIGKILL included, ends the browser too."""
+    ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGTERM)
 
 
 class PageError(Exception):
@@ -50,7 +57,9 @@ class Browser:
             raise PageError(f"no browser is installed: none of {', '.join(NAMES)}")
         self._profile = tempfile.TemporaryDirectory(prefix="chromium_", ignore_cleanup_errors=True)
         command = [path, f"--user-data-dir={self._profile.name}", *FLAGS]
-        self._process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+        self._process = subprocess.Popen(
+            command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_end_with_parent
+        )
         self._socket = connect(self._address(), max_size=None)
         self._number = 0
         self.events: list[Mapping[str, Any]] = []

@@ -45,7 +45,7 @@ SECTIONS = (
         (
             *_docs(
                 "planning", "programs", "service_movements", "energy", "driver", "plant", "architecture",
-                "paper_map", "laws", "benchmarks",
+                "paper_map", "reproduction", "laws", "benchmarks",
             ),
             "CONTRIBUTING.md",
             "CHANGELOG.md",
