@@ -30,6 +30,10 @@ class TrajectoryRefusedError(DriverError):
         super().__init__(sentence)
         self.code = code
 
+    def __reduce__(self) -> tuple[type[TrajectoryRefusedError], tuple[int, str]]:
+        """It passes from one process to another with its code."""
+        return type(self), (self.code, str(self))
+
 
 class RequestRefusedError(DriverError):
     """A service request that cannot be met; `code` answers it."""
@@ -37,6 +41,10 @@ class RequestRefusedError(DriverError):
     def __init__(self, code: StatusCode, sentence: str) -> None:
         super().__init__(sentence)
         self.code = code
+
+    def __reduce__(self) -> tuple[type[RequestRefusedError], tuple[StatusCode, str]]:
+        """It passes from one process to another with its code."""
+        return type(self), (self.code, str(self))
 
 
 class PlantStoppedError(DriverError):
