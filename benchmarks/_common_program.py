@@ -39,16 +39,16 @@ def common_program(chains: Chains, planner: Planner, options: PlanOptions) -> Co
             line = chains.line(place, node, entry=entry)
             if line is not None:
                 T, E = T + line.duration, E + line.energy - line.base_energy
-        if np.abs(second.outside - first.outside).max() < 1e-9:
+        if np.abs(second.arrival - first.departure).max() < 1e-9:
             continue
         segments += 1
-        least = fastest_baseline(first.outside, second.outside, scene, drives)
-        movement = baseline(first.outside, second.outside, scene, least)
+        least = fastest_baseline(first.departure, second.arrival, scene, drives)
+        movement = baseline(first.departure, second.arrival, scene, least)
         if planner.evaluate(movement, options.safety_distance, options.load, "").verification.violation:
             not_free += 1
-            goal = Goal(configuration=second.outside)
+            goal = Goal(configuration=second.arrival)
             around = replace(options, objective="movement_cost")
-            found = planner.plan_regional(first.outside, goal, around).trajectory
+            found = planner.plan_regional(first.departure, goal, around).trajectory
             assert found is not None
             movement = found
         T, E = T + movement.duration, E + drives.energy(movement)

@@ -107,7 +107,7 @@ class Chains:
         """
         chosen = [0]
         for layer, (q, outside) in zip(self.layers[1:], stops, strict=True):
-            off = [np.abs([node.interaction - q, node.outside - outside]).max() for node in layer]
+            off = [np.abs([node.interaction - q, node.arrival - outside]).max() for node in layer]
             chosen.append(int(np.argmin(off)))
         return chosen
 
@@ -124,11 +124,11 @@ class Chains:
 
     def _bounds(self, place: int) -> FloatArray:
         scene = self.route.arriving(place)
-        goals = np.array([node.outside for node in self.layers[place + 1]])
+        goals = np.array([node.arrival for node in self.layers[place + 1]])
         if self.options.objective == "movement_cost":
-            return np.array([least_travel(scene, node.outside, goals) for node in self.layers[place]])
+            return np.array([least_travel(scene, node.departure, goals) for node in self.layers[place]])
         value = self.options.time_value
-        return np.array([least_cost(scene, node.outside, goals, value) for node in self.layers[place]])
+        return np.array([least_cost(scene, node.departure, goals, value) for node in self.layers[place]])
 
     def _plan(self, place: int, a: int, b: int) -> None:
         """Replace the bound of an edge by what the planner finds."""
@@ -143,19 +143,19 @@ class Chains:
         self.planned[place][a, b] = True
 
     def _bound(self, place: int, first: Node, second: Node) -> float:
-        scene, goals = self.route.arriving(place), second.outside[None]
+        scene, goals = self.route.arriving(place), second.arrival[None]
         if self.options.objective == "movement_cost":
-            return float(least_travel(scene, first.outside, goals)[0])
-        return float(least_cost(scene, first.outside, goals, self.options.time_value)[0])
+            return float(least_travel(scene, first.departure, goals)[0])
+        return float(least_cost(scene, first.departure, goals, self.options.time_value)[0])
 
     def _across(self, place: int, first: Node, second: Node) -> float:
         """Cost of the regional movement that the planner answers with; inf: none."""
-        key = (first.outside.tobytes(), second.outside.tobytes(), self._asked())
+        key = (first.departure.tobytes(), second.arrival.tobytes(), self._asked())
         if key not in self.known:
-            goal = Goal(configuration=second.outside)
-            if np.abs(second.outside - first.outside).max() < 1e-9:
+            goal = Goal(configuration=second.arrival)
+            if np.abs(second.arrival - first.departure).max() < 1e-9:
                 return 0.0
-            plan = self.planner.plan_regional(first.outside, goal, self.options)
+            plan = self.planner.plan_regional(first.departure, goal, self.options)
             self.known[key] = cost_of(plan.report, self.options) if plan.status.ok else np.inf
             self.edges += 1
         return self.known[key]

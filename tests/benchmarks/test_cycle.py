@@ -37,7 +37,7 @@ def test_the_common_program_lasts_as_long_as_its_slowest_joints() -> None:
     chains = Chains.of(programs.planner, stops, programs.start, programs.options(), {})
     found = common_program(chains, programs.planner, programs.options())
     speeds = programs.planner.cell.robot.velocity_max
-    first = np.abs(chains.layers[1][0].outside - programs.start) / speeds
+    first = np.abs(chains.layers[1][0].arrival - programs.start) / speeds
     assert found.duration > first.max()
     assert found.drive_energy > 0.0
     assert 0.0 <= found.not_free <= 1.0

@@ -59,7 +59,7 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
         [sys.executable, "-c", code, json.dumps(lines)], capture_output=True, text=True, check=False
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
-    others = {"arena", "completion", "energy", "fleet", "krl", "path", "report"}
+    others = {"arena", "completion", "energy", "fleet", "krl", "path", "report", "study", "view"}
     assert {line[0] for line in lines} | others == set(WITHOUT_ROS)
 
 

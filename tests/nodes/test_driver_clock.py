@@ -108,7 +108,7 @@ def gaps(stamps):
 
 def test_before_the_clock_starts_nothing_passes_and_then_the_grid_begins(driver, clock, stamps, wait_for):
     wait_for(lambda: clock._publisher.get_subscription_count() > 0)
-    assert driver._frame is None  # nothing was stepped
+    assert driver._joints is None  # nothing was stepped
     assert not stamps
     clock.start(1_000 * NS)
     wait_for(lambda: len(stamps) > 300)

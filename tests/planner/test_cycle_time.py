@@ -32,6 +32,8 @@ BASE = 600.0  # W, while a program moves
 class Invented:
     """What the distribution of time looks at, with invented seconds and joules."""
 
+    fixed_time = False
+
     def __init__(self, seconds: float, joules: float) -> None:
         self.seconds, self.joules = seconds, joules
         self.trajectory = self.evaluation = self.report = self

@@ -243,7 +243,7 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
             entry = timed_service(there.line, True, asked(scene).at(stations[hop])).evaluation.report
             for a, before in total.items():
                 here = layers[hop][max(a, 0)]
-                across = plan_regional(here.outside, there.outside[None], asked(scene), registered())
+                across = plan_regional(here.departure, there.arrival[None], asked(scene), registered())
                 chain = before + cost(across.report) + cost(entry)
                 if hop:
                     line = timed_service(here.line, False, asked(scene).at(stations[hop - 1]))
@@ -266,7 +266,7 @@ def test_with_movement_cost_the_chain_is_the_shortest_path_of_eq_9(demo_cell: Ce
     nodes = layers_of(route, home, context, EXIT_SEARCHES, no_progress)[1]
     costs = [
         float(
-            (np.abs(node.outside - home) + np.abs(node.outside - park)) @ scene.weights
+            (np.abs(node.arrival - home) + np.abs(node.departure - park)) @ scene.weights
             + 2.0 * np.abs(np.diff(node.line.points, axis=0)).sum(axis=0) @ scene.weights
         )
         for node in nodes

@@ -67,12 +67,12 @@ def planned(request_: ProgramRequest) -> Callable[[float], ProgramPlan]:
 
 def test_the_common_program_goes_to_the_nearest_configuration_every_time(movements: Movements) -> None:
     chosen = nearest_chain(movements).chosen
-    here = movements.layers[0][0].outside
+    here = movements.layers[0][0].departure
     for hop, k in enumerate(chosen[1:]):
         weights = movements.route.arriving(hop).weights
-        away = [float(np.abs(node.outside - here) @ weights) for node in movements.layers[hop + 1]]
+        away = [float(np.abs(node.arrival - here) @ weights) for node in movements.layers[hop + 1]]
         assert away[k] == min(away)
-        here = movements.layers[hop + 1][k].outside
+        here = movements.layers[hop + 1][k].departure
 
 
 def test_a_movement_of_the_common_program_is_a_straight_segment_at_full_speed(

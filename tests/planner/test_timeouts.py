@@ -103,6 +103,15 @@ def test_no_sequence_with_timers_costs_less_than_the_planned_one(pause: float) -
     assert planned.energy == pytest.approx(least, rel=1e-9)
 
 
+def test_the_shortest_pause_may_end_with_the_controllers_timer() -> None:
+    brakes, deeper = (5.0, 0.0, 1.0, 2.0), (5.0, 0.0, 0.0, 1.0)
+    modes = tuple(Rest(name, *times) for name, times in zip(NAMES, (brakes, deeper, deeper), strict=True))
+    rests, lengths = Rests(5.0, 1.0, modes), np.array([1.0, 2.0])
+    steps = Timeouts(rests, lengths).best()
+    least = np.mean([simulated(rests, ((1, 1.0),), pause, pause)[0] for pause in lengths])
+    assert np.mean([rests.cost(steps, pause)[0] for pause in lengths]) == pytest.approx(least)
+
+
 @given(controllers(), st.lists(st.floats(0.1, 7200.0), min_size=1, max_size=5), st.data())
 @settings(deadline=None, max_examples=60)
 def test_no_timeout_policy_on_a_grid_has_a_lower_expectation(

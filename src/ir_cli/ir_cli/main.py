@@ -70,7 +70,7 @@ HELP = {
     "arena": "planners against each other over cells, tasks and seeds; needs no ROS",
     "study": "where things should stand, statistics: many plans of one cell; needs no ROS",
     "compare": "today's program (KRL, a trace, or PTP at 100 %%) against the planner's",
-    "cell": "check cell files, list the bundled cells",
+    "cell": "begin and check cell files, list the bundled cells",
     "view": "look at a cell in a browser, move it about, plan it; needs no ROS",
     "robot": "check robot files, make one from a URDF, list the bundled ones",
     "completion": "completion for bash: source <(ir completion)",

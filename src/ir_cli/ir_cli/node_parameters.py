@@ -11,10 +11,11 @@ from typing import Any
 import yaml
 
 from ir_msgs_py.errors import ParameterError
+from ir_msgs_py.namespaces import NODES
 from ir_msgs_py.settings import Setting
 
 from .errors import CommandError
-from .node_settings import NODES, parameters_of
+from .node_settings import parameters_of
 from .suggestions import unknown_name
 
 _KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}

@@ -14,7 +14,8 @@ from .studying import add_study, settings_of, studied
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add study with a command per kind; the arena has a command of its own."""
-    study = commands.add_parser("study", help="many plans of one cell, and what follows; needs no ROS")
+    about = "where things should stand, statistics: many plans of one cell; needs no ROS"
+    study = commands.add_parser("study", help=about)
     kinds = study.add_subparsers(dest="kind", required=True, metavar="KIND")
     for name, kind in KINDS.items():
         if name == "arena":

@@ -35,7 +35,7 @@ class Timeouts:
     def _first(self) -> Steps:
         """The first mode and its switch time; none: no pause outlasts standing on motors."""
         rests, lengths = self.rests, self.lengths
-        times = np.concatenate(([0.0], lengths[lengths < rests.timer]))
+        times = np.concatenate(([0.0], lengths[lengths <= rests.timer]))
         best = float("inf"), Steps()
         if lengths[-1] <= rests.timer:
             best = self._until(np.array([lengths[-1]]), rests.motors, 0.0)[0], Steps()
