@@ -22,7 +22,7 @@ LINK_SIZE = 0.2
 """m: a link's centre of mass is off by its mark's share of this, in each direction."""
 STRIBECK_SHARE, STRIBECK_SPEED = 0.15, 0.05
 """Friction more at rest as a share of the Coulomb friction, gone over so many rad/s: an assumption."""
-STANDING_SHARE = 1.0
+STANDING_SHARE = 0.75
 """Friction of an axis that stands, as a share of the Coulomb friction: either way, all along the movement."""
 _SIGN = 0.01  # rad/s over which the sign of a friction turns
 _STANDS = 0.003  # rad/s below which friction is whatever holds the axis
