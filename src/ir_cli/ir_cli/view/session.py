@@ -127,8 +127,8 @@ class Session:
     # the robot by hand
 
     def _joints_moved(self) -> None:
-        degrees = np.nan_to_num([float(slider.value) for slider in self._panel.joints])  # before they stop
-        self._stop()
+        degrees = np.nan_to_num([float(slider.value) for slider in self._panel.joints])
+        self._halt()  # and leave the sliders: a hand may have moved one since
         robot = self._stage.cell.robot
         self._stage.stand(np.clip(np.radians(degrees), robot.position_min, robot.position_max))
         self._say()
@@ -265,9 +265,12 @@ class Session:
         self._panel.play.label = "Stop"
 
     def _stop(self) -> None:
+        self._halt()
+        self._slide()
+
+    def _halt(self) -> None:
         self._playback.runs = False
         self._panel.play.label = "Play"
-        self._slide()
 
     def _time_moved(self) -> None:
         if self._playback.motion is not None:
