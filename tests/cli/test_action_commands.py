@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -38,7 +37,7 @@ class Machine:
 
     def run(self, goal: ServerGoalHandle) -> Any:
         while not self.node.count_subscribers(f"{ACTION}/_action/feedback"):
-            time.sleep(0.005)  # who sent the goal may be found a moment after it
+            self.ended.wait(0.005)  # who sent the goal may be found a moment after it
         goal.publish_feedback(RunProgram.Feedback(phase="moving", total=3))
         result = RunProgram.Result(executed=3)
         if goal.request.program_id == "short":

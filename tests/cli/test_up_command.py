@@ -7,8 +7,8 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rclpy.node import Node
@@ -24,6 +24,7 @@ from ir_cli.up_command import choose_ports
 WAITING = """
 import os, signal, threading
 from pathlib import Path
+from typing import Any
 Path({pid!r}).write_text(str(os.getpid()))
 ended = threading.Event()
 signal.signal(signal.SIGINT, lambda *_: ended.set())
@@ -34,6 +35,7 @@ Path({end!r}).write_text("finished")
 PARENT = """
 import signal, sys
 from pathlib import Path
+from typing import Any
 from ir_cli.processes import NodeCommand, NodeProcesses
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignore it, as nohup does
 with NodeProcesses(Path(sys.argv[1]), {"PYTHONPATH": sys.argv[2]}) as nodes:
@@ -42,25 +44,18 @@ with NodeProcesses(Path(sys.argv[1]), {"PYTHONPATH": sys.argv[2]}) as nodes:
 """
 
 
-def wait_until(condition, what):
-    deadline = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.02)
-
-
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGHUP])
-def test_nodes_end_with_the_process_that_started_them(number: int, tmp_path: Path) -> None:
+def test_nodes_end_with_the_process_that_started_them(number: int, tmp_path: Path, wait_for: Any) -> None:
     pid, end = tmp_path / "pid", tmp_path / "end"
     (tmp_path / "waiting.py").write_text(WAITING.format(pid=str(pid), end=str(end)))
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     parent = subprocess.Popen([sys.executable, "-c", PARENT, str(tmp_path / "log"), path])
     try:
-        wait_until(lambda: pid.exists() and pid.read_text(), "the node starts")
+        wait_for(lambda: pid.exists() and pid.read_text(), what="the node starts")
         os.kill(int(pid.read_text()), 0)
         parent.send_signal(number)
         assert parent.wait(60.0) == -number
-        wait_until(lambda: end.exists() and end.read_text() == "finished", "the node finishes")
+        wait_for(lambda: end.exists() and end.read_text() == "finished", what="the node finishes")
     finally:
         parent.kill()
 

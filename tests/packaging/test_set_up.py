@@ -178,16 +178,15 @@ def test_stages_of_a_wave_run_side_by_side_and_install_one_after_another(
 ) -> None:
     monkeypatch.setattr(stages, "LOGS", tmp_path)
     monkeypatch.setattr(stages, "STAMPS", tmp_path)
-    meets = "import pathlib, time\nme, other = map(pathlib.Path, ('{0}', '{1}'))\nme.touch()\n" + (
-        "for _ in range(3000):\n    if other.exists(): break\n    time.sleep(0.01)\nelse: exit(1)\n"
-    )
+    os.mkfifo(tmp_path / "meet")  # opening it waits for who opens the other end
+    meets = "import os, signal\nsignal.alarm(60)\nos.open('meet', os.{0})\n"
     alone = "import pathlib\nme = pathlib.Path('lock')\nme.touch(exist_ok=False)\nme.unlink()\n"
     wave = [
         stages.Stage(
-            name, name, "now", list, builds=(sys.executable, "-c", meets.format(name, other)),
+            name, name, "now", list, builds=(sys.executable, "-c", meets.format(end)),
             installs=(sys.executable, "-c", alone), folder=tmp_path,
         )
-        for name, other in (("a", "b"), ("b", "a"))
+        for name, end in (("a", "O_RDONLY"), ("b", "O_WRONLY"))
     ]  # fmt: skip
     done = {stage.name for stage, _ in set_up.side_by_side(wave, tmp_path)}
     assert done == {"a", "b"}
