@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from ir_recorder.live.server import Answer
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 
+T = TypeVar("T")
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
 CONTROLS = Path(__file__).with_name("page_controls.js").read_text().strip().split("\n\n")
 DESK, TABLET, PHONE = (1400, 600), (768, 1024), (390, 844)
@@ -61,8 +62,8 @@ def file(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def wait_for(find: Callable[[], list[Path]], page: Any) -> list[Path]:
-    """What is found at last; the browser goes on meanwhile."""
+def wait_for(find: Callable[[], T], page: Any) -> T:
+    """What is found at last, if it is anything; the browser goes on meanwhile."""
     deadline = time.monotonic() + WAIT_SECONDS
     while not (found := find()):
         assert time.monotonic() < deadline, "nothing was found"
@@ -282,9 +283,10 @@ def test_the_live_view_shows_what_comes_and_asks_for_bits(
     for script in LIVE_CONTROLS:
         page.wait(script)
     page.run("document.querySelector('[data-bit=ab]').click()")
-    page.run("document.getElementById('hold').click()")
+    page.run("document.getElementById('hold').click()")  # two requests: each is answered when it likes
+    wait_for(lambda: len(pressed) == 2, page)
+    assert sorted(pressed) == [("ab", True), ("move_enable", False)]
     page.wait("document.getElementById('answer').textContent.includes('refused, <')")
-    assert pressed == [("ab", True), ("move_enable", False)]
     before = page.run("document.getElementById('view').toDataURL()")
     stream.add({"q": [1.5, -1.0, 1.0, 0.0, 1.0, 0.0], "w": [4000.0, 5000.0], "near": None})
     page.wait("document.querySelector('#tiles b').textContent === '5000 W'")
