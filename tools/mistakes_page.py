@@ -72,8 +72,8 @@ MISTAKES = (
     ),
     Mistake(
         "Zones",
-        "    zone: {kind: OPEN, size: [0.8, 1.2, 0.9], xyz: [0, 0, 0.45]}\n",
-        "",
+        "size: [0.8, 1.2, 0.9], xyz: [0, 0, 0.45]",
+        "size: [0.8, 1.2, 0.5], xyz: [0, 0, 0.25]",
         "allowed contacts hold in its zone only",
         deep=True,
     ),

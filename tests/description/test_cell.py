@@ -168,6 +168,48 @@ def test_the_default_zone_encloses_bodies_in_any_orientation() -> None:
             assert np.abs(surface).max(axis=0) == pytest.approx(zone.size / 2, rel=0.05)  # and no larger
 
 
+def table_with(stations: str, zone: str = "OPEN") -> Cell:
+    return cell_from_yaml(f"""
+format: ir_cell/1
+name: bench
+robot: kr210_r2700_extra
+equipment:
+  - name: table
+    pose: {{xyz: [2, 0, 0], abc_deg: [30, 0, 0]}}
+    zone: {zone}
+    bodies:
+      - {{name: top, kind: box, size: [0.8, 0.6, 0.7], xyz: [0, 0, 0.35]}}
+    stations: {stations}
+""")
+
+
+def test_the_default_zone_holds_what_stands_on_a_table_up_to_its_stations() -> None:
+    rng = np.random.default_rng(3)
+    low, high = np.array([-0.4, -0.3, 0.0]), np.array([0.4, 0.3, 0.7])
+    for _ in range(10):
+        places = rng.uniform([-0.6, -0.5, 0.5], [0.6, 0.5, 1.2], (2, 3))
+        items = (f"{{name: s{k}, pose: {{xyz: {place.tolist()}}}}}" for k, place in enumerate(places))
+        cell = table_with(f"[{', '.join(items)}]")
+        zone = cell.machine("table").zone_in_equipment
+        ends = zone.pose[:3, 3] - zone.size / 2, zone.pose[:3, 3] + zone.size / 2
+        assert ends[0] == pytest.approx(np.minimum(low, places.min(axis=0)))
+        assert ends[1] == pytest.approx(np.maximum(high, places.max(axis=0)))
+
+
+def test_the_default_zone_follows_a_station_that_is_moved_and_a_given_one_stays() -> None:
+    station = "[{name: pick, pose: {xyz: [0, 0, 0.9]}}]"
+    lower = pose_of([0.1, 0.0, 0.8])
+    cell = table_with(station)
+    moved = cell.with_station("pick", lower)
+    assert moved.machine("table").zone_in_equipment.size == pytest.approx([0.8, 0.6, 0.8])
+    assert moved.station("pick").pose == pytest.approx(cell.machine("table").pose @ lower)
+    assert "zone: OPEN" in cell_to_yaml(moved)
+    given = table_with(station, "{kind: OPEN, size: [0.8, 0.6, 0.7], xyz: [0, 0, 0.35]}")
+    assert given.with_station("pick", lower).machine("table").zone_in_equipment.size[2] == 0.7
+    again = cell_from_yaml(cell_to_yaml(given))
+    assert again.machine("table").zone_in_equipment.size[2] == 0.7
+
+
 def surface_points(body: Body, rng: np.random.Generator) -> FloatArray:
     """Points (N, 3) of the surface in the body's frame, its farthest ones among them."""
     d = rng.normal(size=(4000, 3))

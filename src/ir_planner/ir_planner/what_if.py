@@ -139,9 +139,8 @@ def _moved(cell: Cell, name: str, by: FloatArray) -> Cell:
             return cell.with_equipment(name, pose=shift @ machine.pose)
     for station in cell.stations:
         if station.name == name:
-            pose, own = shift @ station.pose, cell.machine(station.equipment).pose
-            moved = replace(station, pose=pose, pose_in_equipment=np.linalg.inv(own) @ pose)
-            return replace(cell, stations=tuple(moved if s is station else s for s in cell.stations))
+            own = cell.machine(station.equipment).pose
+            return cell.with_station(name, np.linalg.inv(own) @ shift @ station.pose)
     known = [*(machine.name for machine in cell.equipment), *(station.name for station in cell.stations)]
     raise UnknownNameError("machine or station", name, known)
 

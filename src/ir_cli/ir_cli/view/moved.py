@@ -7,13 +7,12 @@ is read again and compared with what is shown before anybody gets it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import yaml
 
-from ir_description import Cell, Station
-from ir_description.cell import station_at
+from ir_description import Cell
 from ir_description.poses import abc_from_rotation
 from ir_msgs_py.arrays import FloatArray
 
@@ -61,16 +60,8 @@ def cell_with(cell: Cell, moves: Moves) -> Cell:
         if target.kind == "equipment":
             cell = cell.with_equipment(target.name, pose=pose)
         else:
-            stations = (_put(each, cell, target, pose) for each in cell.stations)
-            cell = replace(cell, stations=tuple(stations))
+            cell = cell.with_station(target.name, pose)
     return cell
-
-
-def _put(station: Station, cell: Cell, target: Target, pose: FloatArray) -> Station:
-    if station.name != target.name:
-        return station
-    machine = cell.machine(station.equipment)
-    return station_at(machine, station.name, pose, station.allowed_contacts, station.approach_distance)
 
 
 def snippet(moves: Moves) -> str:

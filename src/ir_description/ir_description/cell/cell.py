@@ -19,7 +19,7 @@ from ir_description.cell.checks import (
     check_program,
     check_single_places,
 )
-from ir_description.cell.equipment import AllowedContact, Equipment, Station, Zone, station_at
+from ir_description.cell.equipment import AllowedContact, Equipment, Station, Zone, station_at, zone_around
 from ir_description.cell.part import Part
 from ir_description.cell.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.cell.tool_path import CellPath
@@ -197,6 +197,20 @@ class Cell:
             stations=tuple(_moved(station, new) for station in self.stations),
             paths=tuple(_moved_path(path, old, new) for path in self.paths),
         )
+
+    def with_station(self, name: str, pose_in_equipment: FloatArray) -> Cell:
+        """Return the cell with a station elsewhere at its machine, whose default zone follows."""
+        old = self.station(name)
+        machine = self.machine(old.equipment)
+        moved = station_at(machine, name, pose_in_equipment, old.allowed_contacts, old.approach_distance)
+        stations = tuple(moved if station is old else station for station in self.stations)
+        mine = [tuple(s for s in each if s.equipment == machine.name) for each in (self.stations, stations)]
+        equipment = self.equipment
+        if machine.has_default_zone(mine[0]):
+            zone = zone_around(machine.zone_in_equipment.kind, machine.bodies, mine[1])
+            new = replace(machine, zone_in_equipment=zone)
+            equipment = tuple(new if each is machine else each for each in equipment)
+        return replace(self, stations=stations, equipment=equipment)
 
 
 def check_posture(robot: RobotModel, posture: FloatArray, name: str) -> None:

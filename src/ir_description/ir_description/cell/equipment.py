@@ -48,13 +48,17 @@ class Zone:
             )
 
 
-def zone_around(kind: ZoneKind, bodies: Iterable[Body]) -> Zone:
-    """Return the box of all bodies along the axes of their machine's frame; planes don't count."""
+def zone_around(kind: ZoneKind, bodies: Iterable[Body], stations: Iterable[Station] = ()) -> Zone:
+    """Return the box of a machine's bodies and its stations' tcps along the axes of its frame.
+
+    What stands on a table belongs to it, up to the height of the station above it. Planes don't count.
+    """
     bounds = [body.bounds() for body in bodies if body.kind != "plane"]
     if not bounds:
         raise InvalidValueError("the zone has no bodies to enclose; give its box (zone: {kind, size, ...})")
-    low = np.min([low for low, _ in bounds], axis=0)
-    high = np.max([high for _, high in bounds], axis=0)
+    tcps = [station.pose_in_equipment[:3, 3] for station in stations]
+    low = np.min([*(low for low, _ in bounds), *tcps], axis=0)
+    high = np.max([*(high for _, high in bounds), *tcps], axis=0)
     return Zone(kind, pose_of((low + high) / 2.0), high - low)
 
 
@@ -118,6 +122,14 @@ class Equipment:
         for end in () if self.switch is None else (self.switch.on, self.switch.off):
             if end not in known:
                 raise UnknownNameError(f"state that the switch of {self.name} names", end, known)
+
+    def has_default_zone(self, stations: Iterable[Station]) -> bool:
+        """Whether its zone is the one that a machine with these stations has where none is given."""
+        if all(body.kind == "plane" for body in self.bodies):
+            return False
+        own = self.zone_in_equipment
+        default = zone_around(own.kind, self.bodies, stations)
+        return np.array_equal(default.pose, own.pose) and np.array_equal(default.size, own.size)
 
     @cached_property
     def zone(self) -> Zone:

@@ -19,7 +19,6 @@ from ir_description.cell import (
     ProgramStep,
     StateSwitch,
     Station,
-    zone_around,
 )
 from ir_description.files.cell_reader import FORMAT
 from ir_description.files.path_reader import path_lines
@@ -103,13 +102,13 @@ def _part(part: Part) -> Iterator[str]:
     yield from _block("bodies", ([_body(body)] for body in part.bodies))
 
 
-def _machine(machine: Equipment, stations: Iterable[Station]) -> Iterator[str]:
+def _machine(machine: Equipment, stations: list[Station]) -> Iterator[str]:
     yield f"name: {machine.name}"
     if not np.array_equal(machine.pose, _IDENTITY):
         yield f"pose: {{{_pose(machine.pose)}}}"
     if not machine.enabled:
         yield "enabled: false"
-    yield _zone(machine)
+    yield _zone(machine, stations)
     if machine.states:
         yield "states:"
         for state in machine.states:
@@ -127,12 +126,10 @@ def _switch(switch: StateSwitch) -> str:
     return f"{{signal: {switch.signal}, {ends}, time: {_number(switch.time)}}}"
 
 
-def _zone(machine: Equipment) -> str:
+def _zone(machine: Equipment, stations: Iterable[Station]) -> str:
     zone = machine.zone_in_equipment
-    if any(body.kind != "plane" for body in machine.bodies):
-        default = zone_around(zone.kind, machine.bodies)
-        if np.array_equal(default.pose, zone.pose) and np.array_equal(default.size, zone.size):
-            return f"zone: {zone.kind}"
+    if machine.has_default_zone(stations):
+        return f"zone: {zone.kind}"
     return f"zone: {{kind: {zone.kind}, size: {_row(zone.size)}, {_pose(zone.pose)}}}"
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 
 from ir_description.cell import (
@@ -42,21 +45,23 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
         enabled=table["enabled"].boolean() if "enabled" in table else True,
         switch=_switch(table["switch"], states) if "switch" in table else None,
     )
-    stations = table["stations"].list(0, 10_000) if "stations" in table else []
-    return machine, [(station, _station(station, machine)) for station in stations]
+    items = table["stations"].list(0, 10_000) if "stations" in table else []
+    stations = [_station(station, machine) for station in items]
+    machine = replace(machine, zone_in_equipment=_zone(table, read, stations))
+    return machine, list(zip(items, stations, strict=True))
 
 
 def _pose(table: Table) -> FloatArray:
     return read_pose(table["pose"]) if "pose" in table else np.eye(4)
 
 
-def _zone(table: Table, bodies: tuple[Body, ...]) -> Zone:
-    """A word is the kind around the bodies, a mapping may give the box."""
+def _zone(table: Table, bodies: tuple[Body, ...], stations: Iterable[Station] = ()) -> Zone:
+    """A word is the kind around bodies and stations, a mapping may give the box."""
     item = table.get("zone")
     if item is None or item.is_scalar():
         kind = "OPEN" if item is None else item.choice(ZONE_KINDS)
         with (item or table.item).blamed():
-            return zone_around(kind, bodies)  # type: ignore[arg-type]
+            return zone_around(kind, bodies, stations)  # type: ignore[arg-type]
     zone = item.table(("kind",), ("size", *POSE_KEYS))
     kind = zone["kind"].choice(ZONE_KINDS)
     with item.blamed():
@@ -64,7 +69,7 @@ def _zone(table: Table, bodies: tuple[Body, ...]) -> Zone:
             for key in POSE_KEYS:
                 if key in zone:
                     zone[key].fail("belongs to a zone with a size")
-            return zone_around(kind, bodies)  # type: ignore[arg-type]
+            return zone_around(kind, bodies, stations)  # type: ignore[arg-type]
         size = zone["size"].numbers(3, 0.0, ZONE_MAX, "m", above=True)
         return Zone(kind, pose_in(zone), size)  # type: ignore[arg-type]
 
