@@ -142,6 +142,7 @@ def main() -> None:
                 print(line_of(asdict(row)), flush=True)
     written = [row for row in rows if not row.refused]
     slower = [row.exported_s / row.planned_s - 1.0 for row in written]
+    dearer = [row.exported_joules / row.planned_joules - 1.0 for row in written]
     claims = [
         at_least("programs written", len(written) / len(rows), "share", 1.0),
         at_least("of them certified again", float(np.mean([row.certified for row in written])), "share", 1.0),
@@ -149,6 +150,7 @@ def main() -> None:
         at_most("ends that are read back", max(row.end_mm for row in written), "mm", 1e-3),
         at_most("joints apart from the plan", max(row.deviation_rad for row in written), "rad", 2e-3),
         at_most("slower than planned, median", 100.0 * float(np.median(slower)), "%", 5.0),
+        at_most("dearer than planned, median", 100.0 * float(np.median(dearer)), "%", 2.0),
         at_least("by Coal, above what is kept", min(row.coal_left_mm for row in written), "mm", PROOF_MM),
         at_most("limits at 10 kHz", max(row.limit_share for row in written), "share", 1.0 + 1e-6),
     ]

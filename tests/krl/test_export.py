@@ -17,6 +17,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, RequestError, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl import DEVIATION_MAX
+from ir_planner.krl.passing import passing_times, resting_spline
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from _tool_path_judge import seen
@@ -35,7 +36,8 @@ def test_an_exported_program_is_certified_and_near_the_plan(planned) -> None:
     export = export_krl(planner, plan.movements, "visit")
     assert export.exported.certified
     assert export.deviation <= DEVIATION_MAX
-    assert export.exported.duration <= 1.1 * export.planned.duration
+    assert export.exported.duration <= 1.02 * export.planned.duration
+    assert export.exported.energy == pytest.approx(export.planned.energy, rel=0.05)
     cell = planner.cell
     texts = [parse(export.source, "visit.src"), parse(export.data, "visit.dat")]
     again = evaluate_krl(planner, follow(texts, cell.machine_home, tool_in_flange(cell.tcp)))
@@ -46,6 +48,23 @@ def test_an_exported_program_is_certified_and_near_the_plan(planned) -> None:
         for end in (0, -1):
             away = np.degrees(step.step.trajectory.positions[end] - movement.trajectory.positions[end])
             assert np.abs(away).max() < 1e-4
+
+
+def test_points_are_passed_within_the_limits_and_hardly_later(planned) -> None:
+    planner, plan = planned
+    movements = [step.trajectory for step in plan.movements if step.trajectory is not None]
+    scene, movement = planner.scene(), min(movements, key=lambda one: one.duration)
+    even = np.linspace(0.0, movement.duration, 13)
+    points = movement.sample(even).q
+    jerk = np.abs(resting_spline(even, points).derivative(3)(np.linspace(0.0, even[-1], 2001)))
+    assert (jerk / scene.limits.jerk).max() > 1.02, "the planned times would do: nothing is proved"
+    times = passing_times(points, even, scene)
+    spline = resting_spline(times, points)
+    fine = np.linspace(0.0, times[-1], 2001)
+    bounds = (scene.limits.velocity, scene.limits.acceleration, scene.limits.jerk)
+    for order, bound in enumerate(bounds, start=1):
+        assert (np.abs(spline.derivative(order)(fine)) / bound).max() <= 1.01
+    assert times[-1] <= 1.005 * even[-1]
 
 
 def path_movement(planner: Planner, name: str, path: CellPath) -> PlannedMovement:

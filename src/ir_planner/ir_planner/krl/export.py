@@ -1,14 +1,16 @@
 """Programs and trajectories written as KRL, read back, driven by the controller's model and proved again.
 
 A movement becomes a PTP_SPLINE through points of its trajectory with a TIME_BLOCK that gives each its time.
-As many points are taken as the movement needs to stay certified and near to what was planned.
+As many points are taken as the movement needs to stay certified and near to what was planned. They are passed
+at the planned times as far as the limits allow.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from ir_description import Cell
 from ir_krl import (
@@ -26,25 +28,27 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import Evaluation, total_report
+from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
 from ir_planner.krl.driven import DrivenStep, drive
 from ir_planner.krl.export_path import deviation_along, fitted_path, one_after_the_other
 from ir_planner.krl.geometry import tool_in_flange
+from ir_planner.krl.judged import Judge
+from ir_planner.krl.passing import passing_times
+from ir_planner.program import Charge, Pause
 from ir_planner.scene import PlanningScene
+from ir_planner.timing import GRID_S
 
 DEVIATION_MAX = 2e-3  # rad, of a joint from the planned movement
 _SPACING = 0.2  # s between points at first
 _POINTS_MIN, _POINTS_MAX = 6, 400
 _SLOWINGS = 4  # per number of points
 _CLOSE = 1.001
-_ENOUGH = 1.01  # of the planned duration
+_ROUNDING = 1e-6  # grid steps
+_ENOUGH, _ENOUGH_J = 1.01, 1.02  # of the planned duration and energy
 _FINEST = 0.04  # s between points, where more of them no longer help
 _SAMPLES_PER_S = 250
 _ASKS = {"BUS_POWER_OFF": "AB", "HIBERNATION": "HIB", "STAND_ON_BRAKES": ""}
-
-Judge = Callable[[JointTrajectory, PlannedMovement], Evaluation]
-"""Evaluates a trajectory as the step that it belongs to: with its load, its parts and its station."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +64,11 @@ class KrlExport:
     exported: TrajectoryReport
 
 
-def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, judge: Judge) -> KrlExport:
-    """Write steps (movements with their points, and pauses) as program `name`.
+def export(
+    steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, judge: Judge, charge: Charge
+) -> KrlExport:
+    """Write steps (movements with their points, and pauses) as program `name`; charge: of the capacitor, as
+    the program begins.
 
     Raises RequestError where a movement can't be written so that it stays certified, KrlError for the name.
     """
@@ -75,8 +82,12 @@ def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, ju
     header = [f"{scene.cell.name}: {len(moving)} movements, points and times as planned"]
     source, data = written(name, start, parts, attached(scene), header)
     driven = (step.trajectory for step in _driven(source, data, scene) if step.moves)
-    before, after, deviation = [], [], 0.0
-    for step in moving:
+    after, deviation = [], 0.0
+    here = start
+    for step in steps:
+        if step.is_pause:
+            charge.stood(step, Pause(step.to_station, step.duration, "", here, judge.scene(step)))
+            continue
         again = one_after_the_other(list(itertools.islice(driven, len(fitted[id(step)]))))
         found = judge(again, step)
         if not found.verification.certified:
@@ -85,9 +96,13 @@ def export(steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, ju
                 f"{_called(step)} isn't certified as the controller would drive it: "
                 f"{found.verification.status.message}",
             )
-        deviation = max(deviation, _deviation_of(step, again))
-        before.append(step.report)
-        after.append(found.report)
+        deviation = max(deviation, _deviation_of(step, fitted[id(step)], again))
+        moved = charge.moved(
+            replace(step, trajectory=again, report=found.report), found.energy, judge.scene(step)
+        )
+        after.append(moved.report)
+        here = again.positions[-1]
+    before = [step.report for step in moving]
     return KrlExport(source, data, deviation, _together(before), _together(after))
 
 
@@ -115,31 +130,35 @@ def _written_as(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> li
     return fitted_path(step, planned, scene, back)
 
 
-def _deviation_of(step: PlannedMovement, again: JointTrajectory) -> float:
+def _deviation_of(step: PlannedMovement, parts: Sequence[Part], again: JointTrajectory) -> float:
     planned = _points_of(step)
-    along = step.kind == MovementKind.CARTESIAN
-    return deviation_along(again, planned) if along else _deviation(again, planned)
+    if isinstance(parts[0], WrittenSpline):
+        return _deviation(parts[0], again, planned)
+    return deviation_along(again, planned)
 
 
 def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> WrittenSpline:
     """The movement through as many points as it needs, doubled from `_SPACING`, to be certified, near to the
-    plan, and hardly slower.
+    plan, and hardly slower or dearer.
     """
     planned = _points_of(step)
+    joules = judge(planned, step).report.energy
     count = max(int(np.ceil(planned.duration / _SPACING)), _POINTS_MIN)
-    best: WrittenSpline | None = None
+    found: list[tuple[float, WrittenSpline]] = []
     reason = ""
     while count <= _POINTS_MAX:
-        spline, reason = _slowed(step, planned, count, scene, judge)
-        if spline is not None and (best is None or spline.seconds < best.seconds):
-            best = spline
-        if best is not None and (
-            best.seconds <= planned.duration * _ENOUGH or count * _FINEST > planned.duration
-        ):
-            return best
+        fits, reason = _slowed(step, planned, count, scene, judge)
+        if fits is not None:
+            spline, spent = fits
+            longer, more = spline.seconds / planned.duration, spent / joules
+            found.append((longer + more, spline))
+            if longer <= _ENOUGH and more <= _ENOUGH_J:
+                return spline
+        if found and count * _FINEST > planned.duration:
+            break
         count *= 2
-    if best is not None:
-        return best
+    if found:
+        return min(found, key=lambda one: one[0])[1]
     raise RequestError(
         StatusCode.INVALID_MOTION_PLAN,
         f"{_called(step)} can't be written with {_POINTS_MAX} points: {reason}",
@@ -148,13 +167,17 @@ def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> Writte
 
 def _slowed(
     step: PlannedMovement, planned: JointTrajectory, count: int, scene: PlanningScene, judge: Judge
-) -> tuple[WrittenSpline | None, str]:
-    """The movement through `count` points, slowed until it is certified; else None, and the reason."""
+) -> tuple[tuple[WrittenSpline, float] | None, str]:
+    """The movement through `count` points, slowed until it is certified, and its joules; else None, and the
+    reason.
+    """
     slower, reason = 1.0, ""
+    times = np.linspace(0.0, planned.duration, count + 1)
+    passed = passing_times(planned.sample(times).q, times, judge.scene(step))
     for _ in range(_SLOWINGS):
-        spline = _spline(step, planned, count, slower)
+        spline = _spline(step, planned, passed * slower)
         again = _read_back(spline, planned.positions[0], scene)
-        away = _deviation(again, planned)
+        away = _deviation(spline, again, planned)
         if away > DEVIATION_MAX:
             return (
                 None,
@@ -162,7 +185,7 @@ def _slowed(
             )
         found = judge(again, step)
         if found.verification.certified:
-            return spline, ""
+            return (spline, found.report.energy), ""
         reason = found.verification.status.message
         needed = _needed(found.report)
         if needed <= 1.0:  # no matter of time: the path is too near to something
@@ -178,14 +201,16 @@ def _needed(report: TrajectoryReport) -> float:
     return max(float(ratio.max(initial=0.0) ** root) for ratio, root in zip(ratios, roots, strict=True))
 
 
-def _spline(step: PlannedMovement, planned: JointTrajectory, count: int, slower: float) -> WrittenSpline:
-    times = np.linspace(0.0, planned.duration, count + 1)[1:]
-    seconds = round(planned.duration * slower, 3) if slower > 1.0 else planned.duration
-    report = step.report
+def _spline(step: PlannedMovement, planned: JointTrajectory, passed: FloatArray) -> WrittenSpline:
+    """Points at equal planned times, passed at shares of the times (M + 1,) s, the last one whole steps of
+    the grid after the start.
+    """
+    seconds, report = GRID_S * np.ceil(float(passed[-1]) / GRID_S - _ROUNDING), step.report
     comment = f"{_called(step)}: {seconds:.2f} s, planned {report.duration:.2f} s and {report.energy:.0f} J"
     if np.isfinite(report.min_clearance):
         comment += f", clearance {1e3 * report.min_clearance:.0f} mm"
-    return WrittenSpline(comment, planned.sample(times).q, np.full(count, 100.0 / count), seconds)
+    points = planned.sample(np.linspace(0.0, planned.duration, len(passed))[1:]).q
+    return WrittenSpline(comment, points, 100.0 * np.diff(passed) / passed[-1], float(seconds))
 
 
 def _read_back(spline: WrittenSpline, start: FloatArray, scene: PlanningScene) -> JointTrajectory:
@@ -220,10 +245,12 @@ def _driven(source: str, data: str, scene: PlanningScene) -> tuple[DrivenStep, .
     return drive(program, scene, home)[0]
 
 
-def _deviation(driven: JointTrajectory, planned: JointTrajectory) -> float:
-    """Largest difference of a joint [rad] at equal shares of the two durations."""
+def _deviation(spline: WrittenSpline, driven: JointTrajectory, planned: JointTrajectory) -> float:
+    """Largest difference of a joint [rad], each point passed when the spline passes it."""
+    passed = np.concatenate([[0.0], np.cumsum(spline.shares)]) / spline.shares.sum()
     share = np.linspace(0.0, 1.0, max(round(planned.duration * _SAMPLES_PER_S), 2))
-    away: FloatArray = driven.sample(share * driven.duration).q - planned.sample(share * planned.duration).q
+    meanwhile = np.clip(PchipInterpolator(np.linspace(0.0, 1.0, len(passed)), passed)(share), 0.0, 1.0)
+    away = driven.sample(meanwhile * driven.duration).q - planned.sample(share * planned.duration).q
     return float(np.abs(away).max())
 
 

@@ -2,15 +2,34 @@
 as its signals move them, sweeping while they do, and what its station allows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from ir_description import Cell, PowerData, ProgramStep, Signal, cell_in
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Evaluation, evaluate_trajectory
-from ir_planner.krl.export import Judge
 from ir_planner.program import doors_along
 from ir_planner.scene import Drives, PlanningScene, with_parts
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Evaluates trajectories as the steps that they belong to: with their load, their parts, their station.
+
+    scenes: of each step by its id(); margin: S_m [m].
+    """
+
+    scenes: Mapping[int, PlanningScene]
+    margin: float
+
+    def __call__(self, trajectory: JointTrajectory, step: PlannedMovement) -> Evaluation:
+        """What a trajectory makes of a step."""
+        return evaluate_trajectory(trajectory, self.scene(step), self.margin, contacts_at(step))
+
+    def scene(self, step: PlannedMovement) -> PlanningScene:
+        """In which a step is driven."""
+        return self.scenes[id(step)]
 
 
 def judge_of(
@@ -18,12 +37,7 @@ def judge_of(
 ) -> Judge:
     """A judge of these steps, S_m `margin` m."""
     found = zip(steps, scenes_of(steps, cell, power, drives), strict=True)
-    scenes = {id(step): scene for step, scene in found}
-
-    def judge(trajectory: JointTrajectory, step: PlannedMovement) -> Evaluation:
-        return evaluate_trajectory(trajectory, scenes[id(step)], margin, contacts_at(step))
-
-    return judge
+    return Judge({id(step): scene for step, scene in found}, margin)
 
 
 def contacts_at(step: PlannedMovement) -> str:

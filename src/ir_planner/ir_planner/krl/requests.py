@@ -13,6 +13,7 @@ from ir_planner.krl.evaluated import EvaluatedProgram, EvaluatedStep, evaluate_p
 from ir_planner.krl.export import KrlExport, export
 from ir_planner.krl.judged import judge_of
 from ir_planner.planner import Planner
+from ir_planner.program import Charge
 from ir_planner.request import safety_distance
 
 ASYNCHRONOUS = "asynchronous"
@@ -53,7 +54,7 @@ def export_krl(
     scene = planner.scene("")
     judge = judge_of(movements, planner.cell, scene.power, planner.settings.drives, chosen.safety_distance)
     try:
-        return export(movements, name, scene, judge)
+        return export(movements, name, scene, judge, Charge(planner.settings.transitions))
     except KrlError as error:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, str(error)) from error
 

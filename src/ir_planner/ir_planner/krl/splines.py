@@ -15,7 +15,8 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.krl.curves import AxisCurve, followed, through_axes
 from ir_planner.krl.geometry import Arm
-from ir_planner.timing import GRID_NS
+from ir_planner.krl.passing import resting_spline
+from ir_planner.timing import GRID_NS, GRID_S
 
 _LINE_POINTS = 9  # of an SLIN part, so that the spline through them is straight
 _STEP_M = 4e-3
@@ -40,12 +41,12 @@ def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTraject
     times = _passing_times(whole[0], len(block.parts))
     if times is None:
         return None
-    rest = [(order, np.zeros(points.shape[1])) for order in (1, 2)]
-    spline = make_interp_spline(times, points, k=_DEGREE, bc_type=(rest, rest))  # type: ignore[arg-type]
-    total = round(times[-1] / (GRID_NS * 1e-9))
-    fine = np.linspace(0, total, max(round(times[-1] * _KNOTS_PER_S), len(times)) + 1)
-    steps = np.unique(np.concatenate([np.rint(fine), np.rint(times / (GRID_NS * 1e-9))])).astype(np.int64)
-    q, qd, qdd = (np.asarray(spline(steps * (GRID_NS * 1e-9), nu=k)) for k in range(3))
+    times = times * (round(times[-1] / GRID_S) * GRID_S / times[-1])  # at rest where the last point lies
+    spline = resting_spline(times, points)
+    inner = zip(times[:-1], times[1:], np.ceil(np.diff(times) * _KNOTS_PER_S).astype(int), strict=True)
+    fine = np.concatenate([np.linspace(a, b, count + 1) for a, b, count in inner])
+    steps = np.unique(np.rint(fine / GRID_S)).astype(np.int64)
+    q, qd, qdd = (np.asarray(spline(steps * GRID_S, nu=k)) for k in range(3))
     qd[[0, -1]] = qdd[[0, -1]] = 0.0
     q[0], q[-1] = points[0], points[-1]
     return JointTrajectory(arm.scene.cell.robot.joint_names, steps * GRID_NS, q, qd, qdd)
