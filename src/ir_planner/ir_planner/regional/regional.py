@@ -13,12 +13,14 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.optimize import Portfolio, Refinement
+from ir_planner.regional import self_barrier
 from ir_planner.regional.answer import MovementPlan
 from ir_planner.regional.asynchronous import with_own_laws
 from ir_planner.regional.enclosure import enclosure, refused
 from ir_planner.regional.exploration import Path, Searches, first_paths
 from ir_planner.regional.refusal import refusal
 from ir_planner.regional.safeguards import DIRECT, Exploration, best_found, not_worse_than_baseline
+from ir_planner.regional.self_barrier import barrier
 from ir_planner.regional.waypoints import over_free_steps
 from ir_planner.request import Context
 from ir_planner.scene import STILL, path_cost
@@ -64,11 +66,9 @@ def _search(
         return blocked, None
     paths = first_paths(ends, space, context, searches, briefly=True)
     if not paths and context.options.planner_id == "" and not context.work.exhausted:
-        with context.journal.stage("enclosure") as notes:
-            enclosed = enclosure(ends, space)
-            notes.append(f"the {enclosed.end} is enclosed" if enclosed else "none is proved")
-        if enclosed is not None:
-            return refused(enclosed), None
+        proved = _impossible(ends, space, context)
+        if proved is not None:
+            return proved, None
     paths = paths or first_paths(ends, space, context, searches, briefly=False)
     if not paths:
         return refusal(start, ends.goals[0], space, context.journal), None
@@ -89,6 +89,18 @@ def _search(
     if context.options.objective == "movement_cost":  # W of its waypoints is asked for
         movement = over_free_steps(movement, space)
     return Status.success(), movement
+
+
+def _impossible(ends: Ends, space: FreeSpace, context: Context) -> Status | None:
+    """The status of a request that provably can't be met, which searches would only find by giving up."""
+    with context.journal.stage("enclosure") as notes:
+        passed = barrier(ends, space)
+        enclosed = enclosure(ends, space) if passed is None else None
+        if passed is not None:
+            notes.append(f"{passed.joint} can't pass {np.degrees(passed.value):.0f} deg")
+            return self_barrier.refused(passed)
+        notes.append(f"the {enclosed.end} is enclosed" if enclosed else "none is proved")
+    return None if enclosed is None else refused(enclosed)
 
 
 def _in_straight_steps(
