@@ -21,7 +21,7 @@ from ir_planner.configurations.interaction_point import distinct_configurations,
 from ir_planner.request import Work
 
 STARTS, QUICK_STARTS = 40, 16  # per station and reading
-VARIANTS, QUICK_VARIANTS = 1, 1  # of each cell and seed
+VARIANTS, QUICK_VARIANTS = 5, 1  # of each cell and seed
 NUMBERS = (1, 2, 4, 8, 16, 32)  # starts whose success is compared
 ASKED, FOUND = 32, 95.0  # starts from which on a free configuration should be known, at so many % of stations
 MANY_SWEEPS, COARSE = 80, 1e-6  # where nothing but sweeps brings the tool there: to 1 mm or 2 mrad
@@ -200,9 +200,10 @@ EXPERIMENT = Experiment(
     "Goal configurations at the interaction point are found by cyclic coordinate descent (3) from p random "
     "starts (1); a joint whose step ends in collision is set back in proportion to the metric distance (5); "
     "what is near enough and free is accepted (6).",
-    f"All stations of {', '.join(CELLS)} and of a mirrored, turned and jittered variant of each; {STARTS} "
-    "starts per station for each reading: (5) as a secant or as printed, none at all (collisions sorted "
-    f"out at the end), without Newton's finish but {MANY_SWEEPS} sweeps and arrived at 1 mm, (1) uniform. "
+    f"All stations of {', '.join(CELLS)} and of {2 * VARIANTS - 1} mirrored, turned and jittered variants of "
+    f"each; {STARTS} starts per station for each reading: (5) as a secant or as printed, none at all "
+    f"(collisions sorted out at the end), without Newton's finish but {MANY_SWEEPS} sweeps and arrived at "
+    "1 mm, (1) uniform. "
     "Only stations where the closed form has a free configuration.",
     measure,
     judge,

@@ -20,12 +20,11 @@ from ir_planner.scene import movement_cost
 PAIRS, QUICK_PAIRS = 500, 60  # per seed
 RANKS = 0.8  # rank correlation from which on W puts about four of five random pairs in the order of joules
 LOSES = 5.0  # % of the least joules that a choice by W may cost
-EVERY = 4  # movements: of one in so many all configurations at the goal are compared
 DIRECTIONS = ("up", "down", "level")
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
-    """A row per movement, and for some of them one with what else reaches the same pose."""
+    """A row per movement, and one with what else reaches the same pose where anything does."""
     planner, rows = planner_of(CELL), []
     for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed):
         trajectory = pair.common()
@@ -33,8 +32,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
         row = {"kind": "movement", "W": _cost(pair), "joules": pair.drive_energy(trajectory)}
         row |= {"seconds": trajectory.duration, "load": pair.load, "direction": pair.direction}
         rows.append(row | {"rise_m": pair.rise})
-        if pair.number % EVERY == 0:
-            rows += _choice(pair)
+        rows += _choice(pair)
     return rows
 
 

@@ -11,7 +11,8 @@ from _paper_statistics import geometric_mean, interval, median, variation
 from _paper_zones import KINDS, MOST, questions
 from _regional_tasks import tasks_of
 
-DRAWS, TASKS, EDGES = 8, 2, 15_000  # of each planner per task; tasks of cells and of each type; checks
+DRAWS, EDGES = 8, 15_000  # of each planner per task; checks
+TASKS, PLACES = 4, 2  # tasks of cells, and as many of each type of zones, in so many cells per seed
 MOSTLY = 0.8  # share of the draws that must be solved: where checks end the others, time can't vary
 CELLS = ("open", "table_columns", "cnc_door")
 OTHERS = ("kpiece", "bkpiece", "lbkpiece", "sbl", "rrt", "rrt_connect", "tree", "genetic")
@@ -38,8 +39,9 @@ def _blocked(seed: int, quick: bool) -> list[tuple[str, Question]]:
     chosen = np.random.default_rng(5).permutation(len(blocked))[seed % 2 :: 2]
     found = [blocked[k] for k in chosen[: 1 if quick else TASKS]]
     for kind in KINDS:
-        among = questions(kind, (MOST,), 1 if quick else TASKS, seed)
-        found += [(f"{kind.lower()} zones {k}", one[MOST]) for k, one in enumerate(among)]
+        for place in range(1 if quick else PLACES):
+            among = questions(kind, (MOST,), 1 if quick else TASKS // PLACES, PLACES * seed + place)
+            found += [(f"{kind.lower()} zones {place} {k}", one[MOST]) for k, one in enumerate(among)]
     return found
 
 

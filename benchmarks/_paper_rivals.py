@@ -17,18 +17,23 @@ from ir_msgs_py.arrays import FloatArray
 EDGES = 6000  # checks of a search, in certified edges: one that spends them counts with them
 SIZES = (0, 1, 3, 10, 30, MOST)
 FEW = 10  # zones up to which there are few
-TASKS, QUICK_TASKS = 12, 1  # movements per type and seed
+PLACES, TASKS = 8, 3  # cells per type and seed, movements in each
 ONE_CELL = 100.0  # rad: larger than every joint's range
 SUPERFLUOUS = 0.9  # of the checks without cells: less would be worth having them
 SLOWER = 1.2  # times the checks among one zone from which on a planner has slowed down
 COMPARED = ("rrt", "rrt_connect", "tree", "genetic")
 
 
-def _among_zones(seed: int, sizes: tuple[int, ...], tasks: int) -> Iterator[tuple[str, int, int, Question]]:
+def _among_zones(
+    seed: int, sizes: tuple[int, ...], *, quick: bool
+) -> Iterator[tuple[str, int, int, Question]]:
+    """Type of the zones, their number, number of the movement, and the question."""
+    places, tasks = (1, 1) if quick else (PLACES, TASKS)
     for kind in KINDS:
-        for number, asked in enumerate(questions(kind, sizes, tasks, seed)):
-            for size, question in asked.items():
-                yield kind, size, number, question
+        for place in range(places):
+            for k, asked in enumerate(questions(kind, sizes, tasks, places * seed + place)):
+                for size, question in asked.items():
+                    yield kind, size, tasks * place + k, question
 
 
 def _row(planner: str, question: Question, seed: int, cell: float | None = None, edges: int = EDGES) -> Row:
@@ -57,7 +62,7 @@ def _ratios(rows: Sequence[Row], one: Row, other: Row, key: str = "edges") -> tu
 def measure_kpiece(seed: int, quick: bool) -> list[Row]:
     """A row per search with cells of 0.3 rad, and with a grid of one cell per quadrant of the joints."""
     rows = []
-    for kind, size, number, question in _among_zones(seed, SIZES[1:], QUICK_TASKS if quick else TASKS):
+    for kind, size, number, question in _among_zones(seed, SIZES[1:], quick=quick):
         for draw in range(1 if quick else 2):
             for name, cell in (("cells", None), ("no cells", ONE_CELL)):
                 row = _row("kpiece", question, draw, cell)
@@ -106,7 +111,7 @@ def follows_kpiece(statements: Sequence[Statement]) -> str:
 def measure_rrt(seed: int, quick: bool) -> list[Row]:
     """A row per search of each planner in every size of the cell."""
     rows: list[Row] = []
-    for kind, size, number, question in _among_zones(seed, SIZES, QUICK_TASKS if quick else TASKS):
+    for kind, size, number, question in _among_zones(seed, SIZES, quick=quick):
         asked = {"kind": kind, "zones": size, "task": number}
         rows.extend(asked | _row(planner, question, number) for planner in COMPARED)
     return rows

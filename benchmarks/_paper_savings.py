@@ -24,9 +24,9 @@ PLANNING_S = 60.0
 SAME_TIME = "same time"
 ARMS = {  # objective, whether the duration is that of the PTP, and one of how many movements is asked
     SAME_TIME: ("energy", True, 1),
-    "free, least J": ("time_and_energy", False, 2),
-    "free, least time": ("time", False, 4),
-    "free, least W": ("movement_cost", False, 4),
+    "free, least J": ("time_and_energy", False, 1),
+    "free, least time": ("time", False, 2),
+    "free, least W": ("movement_cost", False, 2),
 }
 
 

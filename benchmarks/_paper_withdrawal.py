@@ -23,7 +23,7 @@ from ir_planner.service.exit_tree import ExitTree
 from ir_planner.service.modified_ga import ModifiedGa
 
 CELLS = ("cnc_door", "deep_box", "demo")
-VARIANTS, DRAWS, QUICK_DRAWS = 12, 1, 1  # of each cell and seed; searches per station and reading
+VARIANTS, DRAWS, QUICK_DRAWS = 26, 1, 1  # of each cell and seed; searches per station and reading
 EDGES, SECONDS = 8_000, 20.0  # certified edges of a search, and its ceiling
 SURE = 95.0  # % of the searches
 POINTS = 2.0  # percentage points of searches from which on a difference is worth having
