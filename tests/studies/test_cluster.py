@@ -38,6 +38,21 @@ def test_without_dask_a_sentence_says_how_to_install_it(
         run_layout(SETTINGS, tmp_path, Means(scheduler="tcp://127.0.0.1:1"))
 
 
+@pytest.mark.parametrize(
+    "address",
+    ["nonsense", "tcp://", "tcp://host", "tcp://127.0.0.1:abc", "tcp://127.0.0.1:0", "tcp://127.0.0.1:65536",
+     "foo://127.0.0.1:1", "tcp://a b:8786", "tcp://127.0.0.1:8786 ", "--preload=x:1"],
+)  # fmt: skip
+def test_words_that_are_no_address_are_refused_before_anybody_waits(address: str) -> None:
+    with pytest.raises(WorkerError, match=r"it must be an address with a port .* as tcp://127\.0\.0\.1:8786"):
+        Means(scheduler=address)
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "tcp://host-1.lan:8786", "tls://[::1]:8786"])
+def test_addresses_of_schedulers_are_taken(address: str) -> None:
+    assert Means(scheduler=address).scheduler == address
+
+
 def free_port() -> int:
     """A port of the loopback that nobody uses now."""
     with socket.socket() as tried:
@@ -113,6 +128,25 @@ def test_two_workers_of_which_one_is_killed_meanwhile_give_the_same_bytes(
 
 
 @pytest.mark.long
+def test_a_scheduler_that_is_killed_meanwhile_ends_the_study_which_goes_on_later(
+    processes: list[subprocess.Popen[bytes]], tmp_path: Path, wait_for: Any
+) -> None:
+    address = scheduler(processes, tmp_path, wait_for)
+    worker(processes, tmp_path, address)
+
+    def kill(phase: str, done: int, of: int, best: str) -> None:
+        if done == 3:
+            processes[0].kill()
+
+    with pytest.raises(WorkerError, match="the scheduler is gone"):
+        run_layout(SETTINGS, tmp_path / "both", Means(scheduler=address, progress=kill))
+    assert (tmp_path / "both" / NAME).read_bytes().count(b"\n") >= 3
+    same(
+        run_layout(SETTINGS, tmp_path / "alone", Means(1)), run_layout(SETTINGS, tmp_path / "both", Means(1))
+    )
+
+
+@pytest.mark.long
 def test_a_local_cluster_gives_the_same_bytes_and_ends_what_it_started(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     alone = run_layout(SETTINGS, tmp_path / "alone", Means(1))
@@ -131,7 +165,7 @@ def test_a_local_cluster_gives_the_same_bytes_and_ends_what_it_started(tmp_path:
 
 
 @pytest.mark.long
-def test_nobody_at_the_address_and_other_builds_are_refused(
+def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
     processes: list[subprocess.Popen[bytes]],
     tmp_path: Path,
     wait_for: Any,
@@ -140,6 +174,13 @@ def test_nobody_at_the_address_and_other_builds_are_refused(
     monkeypatch.setattr(cluster, "_CONNECT_S", 2.0)
     with pytest.raises(WorkerError, match="no Dask scheduler answers at"):
         run_layout(SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{free_port()}"))
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        with pytest.raises(WorkerError, match=r"no Dask scheduler answers at .* nothing within 2 s"):
+            run_layout(
+                SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{silent.getsockname()[1]}")
+            )
     address = scheduler(processes, tmp_path, wait_for)
     with pytest.raises(WorkerError, match="has no worker: start: dask worker"):
         run_layout(SETTINGS, tmp_path / "b", Means(scheduler=address))

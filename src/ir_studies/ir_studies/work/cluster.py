@@ -6,10 +6,12 @@ the cluster that dies is Dask's own business, which gives its job to another.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import platform
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from importlib import import_module
 from itertools import islice
@@ -46,9 +48,12 @@ class Cluster:
         self._dask, self._stopped = _distributed(), stopped
         self._task = json.dumps(asdict(task))
         try:
+            with ThreadPoolExecutor(1) as apart:  # here a loop may run, as in a notebook
+                apart.submit(asyncio.run, self._identity(address)).result()
             self._client = self._dask.Client(address, timeout=_CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            raise WorkerError(f"no Dask scheduler answers at {address!r:.80}: {error!s:.200}") from error
+        except Exception as error:  # who knows what answers there, and how Dask reads it
+            said = str(error) or f"nothing within {_CONNECT_S:g} s"
+            raise WorkerError(f"no Dask scheduler answers at {address!r:.80}: {said:.200}") from error
         try:
             self._client.wait_for_workers(1, timeout=_CONNECT_S)
         except TimeoutError as error:
@@ -56,6 +61,11 @@ class Cluster:
             raise WorkerError(
                 f"the scheduler at {address} has no worker: start dask worker {address}"
             ) from error
+
+    async def _identity(self, address: str) -> None:
+        """Ask who is there. A client that could not connect is no use: its end waits, and is printed."""
+        async with self._dask.rpc(address) as scheduler:
+            await asyncio.wait_for(scheduler.identity(), _CONNECT_S)
 
     def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
         """Each job with its row, as they are made."""
