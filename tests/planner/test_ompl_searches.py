@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -46,6 +47,18 @@ def test_at_the_ceiling_it_is_killed(scene_of: SceneOf) -> None:
     found = SEARCHES["rrt"].find(ends, space, 1, space.work)
     assert found.paths == []
     assert space.work.truncated
+
+
+def test_processor_time_counts_what_ompl_runs(scene_of: SceneOf) -> None:
+    ends, space = a_blocked_task(scene_of, Work(10_000_000, 1.0, with_ompl.processor_time))
+    own, begin = time.process_time(), with_ompl.processor_time()
+    space.work.deadline = begin + 0.05
+    found = SEARCHES["rrt"].find(Ends(ends.start, ends.goals + 50.0), space, 1, space.work)
+    assert found.paths == []
+    assert space.work.truncated
+    passed = with_ompl.processor_time() - begin  # of the one that has ended too
+    assert passed >= 0.05
+    assert time.process_time() - own < passed
 
 
 def test_a_request_that_is_cancelled_meanwhile_raises(scene_of: SceneOf) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
@@ -13,7 +12,7 @@ import numpy as np
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner, PlannerError
 from ir_planner.search import SEARCHES
-from ir_planner.search.with_ompl import needs_ompl
+from ir_planner.search.with_ompl import needs_ompl, processor_time
 from ir_studies.arena.entries import Entry, tasks_of
 from ir_studies.arena.one_run import one_run
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
@@ -33,7 +32,7 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
 def row_of(entry: Entry, settings: ArenaSettings) -> Row:
     """The row of a run; what the planner refuses is a row too."""
     try:
-        return one_run(entry, settings, planner_of(entry.cell), time.monotonic)
+        return one_run(entry, settings, planner_of(entry.cell), processor_time)
     except PlannerError as error:
         return {"solved": False, "message": str(error)}
 
@@ -55,6 +54,6 @@ def warm_up(settings: ArenaSettings) -> None:
 @cache
 def planner_of(cell: str) -> Planner:
     """One planner per cell."""
-    planner = Planner(time.monotonic)
+    planner = Planner(processor_time)
     planner.set_cell("", cell)
     return planner

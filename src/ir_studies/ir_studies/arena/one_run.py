@@ -1,7 +1,7 @@
 """One run: a planner is asked for one task, with other seeds until its seconds are over; the best counts.
 
 All are treated alike: what a planner finds is simplified, optimised, timed and proved by the same code, and
-who answers quickly is asked more often.
+who answers quickly is asked more often. Seconds are those of processors, also where another process answers.
 """
 
 from __future__ import annotations

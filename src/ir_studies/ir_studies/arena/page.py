@@ -55,7 +55,7 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings) -> str:
         "title": "Arena",
         "subtitle": text(
             f"{len(planners)} planners, {len(settings.cells)} cells, {questions} questions, "
-            f"{settings.seeds} seeds: {len(runs)} runs of {settings.seconds:g} s"
+            f"{settings.seeds} seeds: {len(runs)} runs of {settings.seconds:g} s of processor"
         ),
         "verdict": verdict(runs, settings),
         "cells": "".join(_cell_section(runs, cell, planners) for cell in settings.cells),

@@ -29,12 +29,12 @@ tasks: []                    # names as home->p1; [] is all of them, there and b
 seeds: 10
 loads: [""]                  # what is attached: "" is the tool of the cell, none nothing
 timings: [synchronous]       # and asynchronous
-seconds: 1.0                 # per run: the planner is asked again with other seeds until they are over
+seconds: 1.0                 # of processor per run: the planner is asked again, with other seeds
 requests: 0                  # per run at most; 0: as many as the seconds hold
 max_iterations: 0            # work of a request; 0: the planner's default
 safety_distance: 0.02        # m; less where an end of the task is nearer
 time_value: 500.0            # W in J = energy of the drives + time_value x T
-hang_after: 60.0             # s beyond `seconds` after which a run is cut
+hang_after: 60.0             # s of the wall beyond `seconds` after which a run is cut
 """
 
 
@@ -73,7 +73,8 @@ class ArenaSettings:
     def budget(self) -> dict[str, Any]:
         """What the results of a run depend on beside the axes."""
         axes = ("cells", "planners", "tasks", "seeds", "loads", "timings", "hang_after")
-        return {name: value for name, value in asdict(self).items() if name not in axes}
+        kept = {name: value for name, value in asdict(self).items() if name not in axes}
+        return {**kept, "clock": "processor"}
 
     def _check_cells(self) -> None:
         known_tasks: list[str] = []

@@ -3,6 +3,7 @@
 from ir_planner.search.port import Search
 from ir_planner.search.with_ompl.aorrtc import Aorrtc
 from ir_planner.search.with_ompl.bkpiece import Bkpiece
+from ir_planner.search.with_ompl.charged import processor_time
 from ir_planner.search.with_ompl.host import missing
 from ir_planner.search.with_ompl.kpiece import Kpiece
 from ir_planner.search.with_ompl.lbkpiece import Lbkpiece
@@ -21,6 +22,7 @@ __all__ = [
     "RrtConnect",
     "missing",
     "needs_ompl",
+    "processor_time",
 ]
 
 

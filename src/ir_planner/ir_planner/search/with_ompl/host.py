@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from multiprocessing.connection import Connection
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Work
+from ir_planner.search.with_ompl.charged import charged
 from ir_planner.search.with_ompl.problem import Outcome, Problem
 
 _LOOK_S = 0.005  # s between two looks whether the request was cancelled or its time is up
@@ -95,7 +95,7 @@ def asked(problem: Problem, work: Work) -> Outcome:
     """
     work.check()
     connection, process = _connected()
-    with connection:
+    with connection, charged(process):
         try:
             connection.send(replace(problem, scene=replace(problem.scene)))  # without what it has computed
             while not connection.poll(_LOOK_S):
@@ -105,9 +105,5 @@ def asked(problem: Problem, work: Work) -> Outcome:
             outcome: Outcome = connection.recv()
         except (EOFError, OSError):
             return Outcome(None, 0, "OMPL's process ended without an answer")
-        finally:
-            # it runs until it has answered: where it has, the signal comes too late, at most
-            with suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
     work.spend(outcome.edges)
     return outcome
