@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from _paper_plots import finished, panels
 from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_stations import CELLS, Place, places
+from _paper_stations import CELLS, Place, difference, of_reading, places
 from _paper_statistics import interval, mean, percent, share
 
 from ir_planner.configurations import InteractionSettings
@@ -93,26 +93,19 @@ def _chance(row: Row, drawn: int) -> float:
     return chance(row["starts"], row["free"], drawn)
 
 
-def _by_station(rows: Sequence[Row], reading: str) -> dict[tuple[int, str], Row]:
-    return {(row["seed"], row["station"]): row for row in rows if row["reading"] == reading}
-
-
-def _differences(rows: Sequence[Row], one: str, other: str) -> list[float]:
-    """Per station: share of the starts that succeed, one reading less the other [percentage points]."""
-    a, b = _by_station(rows, one), _by_station(rows, other)
-    return [100.0 * (a[k]["free"] / a[k]["starts"] - b[k]["free"] / b[k]["starts"]) for k in a]
+def _share(row: Row) -> float:
+    return float(row["free"] / row["starts"])
 
 
 def _per_second(rows: Sequence[Row], one: str, other: str) -> tuple[list[float], list[float], list[float]]:
-    a, b = _by_station(rows, one), _by_station(rows, other)
-    keys = list(a)
-    ratio = [a[k]["seconds"] / b[k]["seconds"] for k in keys]
-    return ratio, [a[k]["free"] / a[k]["starts"] for k in keys], [b[k]["free"] / b[k]["starts"] for k in keys]
+    a, b = of_reading(rows, one), of_reading(rows, other)
+    ratio = [a[k]["seconds"] / b[k]["seconds"] for k in a]
+    return ratio, [_share(a[k]) for k in a], [_share(b[k]) for k in a]
 
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """Success of the search, and what each of its parts adds."""
-    default = list(_by_station(rows, DEFAULT).values())
+    default = list(of_reading(rows, DEFAULT).values())
     starts = min(ASKED, default[0]["starts"])
     solved = [_chance(row, starts) for row in default]
     sure = percent(share(solved))
@@ -125,16 +118,16 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         ("Newton's finish lets more starts arrive", DEFAULT, "no Newton finish"),
         ("the normal distribution of (1) does better than a uniform one", DEFAULT, "(1) uniform"),
     ):
-        some = _differences(rows, one, other)
+        some, _ = difference(rows, one, other, _share)
         figure = f"starts that succeed, {one} less {other}"
         found.append(Statement(says, figure, *interval(mean, some), len(some), "stations", "points", POINTS))
-    a, b = (_by_station(rows, name) for name in ("no Newton finish", "no Newton finish, no set-back"))
-    hard = [100.0 * (_chance(a[k], starts) - _chance(b[k], starts)) for k in a]
+    without = "no Newton finish", "no Newton finish, no set-back"
+    hard, _ = difference(rows, *without, lambda row: _chance(row, starts))
     says = f"{starts} starts reach more stations with the set-back, where no Newton finishes it"
     figure = "chance of a free configuration, with less without"
     found.append(Statement(says, figure, *interval(mean, hard), len(hard), "stations", "points", POINTS))
-    ratio, with_it, without = _per_second(rows, DEFAULT, "no set-back")
-    rate = interval(lambda r, a, b: float((a.sum() / b.sum()) / np.mean(r)), ratio, with_it, without)
+    ratio, with_it, without_it = _per_second(rows, DEFAULT, "no set-back")
+    rate = interval(lambda r, a, b: float((a.sum() / b.sum()) / np.mean(r)), ratio, with_it, without_it)
     found.append(Statement("the set-back pays for its time", "successes per second, with over without", *rate,
                            len(ratio), "stations", "", 1.0))  # fmt: skip
     figure = f"of all free configurations found by {default[0]['starts']} starts, mean"
@@ -167,7 +160,7 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Success by number of starts, for each reading."""
     found = []
     for name in READINGS:
-        mine = list(_by_station(rows, name).values())
+        mine = list(of_reading(rows, name).values())
         line: Row = {"reading": name}
         for number in NUMBERS:
             some = [_chance(row, number) for row in mine if row["starts"] >= number]
@@ -181,7 +174,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     """Success over the number of starts, and over processor time."""
     figure, (axes, over_time) = panels(2, width=4.4, height=3.4)
     for name in READINGS:
-        mine = list(_by_station(rows, name).values())
+        mine = list(of_reading(rows, name).values())
         numbers = [n for n in NUMBERS if n <= mine[0]["starts"]]
         chances = [100.0 * np.mean([_chance(r, n) for r in mine]) for n in numbers]
         each = 1e3 * float(np.mean([row["seconds"] / row["starts"] for row in mine]))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from _paper_result import Row
 from _regional_tasks import scene_of_cell
 from _service_stations import margin_at
 from _variants import variant
@@ -15,6 +16,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations import free_configurations
 from ir_planner.scene import PlanningScene
 
+Key = tuple[int, str, int]
 CELLS = ("cnc_door", "deep_box", "demo", "table_columns", "open")
 
 
@@ -53,3 +55,18 @@ def places(cells: tuple[str, ...], seed: int, variants: int) -> Iterator[Place]:
                 q = free_configurations(station.pose, scene, kept, np.array(one.park)).q
                 if len(q):
                     yield Place(scene, station, margin, q)
+
+
+def of_reading(rows: Sequence[Row], reading: str) -> dict[Key, Row]:
+    """Rows of one reading of an equation by seed, station and draw."""
+    return {
+        (row["seed"], row["station"], row.get("draw", 0)): row for row in rows if row["reading"] == reading
+    }
+
+
+def difference(
+    rows: Sequence[Row], one: str, other: str, success: Callable[[Row], float]
+) -> tuple[list[float], list[Key]]:
+    """Success of one reading less the other's [percentage points], and of what each is."""
+    a, b = of_reading(rows, one), of_reading(rows, other)
+    return [100.0 * (success(a[key]) - success(b[key])) for key in a], list(a)

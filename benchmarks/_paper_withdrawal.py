@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from _paper_result import Experiment, Row, Statement
-from _paper_stations import Place, places
+from _paper_stations import Place, difference, of_reading, places
 from _paper_statistics import geometric_mean, interval, mean, percent, share
 
 from ir_msgs_py.arrays import FloatArray
@@ -93,19 +93,6 @@ def _searched(place: Place, reading: Reading, seed: int) -> Row:
     return row
 
 
-Key = tuple[int, str, int]
-
-
-def _mine(rows: Sequence[Row], reading: str) -> dict[Key, Row]:
-    return {(row["seed"], row["station"], row["draw"]): row for row in rows if row["reading"] == reading}
-
-
-def _difference(rows: Sequence[Row], one: str, other: str) -> tuple[list[float], list[tuple[int, str]]]:
-    """Per search: success of one reading less the other's [percentage points], and its station."""
-    a, b = _mine(rows, one), _mine(rows, other)
-    return [100.0 * (a[k]["solved"] - b[k]["solved"]) for k in a], [k[:2] for k in a]
-
-
 def _success(rows: Sequence[Row], zones: str, kinds: tuple[str, ...]) -> Statement:
     some = [row for row in rows if row["reading"] == DEFAULT and row["zone"] in kinds]
     stations = [(row["seed"], row["station"]) for row in some]
@@ -126,7 +113,8 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         ("the mean as read does better than as printed", DEFAULT, "mean as printed"),
         ("eq. (7) leaves more often than two trees", DEFAULT, TREES),
     ):
-        some, stations = _difference(rows, one, other)
+        some, keys = difference(rows, one, other, lambda row: row["solved"])
+        stations = [key[:2] for key in keys]
         figure = f"searches that leave, {one} less {other}"
         what = f"searches at {len(set(stations))} stations"
         means = interval(mean, some, groups=stations)
@@ -145,7 +133,7 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
             1.0,
         ),
     ):
-        a, b = _mine(rows, DEFAULT), _mine(rows, other)
+        a, b = of_reading(rows, DEFAULT), of_reading(rows, other)
         both = [k for k in a if a[k]["solved"] and b[k]["solved"] and b[k][key] > 0.0]
         ratio = interval(geometric_mean, [a[k][key] / b[k][key] for k in both], groups=[k[:2] for k in both])
         found.append(Statement(says, figure, *ratio, len(both), "searches", "", bound, at_least=False))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +32,7 @@ from ir_studies.arena.figures import (
 )
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
 from ir_studies.arena.table import Run
+from ir_studies.page import BUTTON, page
 
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
 _HEADS = (
@@ -60,14 +60,12 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings) -> str:
         "verdict": verdict(runs, settings),
         "cells": "".join(_cell_section(runs, cell, planners) for cell in settings.cells),
         "settings": text(json.dumps(settings.budget)),
-        "style": asset("page.css"),
         "data": json.dumps(
             {"end": longest(runs), "axes": list(_curves(runs, settings))}, separators=(",", ":")
         ).replace("<", "\\u003c"),
         "script": "\n".join(asset(script) for script in SCRIPTS),
     }
-    template = (files("ir_studies") / "arena" / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+    return page("arena", parts, BUTTON)
 
 
 def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:

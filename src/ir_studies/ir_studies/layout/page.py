@@ -8,7 +8,6 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from ir_description import Cell, load_cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder.report.files import write_output
-from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.tables import table
 from ir_recorder.report.words import DASH, joules, millimetres, percent, text
 from ir_studies.layout.finals import Final
@@ -27,6 +26,7 @@ from ir_studies.layout.plan_view import PlanView, colour, estimates, legend, mar
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import LayoutSettings
 from ir_studies.layout.summary import ends, of_condition, sentences
+from ir_studies.page import page
 
 _CHART, _HIGH, _LEFT, _BELOW = 340.0, 190.0, 52.0, 30.0  # width, height and room for numbers
 _SENTENCE = 300  # characters of a reason
@@ -59,10 +59,8 @@ def page_html(known: Sequence[Known], finals: Sequence[Sequence[Final]], setting
         "variables": "".join(_charts(known, finals, settings)),
         "impossible": _impossible(known),
         "settings": text(json.dumps(asdict(settings))),
-        "style": asset("page.css"),
     }
-    template = (files("ir_studies") / "layout" / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+    return page("layout", parts)
 
 
 def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:

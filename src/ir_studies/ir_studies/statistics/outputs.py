@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
-from importlib.resources import files
 from pathlib import Path
 
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder.report.files import write_output
-from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_recorder.report.words import DASH, text
+from ir_studies.page import page
 from ir_studies.statistics.dots import dots
 from ir_studies.statistics.figures import (
     ASYNCHRONOUS,
@@ -38,10 +37,10 @@ def write_outputs(
     rows: Sequence[Row], found: Findings, settings: StatisticsSettings, folder: Path
 ) -> tuple[Path, ...]:
     """Write table.csv and index.html. Raises RecorderError for files that can't be written, or replaced."""
-    page = page_html(found, settings).encode()
+    html = page_html(found, settings).encode()
     return (
         write_columns(columns(rows), folder / "table.csv", _CSV_START, ANYWHERE),
-        write_output(folder / "index.html", page, PAGE_START, ANYWHERE),
+        write_output(folder / "index.html", html, PAGE_START, ANYWHERE),
     )
 
 
@@ -80,10 +79,8 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "agreements": _table(found.agreements, "Energies of a movement"),
         "agreement_dots": dots(found.agreements, "Against direct, movement by movement"),
         "settings": text(settings.budget),
-        "style": asset("page.css"),
     }
-    template = (files("ir_studies") / "statistics" / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+    return page("statistics", parts)
 
 
 def _table(comparisons: Sequence[Comparison], caption: str) -> str:

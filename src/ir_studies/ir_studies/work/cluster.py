@@ -12,6 +12,7 @@ import platform
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict
 from importlib import import_module
 from itertools import islice
@@ -30,6 +31,7 @@ from ir_studies.work.pool import Pool
 _CONNECT_S = 20.0
 _LOOK_S = 0.2  # between two looks whether somebody asks to stop
 _AHEAD = 4  # jobs that each thread has waiting: none waits for the next one to come over the network
+_GONE = "the scheduler is gone: the same command goes on when it is back"
 _MISSING = 'a Dask cluster needs Dask: pip install "ir_studies[cluster]", or pip install dask distributed'
 
 
@@ -84,10 +86,14 @@ class Cluster:
                 if future in running:
                     yield running.pop(future), self._row(future)
         finally:
-            self._client.cancel(list(running))
+            with suppress(OSError):  # a scheduler that is gone has nothing to cancel
+                self._client.cancel(list(running))
 
     def _free(self, running: int) -> int:
-        threads = sum(int(count) for count in self._client.nthreads().values())
+        try:
+            threads = sum(int(count) for count in self._client.nthreads().values())
+        except OSError as error:
+            raise WorkerError(_GONE) from error
         return max(_AHEAD * max(threads, 1) - running, 0)
 
     def _next(self, done: Queue[Any]) -> Any:
@@ -108,7 +114,7 @@ class Cluster:
         except StudyError:
             raise
         except (self._dask.CancelledError, OSError) as error:
-            raise WorkerError("the scheduler is gone: the same command goes on when it is back") from error
+            raise WorkerError(_GONE) from error
         return row
 
     def __enter__(self) -> Cluster:
@@ -117,10 +123,10 @@ class Cluster:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
+        with suppress(OSError):
             if self._client.status == "running":
                 self._client.run(end_pools, on_error="ignore")
-        finally:
+        with suppress(OSError):
             self._client.close(timeout=_CONNECT_S)
 
 
