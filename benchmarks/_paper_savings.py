@@ -16,7 +16,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
 
-PAIRS, QUICK_PAIRS = 500, 24  # per seed
+PAIRS, QUICK_PAIRS = 1000, 24  # per seed
 LOW, HIGH = -80.0, 20.0  # % of section V
 WITHIN = 0.95  # share of the movements that must lie within
 LARGE = 1000.0  # J of the common PTP from which on a relative change is no accident of a small reference

@@ -182,7 +182,7 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
                 SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{silent.getsockname()[1]}")
             )
     address = scheduler(processes, tmp_path, wait_for)
-    with pytest.raises(WorkerError, match="has no worker: start: dask worker"):
+    with pytest.raises(WorkerError, match="has no worker: start one, dask worker"):
         run_layout(SETTINGS, tmp_path / "b", Means(scheduler=address))
     worker(processes, tmp_path, address)
     monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)

@@ -61,7 +61,7 @@ class Cluster:
         except TimeoutError as error:
             self._client.close()
             raise WorkerError(
-                f"the scheduler at {address} has no worker: start dask worker {address}"
+                f"the scheduler at {address} has no worker: start one, dask worker {address}"
             ) from error
 
     async def _identity(self, address: str) -> None:
