@@ -98,6 +98,33 @@ def test_pauses_are_checked_too(analysis: Analysis) -> None:
         assert check.ok == ok
 
 
+def test_a_plant_that_is_not_the_model_is_held_against_the_interval_of_a_pause(analysis: Analysis) -> None:
+    """What drives draw while they stand is known by its interval alone, as in movements."""
+    pause = next(s for s in analysis.steps if s.step.movement.is_pause)
+    planned = pause.step.movement.report.energy
+    report = replace(pause.step.movement.report, energy_low=0.9 * planned, energy_high=1.5 * planned)
+    movement = replace(
+        pause.step.movement, report=report, duration=pause.seconds, power_mode="STAND_ON_MOTORS"
+    )
+    step = replace(pause.step, movement=movement)
+    for share, ok in ((1.95, True), (2.1, False), (0.85, True), (0.7, False)):
+        result = replace(pause, step=step, energy=share * planned, stored_energy=0.0)
+        own = Tolerances(within_interval=True, energy_absolute=1.0)
+        check = named(findings(replace(analysis, steps=(result,)), own), "energy of")[0]
+        assert check.ok == ok, check
+
+
+def test_power_at_rest_is_held_against_the_interval_of_what_drives_draw(analysis: Analysis) -> None:
+    row = next(row for row in analysis.plateaus if row.mode == "STAND_ON_MOTORS")
+    assert row.low <= row.expected <= row.high
+    wide = replace(row, low=row.expected - 10.0, high=row.expected + 400.0)
+    own = Tolerances(within_interval=True)
+    for watts, ok in ((790.0, True), (810.0, False), (-25.0, False)):
+        seen = replace(wide, power=row.expected + watts)
+        (check,) = named(findings(replace(analysis, plateaus=(seen,)), own), "power at rest")
+        assert check.ok == ok, check
+
+
 def test_a_movement_that_took_more_than_planned_fails_its_check(
     new_run: Callable[[], Any], tmp_path: Path
 ) -> None:

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell, Load, PowerData
+from ir_description import Cell, Load, PowerData, data_sheet_of
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried
 from ir_recorder.analysis.meter import Meter
-from ir_recorder.analysis.resting import resting_watts
+from ir_recorder.analysis.predicted import Predictor
+from ir_recorder.analysis.resting import MOTORS, resting_watts
 from ir_recorder.read.recording import PowerSeries, Recording
 
 AT_HOME = 0.005  # rad: gravity torque changes by less than 0.1 % within it
@@ -36,7 +37,8 @@ class Plateau:
     """Power [W] in a mode with a load over `seconds` in total.
 
     payload [kg]: mass of the load. expected [W]: by the data of controller, tool and robot. table_2 [W]:
-    the paper's value, NaN where the load is another one.
+    the paper's value, NaN where the load is another one. low, high [W]: the 90 % interval of what is
+    expected, of a robot that holds itself: drives draw more than the data know. NaN: none.
     """
 
     mode: str
@@ -46,6 +48,8 @@ class Plateau:
     expected: float
     table_2: float
     seconds: float
+    low: float = NAN
+    high: float = NAN
 
     @property
     def error(self) -> float:
@@ -84,7 +88,15 @@ def _plateau(mode: str, load: str, power: float, seconds: float, cell: Cell, dat
     expected = resting_watts(mode, cell.robot.machine_home, cell, loads, data) if known else NAN
     of_the_paper = known and cell.robot.name == data.table_2_robot and _of_the_paper(loads, payload, data)
     table_2 = data.measured(round(payload), mode) if of_the_paper else NAN
-    return Plateau(mode, load, payload, power, expected, table_2, seconds)
+    low, high = _interval(expected, cell, loads, data) if known and mode == MOTORS else (NAN, NAN)
+    return Plateau(mode, load, payload, power, expected, table_2, seconds, low, high)
+
+
+def _interval(expected: float, cell: Cell, loads: tuple[Load, ...], data: PowerData) -> tuple[float, float]:
+    """The 90 % interval of a power [W] on motors at machine home, by the marks of the data."""
+    predictor = Predictor(cell.robot, data.dc_link, cell.base_pose, data_sheet_of(cell.robot, data))
+    watts, low, high = predictor.standing(cell.robot.machine_home, loads)
+    return expected + low - watts, expected + high - watts
 
 
 def _of_the_paper(loads: tuple[Load, ...], payload: float, data: PowerData) -> bool:

@@ -15,7 +15,7 @@ from ir_description.robot import DcLink
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_recorder.measure import PowerModel, planned_samples
+from ir_recorder.measure import PowerModel, Samples, planned_samples, standing_sample
 
 _DRAWS = 400
 _LEVELS = (0.05, 0.95)
@@ -35,15 +35,24 @@ class Predictor:
     ) -> TrajectoryReport:
         """The plan's report with energy [J], interval and name of these parameters."""
         samples = planned_samples(trajectory, loads, self._parameters.modes)
+        energy, low, high = self._energies(samples)
+        return replace(
+            planned,
+            energy=energy,
+            energy_low=low,
+            energy_high=high,
+            power_parameters=self._parameters.name,
+        )
+
+    def standing(self, q: FloatArray, loads: Sequence[Load]) -> tuple[float, float, float]:
+        """Power [W] while it stands at q (n,) on motors, with the ends of its 90 % interval."""
+        return self._energies(standing_sample(q, loads, self._parameters.modes))
+
+    def _energies(self, samples: Samples) -> tuple[float, float, float]:
+        """Energy [J] of samples, and the ends of its 90 % interval."""
         prepared, expected = self._model.prepare(samples), self._draws.mean(axis=0)
         energy = samples.step * float(self._model.watts(self._parameters.mean, prepared).sum())
         watts, slopes = self._model.watts_and_slopes(expected, prepared)
         drawn = samples.step * (watts.sum() + (self._draws - expected) @ slopes.sum(axis=0))
         low, high = np.quantile(drawn, _LEVELS)
-        return replace(
-            planned,
-            energy=energy,
-            energy_low=min(float(low), energy),
-            energy_high=max(float(high), energy),
-            power_parameters=self._parameters.name,
-        )
+        return energy, min(float(low), energy), max(float(high), energy)

@@ -76,6 +76,13 @@ def planned_samples(
     return Samples(step, middles, at.q, at.qd, at.qdd, mode, load, on, none, held)
 
 
+def standing_sample(q: FloatArray, loads: Sequence[Load], modes: Sequence[str]) -> Samples:
+    """One second of standing at q (n,) on motors, without a meter."""
+    still, (held, load) = np.zeros((1, len(q))), one_load(loads, 1)
+    mode, on = np.full(1, list(modes).index(_MOTORS)), np.ones(1, bool)
+    return Samples(1.0, np.full(1, 0.5), q[None], still, still, mode, load, on, np.full(1, np.nan), held)
+
+
 def _motion(joints: Trace, positions: FloatArray, middles: FloatArray) -> FloatArray:
     """Position, speed and acceleration (3, M, n) at the middles; NaN in gaps and next to them."""
     step = max(joints.period, _FASTEST)
