@@ -44,7 +44,7 @@ class BackgroundExecutor:
         self._executor.add_node(node)
         return node
 
-    def run(self, function: Callable[[], T], timeout: float = 10.0) -> T:
+    def run(self, function: Callable[[], T], timeout: float = 60.0) -> T:
         """Call the function on the spinning thread and return what it returns."""
         if threading.current_thread() is self._thread:
             return function()

@@ -155,7 +155,12 @@ class Client:
             if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:  # the kept ones come one after another
                 deadline = time.monotonic() + limit
                 while time.monotonic() < deadline:
-                    if not self._executor.wait_until(_grown(received), _KEPT_WITHIN):
+                    grown = _grown(received)
+                    if self._executor.wait_until(grown, _KEPT_WITHIN):
+                        continue
+                    for _ in range(2):  # a whole turn: that thread may have got no processor meanwhile
+                        self._executor.run(_nothing)
+                    if not grown():
                         break
         finally:
             self._executor.run(lambda: self.node.destroy_subscription(subscription))
@@ -266,6 +271,10 @@ class Client:
         if key not in self._clients:
             self._clients[key] = self.node.create_client(service_type, service, qos_profile=SERVICE)
         return self._clients[key]
+
+
+def _nothing() -> None:
+    """A turn of the spinning thread."""
 
 
 def _grown(received: list[Any]) -> Callable[[], bool]:
