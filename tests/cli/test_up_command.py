@@ -24,10 +24,9 @@ from ir_cli.up_command import choose_ports
 WAITING = """
 import os, signal, threading
 from pathlib import Path
-from typing import Any
-Path({pid!r}).write_text(str(os.getpid()))
 ended = threading.Event()
-signal.signal(signal.SIGINT, lambda *_: ended.set())
+signal.signal(signal.SIGINT, lambda *_: ended.set())  # before anybody can know of this process
+Path({pid!r}).write_text(str(os.getpid()))
 while not ended.wait(0.02):
     pass
 Path({end!r}).write_text("finished")
@@ -35,7 +34,6 @@ Path({end!r}).write_text("finished")
 PARENT = """
 import signal, sys
 from pathlib import Path
-from typing import Any
 from ir_cli.processes import NodeCommand, NodeProcesses
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignore it, as nohup does
 with NodeProcesses(Path(sys.argv[1]), {"PYTHONPATH": sys.argv[2]}) as nodes:

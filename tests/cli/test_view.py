@@ -76,6 +76,10 @@ class View:
         """Wait until the panel says all of this."""
         self.until(lambda: all(word in self.browser.text for word in words))
 
+    def draws(self, *names: str) -> None:
+        """Wait until all these are in the scene."""
+        self.until(lambda: set(names) <= set(self.browser.nodes))
+
     def change(self, label: str, value: Any) -> None:
         """Give a control another value as soon as it is there."""
         labels = lambda: {each.get("label") for each in list(self.browser.controls.values())}  # noqa: E731
@@ -105,12 +109,9 @@ def view(tmp_path: Path) -> Iterator[View]:
 
 def test_the_cell_is_drawn_checked_and_planned(view: View) -> None:
     view.shows("pick with none", "at the mains", "nearest ", " mm: ")
-    nodes = view.browser.nodes
-    assert {"/machines/table/top", "/machines/table/zone", "/machines/table/station_pick", "/path"} <= set(
-        nodes
-    )
-    assert {f"/robot/link_{k}" for k in range(7)} <= set(nodes)
-    assert nodes["/path"]["visible"] is True
+    view.draws("/machines/table/top", "/machines/table/zone", "/machines/table/station_pick")
+    view.draws("/path", *(f"/robot/link_{k}" for k in range(7)))
+    view.until(lambda: view.browser.nodes["/path"].get("visible") is True)
 
 
 def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(view: View) -> None:
@@ -122,13 +123,13 @@ def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(view: Vie
         "small.yaml:13",
         "dwel",
     )
-    assert "/machines/table/top" in view.browser.nodes
+    view.draws("/machines/table/top")
     renamed = CELL.replace("name: top", "name: other_top").replace("name: pick", "name: place")
     view.write(renamed.replace("station: pick", "station: place"))
     view.shows("place with none", "at the mains")
-    assert "can&#x27;t be read" not in view.browser.text
-    assert "/machines/table/other_top" in view.browser.nodes
-    assert "/machines/table/top" not in view.browser.nodes
+    view.until(lambda: "can&#x27;t be read" not in view.browser.text)
+    view.draws("/machines/table/other_top")
+    view.until(lambda: "/machines/table/top" not in view.browser.nodes)
 
 
 @pytest.mark.long
@@ -149,18 +150,19 @@ def test_what_cannot_be_reached_says_why_and_shows_the_pair_in_red(view: View) -
     view.write(CELL.replace("0.1, 0.45]", "0.1, 0.16]"))
     view.shows("0 of ", "none is free", "not planned")
     view.until(lambda: "top" in view.browser.red())
-    assert any(name.startswith("l") for name in view.browser.red())
+    view.until(lambda: any(name.startswith("l") for name in view.browser.red()))
 
 
 def test_sliders_move_the_robot_and_the_nearest_pair(view: View) -> None:
     view.shows("at the mains")
+    view.until(lambda: "position" in view.browser.nodes.get("/robot/link_6", {}))
     before = view.browser.nodes["/robot/link_6"]["position"]
     view.change("A2", -20.0)
+    view.until(lambda: abs(view.session._stage.q[1] - np.radians(-20.0)) < 1e-9)
     view.until(lambda: view.browser.nodes["/robot/link_6"]["position"] != before)
     view.shows("top")  # it comes down to the table
     cell = load_cell(view.path)
-    assert view.session._stage.q[1] == pytest.approx(np.radians(-20.0))
-    assert view.session._stage.near is not None
+    view.until(lambda: view.session._stage.near is not None)
     assert set(view.session._stage.near.names) <= {c.name for c in cell.capsules()} | {"top", "floor"}
     view.change("A2", float("nan"))  # from a program that is no browser
     view.change("A1", 10.0)

@@ -137,11 +137,10 @@ def test_addresses_that_aren_t_there_are_exception_02(make, serve, request_, cod
 
 
 def exchange(port, pdu, length=None):
-    """Send a raw request and return the PDU of the answer, b"" when there is none within 10 s."""
+    """Send a raw request and return the PDU of the answer, b"" when there is none within 60 s."""
     frame = struct.pack(">HHHB", 7, 0, (len(pdu) + 1) if length is None else length, 1) + pdu
-    with socket.create_connection(("127.0.0.1", port), timeout=2.0) as link:
+    with socket.create_connection(("127.0.0.1", port), timeout=60.0) as link:
         link.sendall(frame)
-        link.settimeout(10.0)
         try:
             return link.recv(300)[7:]
         except (TimeoutError, ConnectionError):
@@ -251,7 +250,7 @@ def survive(endangered, frames, framed):
     driver.plc.wake()
     # what is no Modbus ends its connection
     with (
-        socket.create_connection(("127.0.0.1", port), timeout=2.0) as link,
+        socket.create_connection(("127.0.0.1", port), timeout=60.0) as link,
         contextlib.suppress(ConnectionError),
     ):
         for body in frames:

@@ -54,13 +54,13 @@ def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
         wait_for(accepted.done)
         feedback = f"{names.EXECUTE_TRAJECTORY}/_action/feedback"
         wait_for(lambda: len(heard) > 2, what="the driver knows its client")
-        assert len(driver.subscribers(feedback)) == 2
+        wait_for(lambda: len(driver.subscribers(feedback)) == 2, what="both clients are known")
         guest.run(client.destroy)
     finally:
         guest.close()
         context.try_shutdown()
     wait_for(lambda: not driver._driver.moving, what="the movement stops")
-    assert len(driver.subscribers(feedback)) == 1
+    wait_for(lambda: len(driver.subscribers(feedback)) == 1, what="the other one is left")
 
 
 def test_a_client_counts_by_its_process_once_that_is_known() -> None:

@@ -85,13 +85,13 @@ run_node("listed", Listed, sys.argv, goes_on=lambda node: node.looks < 6)
 
 
 def test_a_node_started_without_any_preparation_listens_on_loopback_only(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ros_domain_id: int
 ) -> None:
     """Sockets at the ports of RTPS take data; those at ephemeral ports only send, and nothing reads them."""
     for name in (RANGE, PEERS, PROFILES):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv(RANGE, "SUBNET")
-    monkeypatch.setenv("ROS_DOMAIN_ID", "97")
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
     script = tmp_path / "node.py"
     script.write_text(NODE, encoding="utf-8")
     run = subprocess.run(
@@ -99,7 +99,7 @@ def test_a_node_started_without_any_preparation_listens_on_loopback_only(
     )
     sockets = re.findall(r"socket (\S+) ([0-9A-F]+):([0-9A-F]+)", run.stdout)
     assert "done" in run.stdout, run.stderr
-    ports = range(7400 + 250 * 97, 7400 + 250 * 98)
+    ports = range(7400 + 250 * ros_domain_id, 7400 + 250 * (ros_domain_id + 1))
     listening = [(family, address) for family, address, port in sockets if int(port, 16) in ports]
     assert listening, run.stdout
     assert {address for _, address in listening} <= set(LOOPBACK), listening

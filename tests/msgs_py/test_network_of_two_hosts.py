@@ -29,6 +29,7 @@ class Offering(Node):
 run_node("offering", Offering, sys.argv)
 """
 CLIENT = """
+import os
 import time
 import rclpy
 from std_srvs.srv import Trigger
@@ -37,11 +38,11 @@ from rclpy.node import Node
 rclpy.init()
 node = Node("foreign")
 client = node.create_client(Trigger, "hello")
-found = client.wait_for_service(timeout_sec=10.0)
+found = client.wait_for_service(timeout_sec=60.0 if os.environ["IR_NETWORK"] == "insecure" else 10.0)
 print("nodes:", [name for name in node.get_node_names() if name != "foreign"])
 if found:
     future = client.call_async(Trigger.Request())
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 60.0
     while not future.done() and time.monotonic() < end:
         rclpy.spin_once(node, timeout_sec=0.1)
     print("answered:", future.done())
@@ -58,7 +59,7 @@ def from_the_other_host(folder: Path, network: str) -> str:
     command = ["unshare", *root, "--net", str(SCRIPT), sys.executable, str(node), str(client)]
     environment = {**os.environ, "IR_NETWORK": network, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     environment.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
-    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment)
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
     assert "found:" in run.stdout, run.stderr
     return run.stdout
 

@@ -130,7 +130,7 @@ def ask(ros_context, ros_executor, ros_node, wait_for):
         client = ros_executor.run(lambda: ros_node.create_client(kind, f"/searcher/{name}"))
         wait_for(client.service_is_ready)
         future = ros_executor.run(lambda: client.call_async(kind.Request(parameters=parameters)))
-        wait_for(future.done, timeout=10.0, what=f"{name} answers")
+        wait_for(future.done, what=f"{name} answers")
         return future.result()
 
     return send

@@ -146,7 +146,7 @@ def test_a_jump_aborts_the_goal_with_its_reason_and_the_grid_starts_anew(
             jumped.append(feedback)
             clock.leap(jump)
 
-    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(-0.3, 4.0)))
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(-0.3, 60.0)))
     result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=120.0)
     assert result.error_code == ExecuteTrajectory.Result.INVALID_GOAL
     assert f"the clock jumped {where}" in result.error_string
@@ -168,8 +168,9 @@ def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(client, c
     wait_for(lambda: len(stamps) > 100)
     clock.run_at(100.0)
     wait_for(lambda: stamps[-1] > 40 * NS, timeout=60.0)
-    clock.run_at(1.0)
+    clock.run_at(0.0)  # a busy machine may not follow even at the speed of real time
     wait_for(lambda: clock.now - stamps[-1] < NS, timeout=60.0)
+    clock.run_at(1.0)
     assert min(gaps(stamps)) >= PERIOD
     assert all(stamp % PERIOD == 0 for stamp in stamps)
     assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=120.0).error_code == 0
@@ -183,7 +184,9 @@ def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, s
     def change(feedback):
         if not answers:
             answers.append(driver.set_parameters([Parameter("use_sim_time", value=False)])[0])
+            clock.run_at(1.0)
 
+    clock.run_at(0.2)  # a busy machine must not reach the end before the feedback comes
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.1, 1.0)))
     assert client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=120.0).error_code == 0
     assert not answers[0].successful

@@ -202,7 +202,7 @@ def test_a_trajectory_on_the_topic_runs_and_overrides_the_action(client, ros_nod
             publisher.publish(trajectory_to_msg(override))
 
     with pytest.raises(RequestRefusedError, match="preempted"):
-        client.execute(movement(0.2, 4.0), feedback=send_once, timeout=120.0)
+        client.execute(movement(0.2, 60.0), feedback=send_once, timeout=120.0)
     wait_for(lambda: np.allclose(states[-1].position, target, atol=1e-6))
 
 
@@ -214,7 +214,7 @@ def test_a_cancelled_goal_comes_back_canceled(client, ros_node, wait_for):
     run = client._executor.run
     wait_for(action.server_is_ready)
     handles, results = [], []
-    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.2, 4.0)))
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.2, 60.0)))
 
     def send():
         action.send_goal_async(goal).add_done_callback(lambda future: handles.append(future.result()))

@@ -54,7 +54,9 @@ def test_a_foreign_type_is_named_where_our_node_is_missing_and_ignored_where_it_
 ) -> None:
     name = f"/{names.QUERY_MODES}"
     with Client(context=ros_context) as client:
+        topic = f"/{names.POWER_STATE}"
         wait_for(lambda: name in client.graph.services(), what="the foreign service is seen")
+        wait_for(lambda: topic in client.graph.topics(), what="the foreign topic is seen")
         with pytest.raises(ServiceUnavailableError, match=r"has it as diagnostic_msgs/srv/SelfTest$"):
             client.call(names.QUERY_MODES, QueryModes.Request(), timeout=0.5)
         with pytest.raises(CallTimedOutError, match=r"has it as diagnostic_msgs/msg/DiagnosticArray$"):
@@ -66,4 +68,4 @@ def test_a_foreign_type_is_named_where_our_node_is_missing_and_ignored_where_it_
         assert answer.status.code == StatusCode.SUCCESS
         assert client.next_message(names.POWER_STATE, PowerState, timeout=60.0).energy > 0.0
         wait_for(lambda: client.graph.services()[name] == "ir_msgs/srv/QueryModes", what="its type counts")
-        assert client.graph.topics()[f"/{names.POWER_STATE}"] == "ir_msgs/msg/PowerState"
+        wait_for(lambda: client.graph.topics()[topic] == "ir_msgs/msg/PowerState", what="its type counts")

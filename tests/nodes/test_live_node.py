@@ -112,7 +112,7 @@ def test_a_driver_is_seen_obeys_the_buttons_and_may_go_and_come(
         wait_for(lambda: state.get("in", {}).get("move_enable") is True)
         assert browser.press("ab", True)["done"]
         wait_for(lambda: state["in"]["ab"], what="the bit in force")
-        wait_for(lambda: state["out"]["ab"], what="Bus Power Off")
+        wait_for(lambda: state.get("out", {}).get("ab"), what="Bus Power Off")
         wait_for(lambda: state["mode"] == "BUS_POWER_OFF")
         assert browser.press("ab", False)["done"]
         assert browser.press("move_enable", False)["done"]  # the button `hold`

@@ -44,6 +44,8 @@ def recording(
     ros_executor.run(lambda: recorder.start(str(tmp_path / "a.mcap")))
     states = ros_executor.run(lambda: ros_node.create_publisher(JointState, names.JOINT_STATES, 10))
     cell = planner_node.planner.cell
+    patient = [Parameter("state_max_age", Parameter.Type.DOUBLE, 600.0)]  # a busy machine
+    ros_executor.run(lambda: planner_node.set_parameters(patient))
     calls = f"/{names.PLANNER}/{names.CALLS}"
     wait_for(lambda: recorder.cell_attached, what="the cell is attached")
     wait_for(lambda: recorder.attached("ir_planner.parameters.yaml"), what="the parameters are attached")

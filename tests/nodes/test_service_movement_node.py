@@ -53,11 +53,12 @@ def test_markers_show_the_zone_the_candidates_and_their_closest_pairs(
     answer = call(PlanServiceMovement, SERVICE, station="lathe_work", max_candidates=2)
     wanted = {"service_zone", "service_candidates", "service_closest", "zones"}
 
-    def shown() -> bool:
-        return any(wanted <= {marker.ns for marker in message.markers} for message in seen)
+    def shown() -> MarkerArray | None:
+        complete = (each for each in list(seen) if wanted <= {marker.ns for marker in each.markers})
+        return next(complete, None)
 
-    wait_for(shown, what="the candidates are shown")
-    lines = [marker for marker in seen[-1].markers if marker.ns == "service_candidates"]
+    message = wait_for(shown, what="the candidates are shown")
+    lines = [marker for marker in message.markers if marker.ns == "service_candidates"]
     assert len(lines) == len(answer.candidates)
 
 

@@ -29,9 +29,20 @@ def command(tmp_path: Path) -> tuple[str, ...]:
 def fought(tmp_path: Path, command: tuple[str, ...]) -> Fought:
     """Runs an arena of these planners in a folder."""
 
-    def run(*planners: str, folder: str = "out", seeds: int = 2, progress: Progress = nobody) -> Finished:
+    def run(
+        *planners: str,
+        folder: str = "out",
+        seeds: int = 2,
+        progress: Progress = nobody,
+        hang_after: float = 60.0,
+    ) -> Finished:
         settings = ArenaSettings(
-            cells=("open",), planners=planners, tasks=("home->p1",), seeds=seeds, seconds=0.01, hang_after=2.0
+            cells=("open",),
+            planners=planners,
+            tasks=("home->p1",),
+            seeds=seeds,
+            seconds=0.01,
+            hang_after=hang_after,
         )
         return run_arena(settings, tmp_path / folder, Means(2, progress=progress, command=command))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
@@ -53,13 +54,6 @@ def test_addresses_of_schedulers_are_taken(address: str) -> None:
     assert Means(scheduler=address).scheduler == address
 
 
-def free_port() -> int:
-    """A port of the loopback that nobody uses now."""
-    with socket.socket() as tried:
-        tried.bind(("127.0.0.1", 0))
-        return int(tried.getsockname()[1])
-
-
 @pytest.fixture
 def processes() -> Iterator[list[subprocess.Popen[bytes]]]:
     """Processes of a test, which end with it."""
@@ -80,16 +74,18 @@ def dask(processes: list[subprocess.Popen[bytes]], folder: Path, *words: str) ->
 
 
 def scheduler(processes: list[subprocess.Popen[bytes]], folder: Path, wait_for: Any) -> str:
-    """Starts a scheduler; its address."""
-    port = free_port()
-    dask(processes, folder, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+    """Starts a scheduler on a free port; its address."""
+    said = folder / f"scheduler_{len(processes)}.json"
+    words = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(said))
+    dask(processes, folder, "scheduler", *words)
 
-    def answers() -> bool:
-        with socket.socket() as tried:
-            return tried.connect_ex(("127.0.0.1", port)) == 0
+    def address() -> str:
+        try:
+            return str(json.loads(said.read_text())["address"])
+        except (OSError, ValueError):  # not yet, or not whole
+            return ""
 
-    wait_for(answers, what="the scheduler listens")
-    return f"tcp://127.0.0.1:{port}"
+    return str(wait_for(address, what="the scheduler listens"))
 
 
 def worker(processes: list[subprocess.Popen[bytes]], folder: Path, address: str) -> subprocess.Popen[bytes]:
@@ -173,7 +169,7 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
 ) -> None:
     monkeypatch.setattr(cluster, "_CONNECT_S", 2.0)
     with pytest.raises(WorkerError, match="no Dask scheduler answers at"):
-        run_layout(SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{free_port()}"))
+        run_layout(SETTINGS, tmp_path / "a", Means(scheduler="tcp://127.0.0.1:1"))
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()
@@ -181,11 +177,11 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
             run_layout(
                 SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{silent.getsockname()[1]}")
             )
+    monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)
     address = scheduler(processes, tmp_path, wait_for)
     with pytest.raises(WorkerError, match="has no worker: start one, dask worker"):
         run_layout(SETTINGS, tmp_path / "b", Means(scheduler=address))
     worker(processes, tmp_path, address)
-    monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)
     monkeypatch.setattr(cluster, "computed_with", lambda: "an abacus")
     with pytest.raises(WorkerError, match="not with an abacus"):
         run_layout(replace(SETTINGS, placements=2), tmp_path / "c", Means(scheduler=address))

@@ -28,7 +28,6 @@ GRID = LayoutSettings(
     steps=11,
     keep=2,
     seeds=2,
-    hang_after=2.0,
 )
 SPREAD = replace(GRID, method="spread", placements=120, rounds=3)
 
@@ -85,7 +84,7 @@ def test_more_placements_are_added_to_a_folder_and_other_budgets_refused(laid: L
 
 
 def test_a_given_placement_that_hangs_is_cut_and_said(laid: Laid) -> None:
-    found = laid(replace(SPREAD, placements=40), "out", "hang")
+    found = laid(replace(SPREAD, placements=40, hang_after=2.0), "out", "hang")
     assert found.known[0].reason == ("cut", "no answer within 2 s")
     assert "The given placement is impossible itself: no answer within 2 s" in found.summary
 

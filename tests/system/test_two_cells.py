@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, ParameterEvent
 from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
 
 from ir_msgs.msg import Status
 from ir_msgs.srv import CheckState, StartRecording, StopRecording
@@ -25,7 +27,9 @@ from ir_recorder.read.raw import RawRecording, read_raw
 
 CELLS = ("left", "right")
 GOALS = {"left": "A1 20 A2 -90 A3 90 A4 0 A5 0 A6 0", "right": "A1 -20 A2 -90 A3 90 A4 0 A5 0 A6 0"}
-START_SECONDS = 60.0  # four processes on a busy machine
+TURNED = {"left": math.radians(20.0), "right": math.radians(-20.0)}
+REACHED = 1e-3  # rad
+START_SECONDS = 120.0  # four processes on a busy machine
 
 
 @pytest.fixture
@@ -89,6 +93,8 @@ def test_two_cells_in_one_domain_keep_to_themselves(
             plan = client.plan_to(GOALS[cell])
             ids[cell] = plan.trajectory_id
             client.execute(client.get_trajectory(plan.trajectory_id))
+        for cell in CELLS:
+            wait_for(lambda cell=cell: is_written(tmp_path / f"{cell}.mcap", cell), what="all is recorded")
         for client in clients.values():
             client.ask(names.STOP_RECORDING, StopRecording.Request())
     finally:
@@ -102,6 +108,15 @@ def test_two_cells_in_one_domain_keep_to_themselves(
     assert ids["left"] != ids["right"]
     for cell in CELLS:
         judge(tmp_path / f"{cell}.mcap", cell, ids[cell])
+
+
+def is_written(path: Path, cell: str) -> bool:
+    """Whether a running recording has the end of the movement, and a word of every node."""
+    raw = read_raw(path)
+    states = own(raw, f"/{cell}/{names.JOINT_STATES}", JointState)
+    heard = {status.name for msg in own(raw, names.DIAGNOSTICS, DiagnosticArray) for status in msg.status}
+    said = {f"{cell}/{node}" for node in NODES} <= {name.split(":")[0] for name in heard}
+    return said and bool(states) and abs(states[-1].position[0] - TURNED[cell]) < REACHED
 
 
 def judge(path: Path, cell: str, trajectory_id: str) -> None:
@@ -119,5 +134,4 @@ def judge(path: Path, cell: str, trajectory_id: str) -> None:
     assert recording.controller is not None
     assert set(recording.controller.trajectory_id) - {""} == {trajectory_id}
     assert recording.joints is not None
-    turned = 20.0 if cell == "left" else -20.0
-    assert recording.joints.position[-1, 0] == pytest.approx(turned * 3.141592653589793 / 180.0, abs=1e-3)
+    assert recording.joints.position[-1, 0] == pytest.approx(TURNED[cell], abs=REACHED)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # importing rclpy costs 0.2 s, and tests of a core don't need
 _DOMAINS = 101  # ids above need other ports than the system leaves free
 _RESERVED: list[socket.socket] = []
 _POLL = 0.005
-_PATIENCE = 60.0
+_PATIENCE = 120.0
 """Longest wait [s] where a test chooses none: a busy machine does within it what a free one does at once."""
 
 
