@@ -177,11 +177,12 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
             run_layout(
                 SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{silent.getsockname()[1]}")
             )
-    monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)
+    monkeypatch.setattr(cluster, "_CONNECT_S", 10.0)  # a busy machine's scheduler answers within it
     address = scheduler(processes, tmp_path, wait_for)
     with pytest.raises(WorkerError, match="has no worker: start one, dask worker"):
         run_layout(SETTINGS, tmp_path / "b", Means(scheduler=address))
     worker(processes, tmp_path, address)
+    monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)
     monkeypatch.setattr(cluster, "computed_with", lambda: "an abacus")
     with pytest.raises(WorkerError, match="not with an abacus"):
         run_layout(replace(SETTINGS, placements=2), tmp_path / "c", Means(scheduler=address))
