@@ -56,7 +56,10 @@ def read(path: Path, planner: Planner) -> tuple[Followed, tuple[DrivenStep, ...]
     """A program followed and driven with the inputs that its comments give. Raises KrlError."""
     text = path.read_text(encoding="utf-8")
     inputs = {int(n): value == "true" for n, value in re.findall(r";input (\d+) (\w+)", text)}
-    files = [path, *([data] if (data := path.with_suffix(".dat")).exists() else [])]
+    others = [
+        path.parent / "with" / name for line in re.findall(r";with (.+)", text) for name in line.split()
+    ]
+    files = [path, *([data] if (data := path.with_suffix(".dat")).exists() else []), *others]
     cell, sources = planner.cell, [parse(one.read_text(encoding="utf-8"), one.name) for one in files]
     program = follow(sources, cell.machine_home, tool_in_flange(cell.tcp), inputs=inputs)
     return program, drive(program, planner.scene("none"), cell.machine_home)[0]

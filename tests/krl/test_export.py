@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from dataclasses import replace
@@ -48,6 +49,25 @@ def test_an_exported_program_is_certified_and_near_the_plan(planned) -> None:
         for end in (0, -1):
             away = np.degrees(step.step.trajectory.positions[end] - movement.trajectory.positions[end])
             assert np.abs(away).max() < 1e-4
+
+
+def test_a_controller_would_take_the_files(planned) -> None:
+    """After the language's documentation: names of 24 characters, lines of 471, no values for other lists."""
+    planner, plan = planned
+    export = export_krl(planner, plan.movements, "visit")
+    declared = re.findall(r"DECL \w+ (\w+)=", export.data)
+    assert len(set(declared)) == len(declared) > 10
+    assert max(map(len, declared)) <= 24
+    assert max(map(len, (export.source + export.data).splitlines())) <= 471
+    assert export.data.isascii()
+    assert export.source.isascii()
+    for line in export.data.splitlines()[3:-1]:
+        assert line.startswith(("DECL ", "EXT ", "SIGNAL ")), line
+    for block in re.findall(r"PTP_SPLINE\n(.*?)ENDSPLINE", export.source, re.DOTALL):
+        shares = [float(share) for share in re.findall(r"PART=([\d.]+)", block)]
+        assert len(shares) == block.count("SPTP") - 1
+        assert 0.0 < min(shares)
+        assert sum(shares) < 100.0
 
 
 def test_points_are_passed_within_the_limits_and_hardly_later(planned) -> None:

@@ -126,7 +126,7 @@ SYNTAX = {
     "a character": ("X=§", 2, 3),
     "a loop that isn't closed": ("LOOP\nWAIT SEC 1", 4, 1),
     "an aggregate that isn't closed": ("PTP {A1 0", 2, 10),
-    "analog outputs": ("ANOUT ON X = 1", 2, 10),
+    "analog outputs": ("ANOUT ON X = 1", 2, 1),
 }
 
 

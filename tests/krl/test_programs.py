@@ -44,6 +44,9 @@ def test_a_program_does_what_its_comments_expect(path: Path, planner: Planner) -
         assert waits == pytest.approx(float(seconds))
     for seconds in expected(text, r";expects ([\d.]+) seconds of motion"):
         assert sum(one.duration for one in moves) == pytest.approx(float(seconds))
+    for count, axis, degrees in expected(text, r";reaches (\d+) A(\d) (-?[\d.]+)"):
+        end = np.degrees(moves[int(count) - 1].positions[-1])
+        assert end[int(axis) - 1] == pytest.approx(float(degrees), abs=0.1)
     for one in moves:  # a motion begins and ends at rest, within the axes' ranges
         assert np.abs(one.velocities[[0, -1]]).max() == 0.0
         assert (one.positions >= cell.robot.position_min - 1e-9).all()

@@ -85,13 +85,21 @@ def check_name(name: str) -> None:
 
 
 def written(
-    name: str, start: FloatArray, parts: Sequence[Part], attached: Attached, header: Sequence[str]
+    name: str,
+    start: FloatArray,
+    parts: Sequence[Part],
+    attached: Attached,
+    header: Sequence[str],
+    *,
+    from_home: bool = False,
 ) -> tuple[str, str]:  # long: the lines of two files
-    """Texts of NAME.src and NAME.dat: from `start` (6,) [rad] through the parts. Raises KrlError for a name
-    that the controller doesn't take.
+    """Texts of NAME.src and NAME.dat: from `start` (6,) [rad], from_home: which is XHOME, through the parts.
+
+    Tool and load are variables of the program: a data list may not give values to those of $CONFIG.DAT, and
+    the controller's own tools stay as they are. Raises KrlError for a name that the controller doesn't take.
     """
     check_name(name)
-    body = _Body()
+    body, first = _Body(), "XHOME" if from_home else "XSTART"
     for part in parts:
         body.add(part)
     src = [
@@ -103,10 +111,11 @@ def written(
         "GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM( )",
         "INTERRUPT ON 3",
         "BAS(#INITMOV,0)",
-        "BAS(#TOOL,1)",
-        "BAS(#BASE,0)",
+        "$BASE=$NULLFRAME",
+        "$TOOL=IR_TOOL",
+        "$LOAD=IR_LOAD",
         ";ENDFOLD (INI)",
-        "PTP XSTART",
+        f"PTP {first}",
         *body.lines,
         "END",
     ]
@@ -118,7 +127,7 @@ def written(
         _load(attached),
         _tool(attached),
         *body.signals(),
-        f"DECL E6AXIS XSTART={_axes(start)}",
+        f"DECL E6AXIS {first}={_axes(start)}",
         *body.points,
         "ENDDAT",
     ]
@@ -215,13 +224,13 @@ def _pose(pose: FloatArray) -> str:
 
 def _tool(attached: Attached) -> str:
     fields = frame(attached.tool).fields
-    return "TOOL_DATA[1]={" + ",".join(f"{name} {value:.4f}" for name, value in fields.items()) + "}"
+    return "DECL FRAME IR_TOOL={" + ",".join(f"{name} {value:.4f}" for name, value in fields.items()) + "}"
 
 
 def _load(attached: Attached) -> str:
     x, y, z = 1e3 * attached.centre
     jx, jy, jz = attached.inertia
     return (
-        f"LOAD_DATA[1]={{M {attached.mass:.3f},CM {{X {x:.2f},Y {y:.2f},Z {z:.2f},A 0,B 0,C 0}},"
+        f"DECL LOAD IR_LOAD={{M {attached.mass:.3f},CM {{X {x:.2f},Y {y:.2f},Z {z:.2f},A 0,B 0,C 0}},"
         f"J {{X {jx:.3f},Y {jy:.3f},Z {jz:.3f}}}}}"
     )

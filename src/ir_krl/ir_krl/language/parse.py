@@ -115,7 +115,8 @@ def parse(text: str, file: str) -> Source:
     except RecursionError:
         raise KrlSyntaxError("brackets, signs or blocks are nested too deeply", Place(file)) from None
     except UnexpectedInput as error:
-        raise KrlSyntaxError(_complaint(error, text), Place(file, error.line, error.column)) from None
+        sentence, column = _complaint(error, text)
+        raise KrlSyntaxError(sentence, Place(file, error.line, column)) from None
     routines = [_routine(unit, file) for unit in units if unit.data in ("routine", "function")]
     data = tuple(unit.children[-1] for unit in units if unit.data == "data_list")
     return Source(file, tuple(routines), data)
@@ -164,21 +165,21 @@ def _parameter(tree: Tree) -> Parameter:
     return Parameter(name, direction == ["OUT"])
 
 
-def _complaint(error: Any, text: str) -> str:
-    """What is wrong, of the parser's untyped exceptions."""
+def _complaint(error: Any, text: str) -> tuple[str, int]:
+    """What is wrong, and in which column, of the parser's untyped exceptions."""
     lines = text.splitlines()
     line = lines[error.line - 1] if 0 < error.line <= len(lines) else ""
     if isinstance(error, UnexpectedCharacters):
         character = line[error.column - 1 : error.column] or "?"
-        return f"{character!r} is no part of KRL here"
+        return f"{character!r} is no part of KRL here", error.column
     first = line.split()[0].upper() if line.split() else ""
     if first in _KNOWN_ELSEWHERE:
-        return f"{first} ({_KNOWN_ELSEWHERE[first]}) isn't read"
+        return f"{first} ({_KNOWN_ELSEWHERE[first]}) isn't read", line.upper().index(first) + 1
     word = str(error.token).strip()
     found = f"{word[:40]!r}" if word else "the line ends, or the file"
     expected = sorted(_spelled(name) for name in error.expected)
     wanted = " or ".join(expected) if len(expected) <= _EXPECTED_MAX else "something else"
-    return f"{found} where {wanted} is expected"
+    return f"{found} where {wanted} is expected", error.column
 
 
 def _spelled(terminal: str) -> str:

@@ -117,12 +117,15 @@ class WaitFor:
 
 @dataclass(frozen=True)
 class SetOutput:
-    """A digital output is set; `pulse` [s] later it goes back, 0 = it stays."""
+    """A digital output is set; `pulse` [s] later it goes back, 0 = it stays. on_path: while the robot moves
+    (by a TRIGGER, or after CONTINUE), so that it needn't stop.
+    """
 
     number: int
     value: bool
     place: Place
     pulse: float = 0.0
+    on_path: bool = False
 
 
 Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput

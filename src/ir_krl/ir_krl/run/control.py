@@ -48,6 +48,7 @@ class Control:
     commands: list[Command] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
     statements: int = 0
+    continuing: bool = False  # CONTINUE was the statement before
     expressions: Expressions = field(init=False)
 
     def body(self, body: Tree) -> None:
@@ -59,6 +60,7 @@ class Control:
                     f"more than {STATEMENTS_MAX} statements: does a loop never end?", self.place(statement)
                 )
             getattr(self, f"_{statement.data}")(statement)
+            self.continuing = statement.data == "continue_"
 
     def place(self, tree: Tree | Word) -> Place:
         """Where a piece of the program stands."""
@@ -156,7 +158,7 @@ class Control:
         self.note(tree, "HALT waits for the operator: taken as no pause")
 
     def _continue_(self, tree: Tree) -> None:
-        """Keeps the advance run going: nothing to do without one."""
+        """Keeps the advance run going: an output that follows is set without a stop."""
 
     def _goto(self, tree: Tree) -> None:
         raise KrlRunError(f"GOTO {tree.children[0]} isn't read", self.place(tree))

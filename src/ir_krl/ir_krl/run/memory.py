@@ -1,7 +1,12 @@
-"""Variables by name, as they stand while a program runs."""
+"""Variables by name, as they stand while a program runs: of the routine that runs, of its module, of all.
+
+A module is a .src with its .dat. A variable of a data list is known in its module, one that is GLOBAL or
+stands in $CONFIG everywhere; where two have the same name the nearest one counts.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from ir_krl.errors import KrlRunError, Place
@@ -13,15 +18,41 @@ Step = tuple[str, tuple[int, ...] | None]
 
 
 @dataclass
+class Scope:
+    """Variables of a call: those that have a value, and the names of all that are declared."""
+
+    values: dict[str, Value]
+    names: set[str]
+
+
+@dataclass
 class Memory:
-    """`shared` holds the data lists and system variables, `scopes` the variables of the routines that run."""
+    """`shared` holds what is known everywhere, `modules` the data lists by the names of their modules,
+    `scopes` the calls that run. module: whose statements run.
+    """
 
     shared: dict[str, Value]
-    scopes: list[dict[str, Value]] = field(default_factory=list)
+    scopes: list[Scope] = field(default_factory=list)
+    modules: dict[str, dict[str, Value]] = field(default_factory=dict)
+    module: str = ""
 
-    def declare(self, name: str, value: Value) -> None:
-        """A variable of the routine that runs; of the data lists, where none runs."""
-        (self.scopes[-1] if self.scopes else self.shared)[name] = value
+    def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
+        """A call begins, with these parameters and their values."""
+        self.scopes.append(Scope(values, {*names, *values}))
+
+    def leave(self) -> dict[str, Value]:
+        """The call ends; what its variables hold."""
+        return self.scopes.pop().values
+
+    def declare(self, name: str, value: Value | None, everywhere: bool = False) -> None:
+        """A variable of the routine that runs; of its module's data list, where none runs."""
+        if self.scopes:
+            self.scopes[-1].names.add(name)
+            home = self.scopes[-1].values
+        else:
+            home = self.shared if everywhere else self._own()
+        if value is not None:
+            home[name] = value
 
     def has(self, name: str) -> bool:
         """Whether a variable of this name has a value."""
@@ -76,9 +107,20 @@ class Memory:
             holder = inner.fields
 
     def _home(self, name: str) -> dict[str, Value]:
-        if self.scopes and name in self.scopes[-1]:
-            return self.scopes[-1]
-        return self.shared
+        """Where a variable is, or would be."""
+        if self.scopes and name in self.scopes[-1].names:
+            return self.scopes[-1].values
+        if name in self._own():
+            return self._own()
+        if name in self.shared or name.startswith("$"):
+            return self.shared
+        elsewhere = [one for one in self.modules.values() if name in one]  # a data list of another name
+        if elsewhere:
+            return elsewhere[0]
+        return self.shared if self.scopes else self._own()
+
+    def _own(self) -> dict[str, Value]:
+        return self.modules.setdefault(self.module, {})
 
 
 def _merged(before: Value | None, value: Value) -> Value:

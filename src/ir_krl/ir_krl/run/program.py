@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +14,12 @@ from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import Library
 from ir_krl.run.memory import Memory
 from ir_krl.run.motions import Motions
+from ir_krl.run.routines import Routines, module_of
 from ir_krl.run.system import HARMLESS, MODELLED, system_variables
 from ir_krl.run.values import Array, Symbol, Value, copied, kind_of, typed
 from ir_msgs_py.arrays import FloatArray
 
+GLOBAL, CONFIGURATION = "GLOBAL", "$CONFIG"
 NESTED = "brackets, signs or blocks are nested too deeply"
 DEPTH_MAX = 60
 """Calls within calls."""
@@ -49,22 +51,18 @@ def follow(
     what $IN[n] reads; one that isn't given and decides something is an error. A LOOP without EXIT is run
     `loop_passes` times. Raises KrlRunError with the place.
     """
-    routines: dict[str, Routine] = {}
-    for source in sources:
-        for one in source.routines:
-            if one.name in routines:
-                raise KrlRunError(f"{one.name} is defined twice", place_of(one.body, one.file))
-            routines[one.name] = one
-    name = routine.upper() or next(iter(routines), "")
-    if name not in routines:
-        there = ", ".join(list(routines)[:8]) or "none"
+    routines = Routines(sources)
+    name = routine.upper() or next(iter(routines.names), "")
+    first = routines.named(name)
+    if first is None:
+        there = ", ".join(routines.names[:8]) or "none"
         raise KrlRunError(f"there is no routine {name or 'at all'}; routines: {there}")
     run = _Run(routines, Memory(system_variables(home, tool)), dict(inputs or {}), loop_passes)
     try:
         for source in sources:
             for body in source.data:
                 run.data(body, source.file)
-        run.routine(routines[name], [], Place(routines[name].file))
+        run.routine(first, [], Place(first.file))
     except RecursionError:
         raise KrlRunError(NESTED, Place(run.expressions.file)) from None
     return Followed(name, tuple(run.commands), tuple(run.notes))
@@ -73,9 +71,7 @@ def follow(
 class _Run(Control):
     """Calls, declarations and motions, beside the control structures."""
 
-    def __init__(
-        self, routines: dict[str, Routine], memory: Memory, inputs: dict[int, bool], loop_passes: int
-    ) -> None:
+    def __init__(self, routines: Routines, memory: Memory, inputs: dict[int, bool], loop_passes: int) -> None:
         super().__init__(memory, loop_passes)
         self._routines, self._inputs = routines, inputs
         self._library = Library(memory)
@@ -85,8 +81,12 @@ class _Run(Control):
 
     def data(self, body: Tree, file: str) -> None:
         """Declarations and values of a data list."""
-        self.expressions.file = file
+        self._at(file)
         self.body(body)
+
+    def _at(self, file: str) -> None:
+        """Statements of this file run from here on."""
+        self.expressions.file, self.memory.module = file, module_of(file)
 
     def routine(self, routine: Routine, arguments: list[Value | None], place: Place) -> Value:
         """Run a routine; the value of its RETURN, 0 without one. OUT parameters are read by the caller."""
@@ -98,8 +98,9 @@ class _Run(Control):
             )
         before = self.expressions.file
         named = zip(routine.parameters, arguments, strict=False)
-        self.memory.scopes.append({one.name: copied(value) for one, value in named if value is not None})
-        self.expressions.file = routine.file
+        given = {one.name: copied(value) for one, value in named if value is not None}
+        self.memory.enter(given, (one.name for one in routine.parameters))
+        self._at(routine.file)
         try:
             self.body(routine.body)
         except Returned as returned:
@@ -107,20 +108,20 @@ class _Run(Control):
         except LoopExit:
             raise KrlRunError("EXIT stands outside of a loop", place_of(routine.body, routine.file)) from None
         finally:
-            self.expressions.file = before
+            self._at(before)
         return 0
 
     # names and values
 
     def _declare(self, tree: Tree) -> None:
-        kind, *declarators = tree.children
+        everywhere = GLOBAL in tree.children or self.memory.module == CONFIGURATION
+        kind, *declarators = (one for one in tree.children if one != GLOBAL)
         for declarator in declarators:
             name, index, expression = declarator.children
+            value: Value | None = None if index is None else Array(kind=str(kind))
             if expression is not None:
                 value = typed(str(kind), copied(self.expressions.value(expression)))
-                self.memory.declare(str(name), value)
-            elif index is not None:
-                self.memory.declare(str(name), Array(kind=str(kind)))
+            self.memory.declare(str(name), value, everywhere)
 
     def _structure(self, tree: Tree) -> None:
         """A type of structures needs no entry: components are made where they are set."""
@@ -140,7 +141,8 @@ class _Run(Control):
         if name == "$OUT" and index is not None:
             if not isinstance(value, bool):
                 raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", self.place(tree))
-            self.commands.append(SetOutput(_output(index[0], self.place(tree)), value, self.place(tree)))
+            where = self.place(tree)
+            self.commands.append(SetOutput(_output(index[0], where), value, where, on_path=self.continuing))
         elif name == "$IPO_MODE" and value != Symbol("BASE"):
             raise KrlRunError(
                 f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", self.place(tree)
@@ -166,15 +168,15 @@ class _Run(Control):
             trees = []
         if name == "PULSE":
             return self._pulse(trees, place)
-        if name not in self._routines and self._library.has(name):
+        routine = self._routines.named(name, self.expressions.file)
+        if routine is None and self._library.has(name):
             values = [None if one is None else self.expressions.value(one) for one in trees]
             return self._library.call(name, values, place)
-        if name not in self._routines:
+        if routine is None:
             raise KrlRunError(f"there is no routine {name}", place)
-        routine = self._routines[name]
         values = [None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)]
         result = self.routine(routine, values, place)
-        left = self.memory.scopes.pop()
+        left = self.memory.leave()
         for parameter, tree in zip(routine.parameters, trees, strict=False):
             if parameter.out and parameter.name in left and tree is not None and tree.data == "access":
                 self.memory.set(self.expressions.path(tree), left[parameter.name], place)
@@ -195,7 +197,7 @@ class _Run(Control):
             raise KrlRunError(f"PULSE sets outputs, not {name}", place)
         seconds = self.expressions.number(trees[2], "the time of PULSE")
         level = self.expressions.truth(trees[1], "the value of PULSE")
-        self.commands.append(SetOutput(_output(index[0], place), level, place, seconds))
+        self.commands.append(SetOutput(_output(index[0], place), level, place, seconds, self.continuing))
         return 0
 
     # interrupts
@@ -221,13 +223,16 @@ class _Run(Control):
 
     def _ptp(self, tree: Tree) -> None:
         due, self._triggers = self._triggers, []
-        for at, action in due:
-            if at == 0.0:
-                getattr(self, f"_{action.data}")(action)
+        self._act(action for at, action in due if at == 0.0)
         self.commands.append(self._with_settings(tree, lambda: self._motions.motion(tree)))
-        for at, action in due:
-            if at != 0.0:
-                getattr(self, f"_{action.data}")(action)
+        self._act(action for at, action in due if at != 0.0)
+
+    def _act(self, actions: Iterable[Tree]) -> None:
+        """What triggers do while the robot moves."""
+        for action in actions:
+            self.continuing = True
+            getattr(self, f"_{action.data}")(action)
+        self.continuing = False
 
     _lin = _circ = _ptp
 

@@ -21,7 +21,17 @@ MODELLED = frozenset(
 )
 """System variables that motions follow from."""
 HARMLESS = frozenset(
-    ("$ADVANCE", "$BWDSTART", "$H_POS", "$GEAR_JERK", "$COLLMON_TOL_PRO", "$CIRC_TYPE", "$JERK", "$IPO_MODE")
+    (
+        "$ADVANCE",
+        "$BWDSTART",
+        "$H_POS",
+        "$GEAR_JERK",
+        "$COLLMON_TOL_PRO",
+        "$CIRC_TYPE",
+        "$JERK",
+        "$IPO_MODE",
+        "$LOAD",
+    )
 )
 """Set by nearly every program; nothing here follows from them."""
 STANDING = frozenset(("$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MEAS"))

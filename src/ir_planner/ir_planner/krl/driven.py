@@ -72,6 +72,7 @@ class _Drive:
     _moves: list[Move] = field(default_factory=list)
     _overlaps: list[int] = field(default_factory=list)
     _places: list[Place] = field(default_factory=list)
+    _outputs: list[tuple[int, bool]] = field(default_factory=list)  # set while the robot moves
     _on_path: bool = False  # the first motion has led to the programmed path
     _blend: Blend | None = None  # of the last motion; None: it ends at rest
 
@@ -85,6 +86,8 @@ class _Drive:
                 self._motion(command)
             case SplineBlock():
                 self._block(command)
+            case SetOutput() if command.on_path and self._moves:
+                self._outputs.append((command.number, command.value))
             case SetOutput():
                 self.finish()
                 if self.steps:
@@ -103,7 +106,8 @@ class _Drive:
             return
         names = self.scene.cell.robot.joint_names
         self._step(trajectory(self._moves, self._overlaps, names), tuple(self._places), moves=True)
-        self._moves, self._overlaps, self._places, self._blend = [], [], [], None
+        self.steps[-1] = replace(self.steps[-1], outputs=tuple(self._outputs))
+        self._moves, self._overlaps, self._places, self._blend, self._outputs = [], [], [], None, []
 
     def _motion(self, motion: Motion) -> None:
         if not self._on_path:

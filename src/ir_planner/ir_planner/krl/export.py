@@ -36,7 +36,7 @@ from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.krl.judged import Judge
 from ir_planner.krl.passing import passing_times
 from ir_planner.program import Charge, Pause
-from ir_planner.scene import PlanningScene
+from ir_planner.scene import STILL, PlanningScene
 from ir_planner.timing import GRID_S
 
 DEVIATION_MAX = 2e-3  # rad, of a joint from the planned movement
@@ -80,7 +80,8 @@ def export(
     parts = [part for step in steps for part in _parts(step, fitted)]
     start = _points_of(moving[0]).positions[0]
     header = [f"{scene.cell.name}: {len(moving)} movements, points and times as planned"]
-    source, data = written(name, start, parts, attached(scene), header)
+    from_home = bool(np.abs(start - scene.cell.machine_home).max() < STILL)
+    source, data = written(name, start, parts, attached(scene), header, from_home=from_home)
     driven = (step.trajectory for step in _driven(source, data, scene) if step.moves)
     after, deviation = [], 0.0
     here = start
