@@ -66,7 +66,7 @@ def test_a_controller_would_take_the_files(planned) -> None:
     for block in re.findall(r"PTP_SPLINE\n(.*?)ENDSPLINE", export.source, re.DOTALL):
         shares = [float(share) for share in re.findall(r"PART=([\d.]+)", block)]
         assert len(shares) == block.count("SPTP") - 1
-        assert 0.0 < min(shares)
+        assert min(shares) > 0.0
         assert sum(shares) < 100.0
 
 

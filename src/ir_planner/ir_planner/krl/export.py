@@ -83,8 +83,7 @@ def export(
     from_home = bool(np.abs(start - scene.cell.machine_home).max() < STILL)
     source, data = written(name, start, parts, attached(scene), header, from_home=from_home)
     driven = (step.trajectory for step in _driven(source, data, scene) if step.moves)
-    after, deviation = [], 0.0
-    here = start
+    after, deviation, here = [], 0.0, start
     for step in steps:
         if step.is_pause:
             charge.stood(step, Pause(step.to_station, step.duration, "", here, judge.scene(step)))
@@ -103,8 +102,7 @@ def export(
         )
         after.append(moved.report)
         here = again.positions[-1]
-    before = [step.report for step in moving]
-    return KrlExport(source, data, deviation, _together(before), _together(after))
+    return KrlExport(source, data, deviation, _together([one.report for one in moving]), _together(after))
 
 
 def attached(scene: PlanningScene) -> Attached:
