@@ -17,9 +17,10 @@ from websockets.typing import Origin, Subprotocol
 class FakeBrowser:
     """Connected until it is closed; `controls` are the panel's by uuid, `nodes` the scene's by name."""
 
-    def __init__(self, port: int, origin: str | None = None) -> None:
+    def __init__(self, port: int, token: str, origin: str | None = None) -> None:
         self._socket = connect(
             f"ws://127.0.0.1:{port}/",
+            additional_headers={"Cookie": f"ir_view_{port}={token}"},
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
             origin=None if origin is None else Origin(origin),
             max_size=None,

@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.error
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -54,6 +56,7 @@ def _module(name: str) -> Any:
 
 
 FakeBrowser = _module("fake_browser").FakeBrowser
+TOKEN = "a-token_of-the-test"
 
 
 class View:
@@ -61,10 +64,10 @@ class View:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.server = opened(0)
+        self.server = opened(0, TOKEN)
         self.session = Session(self.server, Watched(str(path)))
         self.port = self.server.get_port()
-        self.browser = FakeBrowser(self.port)
+        self.browser = FakeBrowser(self.port, TOKEN)
 
     def until(self, condition: Callable[[], bool]) -> None:
         deadline = time.monotonic() + PATIENCE
@@ -222,7 +225,7 @@ def test_the_motion_is_played_with_power_and_nearest_pair(view: View) -> None:
 @pytest.mark.long
 def test_viewers_come_and_go(view: View) -> None:
     view.shows("at the mains")
-    others = [FakeBrowser(view.port) for _ in range(5)]
+    others = [FakeBrowser(view.port, TOKEN) for _ in range(5)]
     view.until(lambda: all("at the mains" in each.text for each in others))
     for each in others:
         each._socket.socket.close()  # without a word
@@ -232,12 +235,43 @@ def test_viewers_come_and_go(view: View) -> None:
 
 def test_pages_from_elsewhere_are_refused_and_nothing_is_published(view: View) -> None:
     with pytest.raises(InvalidStatus):
-        FakeBrowser(view.port, "http://evil.example")
-    FakeBrowser(view.port, f"http://localhost:{view.port}").close()
+        FakeBrowser(view.port, TOKEN, "http://evil.example")
+    FakeBrowser(view.port, TOKEN, f"http://localhost:{view.port}").close()
     handled = view.server._websock_server._incoming_handlers
     shared = [handlers for message, handlers in handled.items() if message.__name__.startswith("ShareUrl")]
     assert [handlers for handlers in shared if handlers] == []
     assert view.server.get_host() == "127.0.0.1"
+
+
+def _asked(url: str, cookie: str = "") -> tuple[int, str]:
+    """Status of a page and the cookie that it sets."""
+    request = urllib.request.Request(url, headers={"Cookie": cookie} if cookie else {})
+    try:
+        with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+            return answer.status, answer.headers.get("Set-Cookie", "")
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, error.headers.get("Set-Cookie", "")
+
+
+def test_only_who_has_the_address_with_its_token_gets_an_answer(view: View) -> None:
+    page = f"http://127.0.0.1:{view.port}/"
+    name = f"ir_view_{view.port}"
+    for url, cookie in (
+        (page, ""),
+        (page + "?token=", ""),
+        (page + "?token=guessed", ""),
+        (page + "?token=" + TOKEN[:-1], f"{name}="),
+        (page + "assets/any.js", f"{name}=guessed"),
+        (page, f"{name}_=" + TOKEN),
+        (page, "\xff; ;=" + TOKEN),
+    ):
+        assert _asked(url, cookie) == (403, ""), (url, cookie)
+    status, cookie = _asked(page + "?token=" + TOKEN)
+    assert (status, cookie) == (200, f"{name}={TOKEN}; Path=/; HttpOnly; SameSite=Strict")
+    assert _asked(page, cookie.split(";")[0]) == (200, "")
+    with pytest.raises(InvalidStatus):
+        FakeBrowser(view.port, "guessed")
 
 
 def test_the_latest_of_each_kind_waits_in_the_order_in_which_it_came() -> None:

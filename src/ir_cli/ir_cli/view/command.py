@@ -8,6 +8,7 @@ import sys
 import time
 
 from ..offline.asking import add_cell
+from .key import address, new_token
 from .loopback import HOST, PORT, check_installed, closed, opened
 
 HELP = "look at a cell in a browser, move it about, plan it; needs no ROS"
@@ -31,11 +32,12 @@ def run(arguments: argparse.Namespace) -> int:
     from .watched import Watched
 
     watched = Watched(arguments.cell)
-    server = opened(arguments.port)
+    token = new_token()
+    server = opened(arguments.port, token)
     session = None
     try:
         session = Session(server, watched, tuple(arguments.stations))
-        sys.stdout.write(f"http://{HOST}:{server.get_port()}/\n")
+        sys.stdout.write(f"{address(HOST, server.get_port(), token)}\n")
         sys.stdout.write("open it in a browser of this machine; Ctrl-C ends it\n")
         sys.stdout.flush()
         session.run(time.monotonic() + arguments.seconds)

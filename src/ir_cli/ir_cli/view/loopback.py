@@ -1,21 +1,21 @@
 """viser's server, for browsers on this machine alone.
 
-It listens on 127.0.0.1 and answers to a page that it served itself: a page from elsewhere in the same browser
-is refused by its Origin. viser can publish a server through a tunnel when a client asks for it; not this one.
+It listens on 127.0.0.1 and answers to who has its token, and to a page that it served itself: a page from
+elsewhere in the same browser is refused by its Origin. viser can publish a server through a tunnel when a
+client asks for it; not this one.
 """
 
 from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Callable
 from contextlib import redirect_stdout
-from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
 from ..errors import CommandError, InputError
 from ..ports import TCP, free_port, is_free
+from .key import Answer, guarded
 
 HOST = "127.0.0.1"
 PORT = 8880
@@ -31,20 +31,21 @@ def check_installed() -> None:
         raise InputError(MISSING)
 
 
-def opened(port: int | None) -> Any:
-    """A running viser.ViserServer on a port, 0: a free one, None: the usual one or a free one.
+def opened(port: int | None, token: str) -> Any:
+    """A running viser.ViserServer on a port, 0: a free one, None: the usual one or a free one; for who has
+    the token.
 
     Raises CommandError where the port is taken.
     """
     if port is None:
         port = PORT if is_free(PORT, TCP, HOST) else 0
     if port:
-        server = _on(port)
+        server = _on(port, token)
         if server is None:
             raise CommandError(f"port {port} of {HOST} is taken: give another, or 0 for a free one")
         return server
     for _ in range(ATTEMPTS):
-        server = _on(free_port(TCP))
+        server = _on(free_port(TCP), token)
         if server is not None:
             return server
     raise CommandError(f"no port of {HOST} is free")
@@ -56,7 +57,7 @@ def closed(server: Any) -> None:
         server.stop()
 
 
-def _on(port: int) -> Any:
+def _on(port: int, token: str) -> Any:
     """A server on exactly this port, None where that is taken."""
     if not is_free(port, TCP, HOST):
         return None
@@ -64,7 +65,7 @@ def _on(port: int) -> Any:
     from viser import _messages
 
     origins = [f"http://{name}:{port}" for name in (HOST, "localhost")]
-    with _STARTING, _asked_by(origins), redirect_stdout(io.StringIO()):
+    with _STARTING, _asked_by(origins, token, port), redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=HOST, port=port, verbose=False)
     if server.get_port() != port:  # viser goes on to the next port, where the origins would not fit
         closed(server)
@@ -75,17 +76,23 @@ def _on(port: int) -> Any:
 
 
 class _asked_by:  # noqa: N801 - used as a function
-    """While it lasts, servers of websockets start that answer to these origins only (None: to programs)."""
+    """While it lasts, servers of websockets start that answer to these origins only (None: to programs), and
+    to who has the token.
+    """
 
-    def __init__(self, origins: list[str]) -> None:
+    def __init__(self, origins: list[str], token: str, port: int) -> None:
         self._origins: list[Any] = [*origins, None]
+        self._token, self._port = token, port
 
     def __enter__(self) -> None:
         import websockets.asyncio.server as module
 
         self._module, self._serve = module, module.serve
-        guarded: Callable[..., Any] = partial(self._serve, origins=self._origins)
-        module.serve = guarded  # type: ignore[assignment, misc]  # viser has no argument for it
+        module.serve = self._started  # type: ignore[assignment, misc]  # viser has no argument for it
+
+    def _started(self, *arguments: Any, process_request: Answer, **settings: Any) -> Any:
+        answer = guarded(process_request, self._token, self._port)
+        return self._serve(*arguments, process_request=answer, origins=self._origins, **settings)
 
     def __exit__(self, *_: object) -> None:
         self._module.serve = self._serve  # type: ignore[misc]
