@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import coal
 import numpy as np
 import pytest
+import trimesh
 
 from ir_cli.main import main
 from ir_description import Body, CellFileError, cell_from_yaml, cell_to_yaml, load_cell
 from ir_description.files import coacd_process, piece_cache, solid_mesh
 from ir_description.files import convex_pieces as convex
 from ir_description.files.convex_pieces import ConvexPieces, contains
+from ir_description.files.mesh import is_closed
 from ir_description.files.piece_cache import pieces_of
 from ir_description.files.protrusion import protrusion, winding
 from ir_description.files.solid_mesh import triangles_from_obj
@@ -222,6 +225,29 @@ def test_a_machine_is_one_line_of_a_cell(folder: Path, divided: ConvexPieces) ->
     assert list(cell.machine("press").states[0].bodies) == names
     written = cell_to_yaml(cell)
     assert cell_to_yaml(cell_from_yaml(written)) == written
+    path.write_text(path.read_text() + PATHS)
+    (bead,) = load_cell(path).paths
+    assert [contact.body_b for contact in bead.allowed_contacts] == names
+
+
+def test_the_guide_repairs_what_is_refused_with_the_place_of_its_hole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, divided: ConvexPieces
+) -> None:
+    corners = np.arange(3 * len(OPEN)).reshape(-1, 3)
+    trimesh.Trimesh(OPEN.reshape(-1, 3), corners, process=False).export(tmp_path / "press.stl")
+    path = tmp_path / "press.yaml"
+    path.write_text(cell_text("{name: frame, mesh: press.stl, unit: m}"))
+    with pytest.raises(CellFileError, match=r"3 edges, one at \(.*\) m") as refused:
+        load_cell(path)
+    assert "docs/cad.md, Repair" in str(refused.value)
+    page = (Path(__file__).resolve().parents[2] / "docs" / "cad.md").read_text()
+    (code,) = re.findall(r"```python\n(import trimesh.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    mended = solid_mesh.read_solid(tmp_path, "press_closed.stl").triangles
+    assert len(mended) == len(CUBE)
+    assert is_closed(mended)
+    assert np.linalg.det(mended).sum() / 6.0 == pytest.approx(divided.volume, rel=1e-6)
 
 
 def test_gltf_stands_upright_and_takes_buffers_of_its_folder_only(
@@ -259,6 +285,14 @@ def test_gltf_stands_upright_and_takes_buffers_of_its_folder_only(
             solid_mesh.read_solid(folder, "frame.gltf")
 
 
+PATHS = """\
+paths:
+  - name: bead
+    equipment: press
+    allowed_contacts: [{between: [l6, frame], safety_distance: 0.001}]
+    start: {xyz: [1.0, 0, 1.0]}
+    segments: [{line: {xyz: [1.1, 0, 1.0]}}]
+"""
 CUBE = c_frame()
 OPEN, NAN = CUBE[:-1], np.where(np.arange(3) == 0, np.nan, CUBE)
 

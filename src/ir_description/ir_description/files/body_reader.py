@@ -6,10 +6,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
-from ir_description.cell import BODIES_MAX, AllowedContact, NameRegister, Station
+from ir_description.cell import BODIES_MAX, AllowedContact, CellPath, NameRegister, Station
 from ir_description.files.items import Item, Table
 from ir_description.files.mesh import (
     CELL_TRIANGLES_MAX,
@@ -26,6 +27,7 @@ from ir_description.shapes import KINDS, SIZE_MAX, Body
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 
+_Stop = TypeVar("_Stop", Station, CellPath)
 POSE_KEYS = ("xyz", "abc_deg", "quaternion", "rotation")
 FAR = 1000.0
 """Farthest place [m] of anything in a cell."""
@@ -78,14 +80,14 @@ class BodyReader:
         """Return names of bodies, with the pieces of a mesh instead of its name."""
         return tuple(piece for name in names for piece in self.pieces.get(name, (name,)))
 
-    def at_pieces(self, station: Station) -> Station:
-        """Return a station whose contacts name the pieces of meshes."""
+    def at_pieces(self, stop: _Stop) -> _Stop:
+        """Return a station or a path whose contacts name the pieces of meshes."""
         contacts = (
             AllowedContact(*pair, contact.safety_distance)
-            for contact in station.allowed_contacts
+            for contact in stop.allowed_contacts
             for pair in product(self.named((contact.body_a,)), self.named((contact.body_b,)))
         )
-        return replace(station, allowed_contacts=tuple(contacts))
+        return replace(stop, allowed_contacts=tuple(contacts))
 
     def _divided(self, item: Item) -> list[Body]:
         table = item.table(("name", "mesh", "unit"), (*POSE_KEYS, "pieces"))

@@ -134,7 +134,7 @@ class _CellReader:
         equipment, placed = self._equipment()
         stations = tuple(entry.station for entry in placed)
         self._check_part_stations(parts, stations)
-        paths = read_paths(self._list("paths", PATHS_MAX))
+        paths = tuple(map(self._bodies.at_pieces, read_paths(self._list("paths", PATHS_MAX))))
         self._check_contacts(placed, paths, equipment, parts)
         signals = self._signals()
         self._check_switches(equipment, signals)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.files.coacd_process import decomposed
-from ir_description.files.mesh import HULL_VERTICES_MAX, is_closed
+from ir_description.files.mesh import HULL_VERTICES_MAX, open_edges
 from ir_description.files.protrusion import protrusion
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -55,10 +55,13 @@ def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
     """At most `most` pieces that contain a mesh (T, 3, 3) [m]. Raises InvalidValueError with the reason."""
     triangles = triangles[np.linalg.norm(_normals(triangles), axis=1) > 0.0]
     volume = float(np.linalg.det(triangles).sum()) / 6.0
-    if not len(triangles) or not is_closed(triangles):
+    wrong = open_edges(triangles)
+    if not len(triangles) or len(wrong):
+        where = f"{len(wrong)} edges, one at {_place(wrong[0])} m" if len(wrong) else "no triangles"
         raise InvalidValueError(
-            "the mesh is not closed (an edge does not belong to exactly two triangles that agree which side "
-            "is outside): close it in CAD, or take kind: mesh with convex_hull: true"
+            f"the mesh is not closed ({where}; each must belong to exactly two triangles that agree which "
+            "side is outside): close it in CAD or with trimesh.repair (docs/cad.md, Repair), or take kind: "
+            "mesh with convex_hull: true"
         )
     if volume <= 0.0:
         raise InvalidValueError(f"the mesh has {volume:.3g} m^3: its triangles must be seen from outside")
@@ -73,6 +76,10 @@ def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
         f"its convex pieces leave out more than {1e3 * MARGINS[-1]:g} mm of it: "
         "give more pieces, or a simpler mesh"
     )
+
+
+def _place(point: FloatArray) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in point + 0.0) + ")"
 
 
 def contains(pieces: Sequence[FloatArray], triangles: FloatArray) -> bool:

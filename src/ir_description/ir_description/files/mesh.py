@@ -140,9 +140,16 @@ def _points_of(hull: ConvexHull, points: FloatArray) -> FloatArray:
 
 def is_closed(triangles: FloatArray) -> bool:
     """Whether every edge of a mesh (T, 3, 3) is walked once in each direction."""
-    _, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return not len(open_edges(triangles))
+
+
+def open_edges(triangles: FloatArray) -> FloatArray:
+    """The middles (E, 3) of the edges that are not walked once in each direction."""
+    points, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     corners = index.reshape(-1, 3)
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    forward, count = np.unique(edges, axis=0, return_counts=True)
-    backward = np.unique(edges[:, ::-1], axis=0)
-    return bool((count == 1).all() and np.array_equal(forward, backward))
+    ends, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    upwards = edges[:, 0] < edges[:, 1]
+    there, back = (np.bincount(which.ravel(), walked, len(ends)) for walked in (upwards, ~upwards))
+    wrong = (there != 1) | (back != 1)
+    return np.asarray(points[ends[wrong]].mean(axis=1))
