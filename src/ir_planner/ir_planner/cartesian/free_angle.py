@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.cartesian.joint_curve import Angle, followed, tool_poses
@@ -45,8 +45,7 @@ class _Problem:
     fixed: bool
 
     def angle(self, control: FloatArray) -> Angle:
-        spline = BSpline(self.knots, control, 3)
-        return lambda s: np.asarray(spline(np.clip(s, self.chain.s[0], self.chain.s[-1])))
+        return Angle(BSpline(self.knots, control, 3))
 
     def reached(self, control: FloatArray, near: Chain) -> Chain | None:
         """The chain with other angles; None where it isn't free or jumps."""
@@ -70,7 +69,7 @@ def angle_along(
     problem = _problem(path, chain, free_angle, space, fixed)
     begun = _fitted(problem)
     if begun is None:
-        return (lambda s: np.interp(s, chain.s, chain.angles)), chain
+        return Angle(make_interp_spline(chain.s, chain.angles, k=1)), chain
     control, smooth = begun
     cost = _cost(smooth, space.scene)
     for _ in range(_STEPS):

@@ -1,7 +1,6 @@
 """The axes along a path: configurations of one chain at dense samples, joined by a spline of degree five."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +10,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.layers import JUMP, Chain
-from ir_planner.cartesian.orientations import about_tool
+from ir_planner.cartesian.orientations import Rates, about_tool, rates_of
 from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.scene import PlanningScene
@@ -25,8 +24,28 @@ _LAST = 4.0  # times as much at the finest: near a singularity the axes bend wit
 _SHARP = ", where it bends too sharply"
 _WRIST = np.radians(5.0)  # an axis 5 nearer to 0 than this is near the singularity of the wrist
 
-Angle = Callable[[FloatArray], FloatArray]
-"""The angle (M,) rad about the tool's axis at s (M,) m."""
+
+@dataclass(frozen=True, eq=False)
+class Angle:
+    """The angle about the tool's axis over the arc length, a spline of degree one or three."""
+
+    spline: BSpline
+
+    def __call__(self, s: FloatArray) -> FloatArray:
+        """Radians (M,) at s (M,) m."""
+        return np.asarray(self.spline(np.clip(s, self.spline.t[0], self.spline.t[-1])))
+
+    @property
+    def smooth(self) -> bool:
+        """Whether its rate is continuous."""
+        return self.spline.k > 1
+
+    @cached_property
+    def rates(self) -> Rates:
+        """How fast it turns the tool."""
+        if self.smooth:
+            return rates_of(self.spline)
+        return Rates(float(np.abs(self.spline.derivative(1).c).max()))
 
 
 @dataclass(frozen=True, eq=False)

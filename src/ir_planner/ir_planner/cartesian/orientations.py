@@ -1,11 +1,27 @@
 """Orientations along one part of a tool's path: turning evenly, through poses, or with the path."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from ir_msgs_py.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Bounds of a rotation's derivatives along a path, |R'| [rad/m] and |R''| [rad/m^2], as 1 / sqrt(2) of
+    their Frobenius norms: of turning about one axis that is the angle's rate.
+    """
+
+    first: float = 0.0
+    second: float = 0.0
+
+    def then(self, other: "Rates") -> "Rates":
+        """Of the product of two rotations."""
+        return Rates(self.first + other.first, self.second + other.second + 2.0 * self.first * other.first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +44,12 @@ class Evenly:
         share = np.asarray(s)[:, None] / self.length
         return np.asarray(self.start @ Rotation.from_rotvec(share * self.turn).as_matrix())
 
+    @property
+    def rates(self) -> "Rates":
+        """How fast it turns."""
+        rate = float(np.linalg.norm(self.turn)) / self.length
+        return Rates(rate, rate**2)
+
 
 class ThroughPoses:
     """The rotation spline through rotations (N, 3, 3) at s (N,) m: its acceleration is continuous."""
@@ -39,6 +61,26 @@ class ThroughPoses:
     def at(self, s: FloatArray) -> FloatArray:
         """Rotations (M, 3, 3) at s (M,) m."""
         return np.asarray(self._spline(np.clip(s, 0.0, self._end)).as_matrix())
+
+    @cached_property
+    def rates(self) -> "Rates":
+        """How fast it turns: in each piece R = R_k exp(v) with a cubic v, so that |R'| <= |v'| and
+        |R''| <= |v''| + 3/2 |v'|^2.
+        """
+        cubic, square, line = (self._spline.interpolator.c[k] for k in range(3))
+        h = np.diff(self._spline.interpolator.x)[:, None]
+        second = [2.0 * square, 2.0 * square + 6.0 * cubic * h]
+        first = [line, line + 2.0 * square * h + 3.0 * cubic * h**2]
+        bulge = h[:, 0] ** 2 / 8.0 * np.linalg.norm(6.0 * cubic, axis=1)
+        rate = np.max([np.linalg.norm(one, axis=1) for one in first], axis=0) + bulge
+        bend = np.max([np.linalg.norm(one, axis=1) for one in second], axis=0)
+        return Rates(float(rate.max()), float((bend + 1.5 * rate**2).max()))
+
+
+def rates_of(angle: BSpline) -> Rates:
+    """Of turning about one axis by a spline, by the hulls of its derivatives' control points."""
+    first, second = (float(np.abs(angle.derivative(nu).c).max()) for nu in (1, 2))
+    return Rates(first, second + first**2)
 
 
 def turn_between(first: FloatArray, second: FloatArray) -> float:

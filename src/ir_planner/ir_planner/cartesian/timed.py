@@ -25,6 +25,7 @@ _WARP_S, _WARP_MIN, _WARP_MAX = 0.02, 60, 1500  # of the slowness' knots
 _ROUNDS, _AROUND = 25, 4
 _ENOUGH = 1.0 + 1e-4
 _SLOWER = 0.85
+_SHOWN = 0.95  # of the tolerance: what is shown of the speed is a bound, a little above what it is at samples
 _SLOWEST = 1e-4  # m/s
 
 
@@ -191,7 +192,7 @@ def _ramps_fit(
 def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene) -> TimedStroke:
     """The stroke with more time where a limit is exceeded, as far as the tolerance allows."""
     law = made.law
-    most = np.inf if tolerance >= 1.0 else 1.0 / (1.0 - tolerance)
+    most = np.inf if tolerance >= 1.0 else 1.0 / (1.0 - _SHOWN * tolerance)
     knots = np.linspace(0.0, law.total, int(np.clip(law.total / _WARP_S, _WARP_MIN, _WARP_MAX)))
     slowness = np.ones(len(knots))
     window = np.hanning(2 * _AROUND + 3)[1:-1]

@@ -1,123 +1,138 @@
-"""How well the tool keeps to its path: a bound of its distance from it at every instant, and its speed.
+"""How well the tool keeps to its path: bounds of its distance, its turn and its speed at every instant.
 
-Between two instants the tool leaves the chord of its places by at most T^2 / 8 times a bound of its
-acceleration, and the path leaves its own chord by at most du^2 / 8 times a bound of its second derivative.
-The chords are nowhere farther apart than at their ends. So the largest distance at the instants with these
-two sags is a bound of the distance at all times.
+Between two instants a curve leaves the chord of its places by at most T^2 / 8 times a bound of its second
+derivative, and the path leaves its own chord by at most du^2 / 8 times a bound of its. The chords are nowhere
+farther apart than at their ends. So the largest distance at the instants with these two sags is a bound of
+the distance at all times. The same holds for rotations as matrices, and for the tool's velocity.
 """
 
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian.joint_curve import Angle, tool_poses
 from ir_planner.cartesian.points import SentPath
-from ir_planner.cartesian.timed import Driven
+from ir_planner.cartesian.tool_motion import ToolMotion, tool_motion
 from ir_planner.cartesian.tool_path import ToolPath
-from ir_planner.curves import extremes
 from ir_planner.scene import PlanningScene
 
-_BETWEEN = 2e-5  # m that the bound may add between samples
+_BETWEEN = 2e-5  # m that the bound may add between samples,
+_BETWEEN_TURN = 1e-4  # rad,
+_BETWEEN_SPEED = 5e-4  # and share of the speed
 _STEP_MAX, _STEP_MIN = 0.02, 1e-4  # s
 _PIECE = 20_000
+_ROOT = np.sqrt(2.0)
 
 
 @dataclass(frozen=True)
 class Kept:
-    """tool_error [m]: a bound; rotation_error [rad]; speed_deviation: share of the speed asked for."""
+    """Bounds: tool_error [m]; rotation_error [rad]; speed_deviation: share of the speed asked for."""
 
-    tool_error: float
-    rotation_error: float
-    speed_deviation: float
+    tool_error: float = 0.0
+    rotation_error: float = 0.0
+    speed_deviation: float = 0.0
+
+    def worse(self, other: "Kept") -> "Kept":
+        """The larger ones."""
+        return Kept(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
 
 
 def kept_of(sent: SentPath, path: ToolPath, angle: Angle | None, scene: PlanningScene) -> Kept:
     """What the trajectory that is sent keeps of the path."""
-    found = [_of_stroke(sent, k, path, angle, scene) for k in range(len(sent.strokes))]
-    return Kept(*(max(getattr(one, name) for one in found) for name in Kept.__dataclass_fields__))
-
-
-def _of_stroke(sent: SentPath, k: int, path: ToolPath, angle: Angle | None, scene: PlanningScene) -> Kept:
-    stroke, tau = sent.strokes[k], sent.instants[k]
-    begin, last = sent.begins[k], sent.trajectory.duration
-    accelerations = _accelerations(sent.trajectory, scene)
-
-    def passed(at: FloatArray) -> FloatArray:
-        return np.asarray(np.minimum(begin + stroke.at(at).t, last))
-
-    points = passed(tau)
-    step = np.sqrt(8.0 * _BETWEEN / np.maximum(_largest(accelerations, points, sent.trajectory), 1e-9))
-    count = np.maximum(np.ceil(np.diff(points) / np.clip(step, _STEP_MIN, _STEP_MAX)), 1).astype(int)
-    pieces = zip(tau[:-1], tau[1:], count, strict=True)
-    fine = np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), tau[-1])
-    kept = Kept(0.0, 0.0, 0.0)
-    for first in range(0, len(fine) - 1, _PIECE):
-        part = fine[first : first + _PIECE + 1]
-        asked = stroke.at(part)
-        times = np.minimum(begin + asked.t, last)
-        away, turned, off = _at(sent, k, part, asked, times, path, angle, scene)
-        u = path.parameter(asked.s)
-        sags = np.diff(times) ** 2 * _largest(accelerations, times, sent.trajectory)
-        sags += np.diff(u) ** 2 * path.bends(u)
-        error = float((np.maximum(away[1:], away[:-1]) + sags / 8.0).max())
-        found = (error, turned, off)
-        kept = Kept(*(max(a, b) for a, b in zip(astuple(kept), found, strict=True)))
+    motion, kept = tool_motion(sent.trajectory, scene), Kept()
+    for k in range(len(sent.strokes)):
+        judged = _Stroke(sent, k, path, angle, scene, motion)
+        tau = judged.instants()
+        for first in range(0, len(tau) - 1, _PIECE):
+            kept = kept.worse(judged.kept(tau[first : first + _PIECE + 1]))
     return kept
 
 
-def _at(
-    sent: SentPath,
-    k: int,
-    tau: FloatArray,
-    asked: Driven,
-    times: FloatArray,
-    path: ToolPath,
-    angle: Angle | None,
-    scene: PlanningScene,
-) -> tuple[FloatArray, float, float]:
-    """Distances (M,) m at instants tau (M,) s of the law of stroke k, the largest turn [rad], and the share
-    by which the tool is off its speed.
-    """
-    motion = sent.trajectory.sample(times)
-    poses, there = tool_poses(path, angle, asked.s), scene.chain.tcp_poses(motion.q)
-    away = np.linalg.norm(poses[:, :3, 3] - there[:, :3, 3], axis=1)
-    between = poses[:, :3, :3].transpose(0, 2, 1) @ there[:, :3, :3]
-    turned = float(Rotation.from_matrix(between).magnitude().max())
-    law = sent.strokes[k].law
-    phase = law.phase(tau)
-    even = law.even[phase] & (tau > law.times[phase]) & (tau < law.times[phase + 1])
-    if not even.any():
-        return away, turned, 0.0
-    jacobian = scene.chain.jacobian(motion.q[even])[:, :3]
-    speed = np.linalg.norm(np.einsum("mij,mj->mi", jacobian, motion.qd[even]), axis=1)
-    off = np.abs(speed / law.first[phase[even]] - 1.0)
-    return away, turned, float(off.max())
+@dataclass(frozen=True, eq=False)
+class _Stroke:
+    """Stroke k of a path that is sent, with bounds of the tool's motion."""
+
+    sent: SentPath
+    k: int
+    path: ToolPath
+    angle: Angle | None
+    scene: PlanningScene
+    motion: ToolMotion
+
+    def times(self, tau: FloatArray) -> FloatArray:
+        """Seconds (M,) of the trajectory at instants tau (M,) s of the law."""
+        stroke, last = self.sent.strokes[self.k], self.sent.trajectory.duration
+        return np.asarray(np.minimum(self.sent.begins[self.k] + stroke.at(tau).t, last))
+
+    def instants(self) -> FloatArray:
+        """Instants (M,) s of the law, near enough to each other for the bounds to be close."""
+        law, motion = self.sent.strokes[self.k].law, self.motion
+        tau = np.union1d(self.sent.instants[self.k], law.times)
+        points = self.times(tau)
+        slowest = float(law.first[law.even].min()) if law.even.any() else np.inf
+        allowed = (
+            (_BETWEEN, motion.acceleration),
+            (_BETWEEN_TURN, motion.turning),
+            (_BETWEEN_SPEED * slowest, motion.jerk),
+        )
+        steps = [8.0 * most / np.maximum(motion.between(value, points), 1e-9) for most, value in allowed]
+        step = np.clip(np.sqrt(np.min(steps, axis=0)), _STEP_MIN, _STEP_MAX)
+        count = np.maximum(np.ceil(np.diff(points) / step), 1).astype(int)
+        pieces = zip(tau[:-1], tau[1:], count, strict=True)
+        return np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), tau[-1])
+
+    def kept(self, tau: FloatArray) -> Kept:
+        """The bounds from the first of tau (M,) s to the last."""
+        asked, times = self.sent.strokes[self.k].at(tau), self.times(tau)
+        moved = self.sent.trajectory.sample(times)
+        wanted, poses = tool_poses(self.path, self.angle, asked.s), self.scene.chain.tcp_poses(moved.q)
+        difference = poses - wanted
+        u, squared = self.path.parameter(asked.s), np.diff(times) ** 2
+        sags = squared * self.motion.between(self.motion.acceleration, times)
+        sags += np.diff(u) ** 2 * self.path.bends(u)
+        away = _at_most(np.linalg.norm(difference[:, :3, 3], axis=1), sags / 8.0)
+        turns = squared * self.motion.between(self.motion.turning, times) / 8.0 + self._turned(u)
+        norm = _at_most(np.linalg.norm(difference[:, :3, :3], axis=(1, 2)), _ROOT * turns)
+        jacobian = self.scene.chain.jacobian(moved.q)[:, :3]
+        velocity = np.einsum("mij,mj->mi", jacobian, moved.qd)
+        sags = squared * self.motion.between(self.motion.jerk, times) / 8.0
+        turn = 2.0 * np.arcsin(min(norm / (2.0 * _ROOT), 1.0))
+        return Kept(away, float(turn), self._off(tau, velocity, sags))
+
+    def _turned(self, u: FloatArray) -> FloatArray:
+        """By how much (M - 1,) rotations asked for leave their chords between u (M,) m and the next."""
+        first, second = self.path.turns(u)
+        h = np.diff(u)
+        if self.angle is None:
+            return np.asarray(h**2 / 8.0 * second)
+        rates, bends = self.angle.rates, self.path.bends(u)
+        second = second + rates.second + rates.first * bends + 2.0 * first * rates.first
+        kinks = 0.0 if self.angle.smooth else rates.first * h / 2.0
+        return np.asarray(h**2 / 8.0 * second + kinks)
+
+    def _off(self, tau: FloatArray, velocity: FloatArray, sags: FloatArray) -> float:
+        """The share that velocity (M, 3) m/s at tau (M,) s is off the speed where that is to be kept."""
+        law = self.sent.strokes[self.k].law
+        phase = law.phase(0.5 * (tau[1:] + tau[:-1]))
+        even = law.even[phase] & (tau[:-1] >= law.times[phase]) & (tau[1:] <= law.times[phase + 1])
+        if not even.any():
+            return 0.0
+        ends = np.linalg.norm(velocity, axis=1)
+        most = np.maximum(ends[1:], ends[:-1]) + sags
+        least = _least_between(velocity[:-1], velocity[1:]) - sags
+        asked = law.first[phase[even]]
+        return float(np.maximum(most[even] / asked - 1.0, 1.0 - least[even] / asked).max())
 
 
-def _accelerations(trajectory: JointTrajectory, scene: PlanningScene) -> FloatArray:
-    """Bounds (S,) [m/s^2] of |p''| of the tcp in each segment: the sum of |q''_j| r_j, and of |q'_j| |q'_k|
-    times the distance r from the outer one of both axes.
-    """
-    largest, reach = extremes(*trajectory.coefficients()), _reach(scene)
-    outer = np.minimum(reach[:, None], reach[None, :])
-    turning = np.einsum("sj,jk,sk->s", largest.velocity, outer, largest.velocity)
-    return np.asarray(largest.acceleration @ reach + turning)
+def _at_most(values: FloatArray, sags: FloatArray) -> float:
+    """The largest of values (M,) with what may be added between them (M - 1,)."""
+    return float((np.maximum(values[1:], values[:-1]) + sags).max())
 
 
-def _largest(values: FloatArray, times: FloatArray, trajectory: JointTrajectory) -> FloatArray:
-    """The largest value (M - 1,) of the segments between times (M,) s and the next, values (S,)."""
-    last = len(values) - 1
-    first = np.clip(np.searchsorted(trajectory.times, times[:-1], side="right") - 1, 0, last)
-    second = np.clip(np.searchsorted(trajectory.times, times[1:], side="left") - 1, 0, last)
-    return np.maximum(values[first], values[np.maximum(second, first)])
-
-
-def _reach(scene: PlanningScene) -> FloatArray:
-    """Farthest (n,) m that the tcp can be from each axis."""
-    chain = scene.chain
-    links = np.linalg.norm(chain.joint_origin[1:, :3, 3], axis=1)
-    tail = np.append(links, np.linalg.norm(chain.tcp[:3, 3]))
-    return np.asarray(np.cumsum(tail[::-1])[::-1])
+def _least_between(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Least norms (M,) on the segments between vectors (M, 3)."""
+    step = second - first
+    share = -(first * step).sum(axis=1) / np.maximum((step * step).sum(axis=1), 1e-300)
+    nearest = first + np.clip(share, 0.0, 1.0)[:, None] * step
+    return np.asarray(np.linalg.norm(nearest, axis=1))

@@ -8,12 +8,13 @@ jumps, are joined in the same manner within micrometres; at any other corner wit
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from ir_msgs_py.arrays import FloatArray, IntArray
-from ir_planner.cartesian.orientations import about_tool
+from ir_planner.cartesian.orientations import Rates, about_tool, rates_of
 from ir_planner.cartesian.parts import Part
 from ir_planner.cartesian.places import ArcLength
 
@@ -111,6 +112,27 @@ class ToolPath:
                 bend = joint_bend(self.parts[k - 1], self.parts[k], float(radius))
                 result[near] = np.maximum(result[near], bend)
         return result
+
+    def turns(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Bounds (M - 1,) of how fast the tool turns between u (M,) and the next, as those of Rates, by u."""
+        first, second = np.zeros(len(u) - 1), np.zeros(len(u) - 1)
+        zones = [
+            (self.corners[k], self.corners[k + 1], part.turning.rates) for k, part in enumerate(self.parts)
+        ]
+        for corner, radius, parts in zip(
+            self.corners[1:-1], self.radius[1:-1], pairwise(self.parts), strict=True
+        ):
+            if radius > 0.0:
+                both = parts[0].turning.rates.then(parts[1].turning.rates)
+                bent = Rates(both.first, both.second + both.first * 35.0 / (32.0 * radius))
+                zones.append((corner - radius, corner + radius, bent))
+        for begin, end, rates in zones:
+            if self.headings:
+                rates = rates.then(rates_of(self._heading))
+            within = (u[1:] >= begin) & (u[:-1] <= end)
+            first[within] = np.maximum(first[within], rates.first)
+            second[within] = np.maximum(second[within], rates.second)
+        return first, second
 
     def parameter(self, s: FloatArray) -> FloatArray:
         """u (M,) along the parts at arc lengths s (M,) m."""
