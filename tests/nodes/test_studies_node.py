@@ -152,6 +152,17 @@ def test_a_folder_that_is_a_link_out_is_refused(result: Goal, tmp_path: Path) ->
     assert not list((tmp_path / "elsewhere").iterdir())
 
 
+def test_a_file_of_something_else_is_kept_and_named(result: Goal, tmp_path: Path) -> None:
+    taken = tmp_path / "out" / "a" / "index.html"
+    taken.parent.mkdir(parents=True)
+    taken.write_text("mine")
+    refused = result(settings=SETTINGS.replace("20", "2")).status
+    assert refused.code == StatusCode.FAILURE
+    assert "index.html" in refused.message
+    assert "unexpected" not in refused.message
+    assert taken.read_text() == "mine"
+
+
 class TestHanging:
     @pytest.fixture
     def faults(self) -> list[str]:

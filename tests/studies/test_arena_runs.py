@@ -106,6 +106,12 @@ def test_a_folder_that_cannot_be_written_is_named(fought: Fought, tmp_path: Path
         fought("sbl")
 
 
+def test_what_lies_where_the_database_belongs_is_named(fought: Fought, tmp_path: Path) -> None:
+    (tmp_path / "out" / "arena.db.part").mkdir(parents=True)
+    with pytest.raises(FolderError, match=r"arena\.db can't be written"):
+        fought("sbl", seeds=1)
+
+
 def test_workers_that_never_start_end_the_arena(tmp_path: Path) -> None:
     settings = ArenaSettings(cells=("open",), tasks=("home->p1",), seeds=5)
     with pytest.raises(WorkerError, match="a worker died before it could start"):

@@ -30,6 +30,7 @@ from ir_msgs_py.ros.refusals import answered
 from ir_msgs_py.ros.running import run_node
 from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_msgs_py.status import Status, StatusCode
+from ir_recorder.errors import RecorderError
 from ir_studies.errors import SettingsError, StoppedError, StudyError
 from ir_studies.parameters import declared_settings
 from ir_studies.settings import StudiesSettings
@@ -146,7 +147,7 @@ def _known(error: Exception) -> Status | None:
         return Status(StatusCode.PREEMPTED, "stopped; the same goal goes on from there")
     if isinstance(error, SettingsError):
         return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error))
-    if isinstance(error, (StudyError, MsgsError, DescriptionError, OSError)):
+    if isinstance(error, (StudyError, RecorderError, MsgsError, DescriptionError, OSError)):
         return Status(StatusCode.FAILURE, str(error))
     return None
 

@@ -7,11 +7,13 @@ import os
 import platform
 import sqlite3
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
 from ir_studies.arena.settings import ArenaSettings
 from ir_studies.arena.table import Run
+from ir_studies.errors import FolderError
 
 _TABLES = """
 CREATE TABLE experiments (id INTEGER PRIMARY KEY AUTOINCREMENT, name VARCHAR(512), totaltime REAL,
@@ -32,18 +34,17 @@ _STATUS = ("answered", "died", "cut")
 
 
 def write_database(runs: Sequence[Run], settings: ArenaSettings, path: Path) -> Path:
-    """Write the database in place of an earlier one."""
+    """Write the database in place of an earlier one. FolderError where that can't be done."""
     part = path.with_name(path.name + ".part")
-    part.unlink(missing_ok=True)
-    database = sqlite3.connect(part)
     try:
-        with database:
+        part.unlink(missing_ok=True)
+        with closing(sqlite3.connect(part)) as database, database:
             database.executescript(_TABLES)
             database.executemany("INSERT INTO enums VALUES ('status', ?, ?)", list(enumerate(_STATUS)))
             _fill(database, runs, settings)
-    finally:
-        database.close()
-    os.replace(part, path)
+        os.replace(part, path)
+    except (OSError, sqlite3.Error) as error:
+        raise FolderError(f"{path} can't be written: {error}") from error
     return path
 
 
