@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import pytest
+import yaml
 
 from ir_studies import SettingsError, read_layout, study_of
 from ir_studies.layout import EXAMPLE
 
+STUDIES = Path(__file__).parents[2] / "docs" / "studies.md"
 HEAD = "format: ir_layout/1\ncell: demo\n"
 MOVES = HEAD + "base: {x: [0, 1]}\n"
 
@@ -69,3 +72,11 @@ def test_a_file_is_named_in_its_refusal_and_its_cell_stands_beside_it(tmp_path: 
     path.write_text("format: ir_layout/1\ncell: mine.yaml\nbase: {x: [0, 1]}\n")
     with pytest.raises(SettingsError, match=r"layout.yaml: cell: .*can't be opened"):
         read_layout(path)
+
+
+def test_the_goal_in_the_documentation_carries_the_settings_as_they_are(tmp_path: Path) -> None:
+    (tmp_path / "layout.yaml").write_text(EXAMPLE)
+    command = next(part for part in STUDIES.read_text().split("```") if "ir send_goal" in part)
+    shown = 'ir() { printf %s "${@: -1}"; }\n' + command
+    goal = subprocess.run(["bash", "-c", shown], cwd=tmp_path, capture_output=True, check=True).stdout
+    assert study_of(yaml.safe_load(goal)["settings"]) == study_of(EXAMPLE)

@@ -67,9 +67,10 @@ def words(best: Final, given: Final | None) -> str:
     within = best.interval
     text = (
         f"Best ({best.placement.key}; {best.condition.text}): {joules(best.mean())} at the mains per cycle, "
-        f"predicted, 90 % interval {joules(within.low)} to {joules(within.high)}, "
-        f"{joules(best.spread())} between {len(best.rows)} seeds"
+        f"predicted, 90 % interval {joules(within.low)} to {joules(within.high)}"
     )
+    if len(best.rows) > 1:
+        text += f", {joules(best.spread())} between {len(best.rows)} seeds"
     if given is None:
         return f"{text}."
     less, saved = best.saving(given)
