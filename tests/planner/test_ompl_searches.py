@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-import time
+import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -49,16 +50,24 @@ def test_at_the_ceiling_it_is_killed(scene_of: SceneOf) -> None:
     assert space.work.truncated
 
 
-def test_processor_time_counts_what_ompl_runs(scene_of: SceneOf) -> None:
-    ends, space = a_blocked_task(scene_of, Work(10_000_000, 1.0, with_ompl.processor_time))
-    own, begin = time.process_time(), with_ompl.processor_time()
-    space.work.deadline = begin + 0.05
-    found = SEARCHES["rrt"].find(Ends(ends.start, ends.goals + 50.0), space, 1, space.work)
-    assert found.paths == []
-    assert space.work.truncated
-    passed = with_ompl.processor_time() - begin  # of the one that has ended too
-    assert passed >= 0.05
-    assert time.process_time() - own < passed
+def test_each_process_is_charged_while_it_is_there(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    charged: list[int] = []
+
+    @contextmanager
+    def charge(process: int) -> Iterator[None]:
+        os.kill(process, 0)
+        yield
+        os.kill(process, 0)  # not killed before it was charged
+        charged.append(process)
+
+    monkeypatch.setattr(host, "_charged", host._charged)  # as it was, afterwards
+    with_ompl.charge_to(charge)
+    ends, space = a_blocked_task(scene_of, Work(10_000, 1.0, lambda: 0.0))
+    for seed in range(2):
+        assert SEARCHES["rrt_connect"].find(ends, space, seed, space.work).paths
+    assert len(set(charged)) == 2
 
 
 def test_a_request_that_is_cancelled_meanwhile_raises(scene_of: SceneOf) -> None:

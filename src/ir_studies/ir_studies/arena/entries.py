@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 
-import numpy as np
-
-from ir_description import Cell, load_cell
-from ir_msgs_py.arrays import FloatArray
+from ir_description import load_cell
 from ir_studies.arena.settings import MOST_RUNS, ArenaSettings
+from ir_studies.arena.tasks import tasks_of
 from ir_studies.errors import SettingsError
 from ir_studies.work import Job
 
@@ -39,17 +37,6 @@ class Entry:
     def question(self) -> tuple[str, str, str, str]:
         """What all planners and seeds are asked alike."""
         return self.cell, self.task, self.load, self.timing
-
-
-def tasks_of(cell: Cell) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-    """Ends (n,) of every task, there and back: home->p1 and p1->home."""
-    found: dict[str, tuple[FloatArray, FloatArray]] = {}
-    for task in cell.tasks:
-        start, goal = np.array(task.start), np.array(task.goal)
-        first, _, last = task.name.partition("->")
-        found[task.name] = start, goal
-        found[f"{last}->{first}" if last else f"{task.name} back"] = goal, start
-    return found
 
 
 def entries(settings: ArenaSettings) -> list[Entry]:

@@ -12,10 +12,12 @@ import numpy as np
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner, PlannerError
 from ir_planner.search import SEARCHES
-from ir_planner.search.with_ompl import needs_ompl, processor_time
-from ir_studies.arena.entries import Entry, tasks_of
+from ir_planner.search.with_ompl import charge_to, needs_ompl
+from ir_studies.arena.entries import Entry
 from ir_studies.arena.one_run import one_run
+from ir_studies.arena.processor_time import charged, processor_time
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
+from ir_studies.arena.tasks import tasks_of
 from ir_studies.work import Row
 
 
@@ -25,6 +27,7 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
         key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()
     }
     arena = ArenaSettings(**read)
+    charge_to(charged)
     warm_up(arena)
     return lambda words: row_of(Entry(**words), arena)
 

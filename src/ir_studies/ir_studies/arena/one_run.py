@@ -16,8 +16,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_planner import Goal, MovementPlan, Planner
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
-from ir_studies.arena.entries import Entry, tasks_of
+from ir_studies.arena.entries import Entry
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
+from ir_studies.arena.tasks import tasks_of
 from ir_studies.work import Row
 
 SEEDS = 100_000  # between the first requests of two seeds

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,9 @@ from ir_planner import PlannerError
 from ir_planner.scene import scene_with
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import missing, needs_ompl
+from ir_studies.arena.tasks import tasks_of
 from ir_studies.errors import SettingsError
-from ir_studies.work import Placed, beside, checked_number, read_text, settings_values
+from ir_studies.work import Placed, beside, checked_known, checked_numbers, read_text, settings_values
 
 FORMAT = "ir_arena/1"
 PORTFOLIO = "portfolio"
@@ -58,12 +58,9 @@ class ArenaSettings:
     def __post_init__(self) -> None:
         for name in ("cells", "planners", "loads", "timings", "tasks"):
             _check_names(name, getattr(self, name), may_be_empty=name == "tasks")
-        _check_known("planners", self.planners, (PORTFOLIO, *SEARCHES))
-        _check_known("timings", self.timings, TIMINGS)
-        for name, low, high in _WHOLE:
-            checked_number(name, getattr(self, name), low, high, whole=True)
-        for name, least, most in _REAL:
-            checked_number(name, getattr(self, name), least, most)
+        checked_known("planners", self.planners, (PORTFOLIO, *SEARCHES))
+        checked_known("timings", self.timings, TIMINGS)
+        checked_numbers(self, _WHOLE, _REAL)
         wanted = [name for name in self.planners if name in SEARCHES and needs_ompl(SEARCHES[name])]
         if wanted and missing():
             raise SettingsError(f"planners: {', '.join(wanted)}: {missing()}")
@@ -87,8 +84,8 @@ class ArenaSettings:
                 raise SettingsError(f"cells: {name}: {error}") from error
             if not cell.tasks:
                 raise SettingsError(f"cells: {name} has no tasks")
-            known_tasks += [task.name for task in cell.tasks]
-        _check_known("tasks", self.tasks, known_tasks)
+            known_tasks += tasks_of(cell)
+        checked_known("tasks", self.tasks, known_tasks)
 
 
 _WHOLE = (("seeds", 1, 100_000), ("requests", 0, 1_000_000), ("max_iterations", 0, 2**32 - 1))
@@ -125,17 +122,3 @@ def _check_names(key: str, names: Any, *, may_be_empty: bool) -> None:
         raise SettingsError(f"{key} is empty")
     if len(set(names)) < len(names):
         raise SettingsError(f"{key} names one twice")
-
-
-def _check_known(key: str, names: Collection[str], known: Collection[str]) -> None:
-    for name in names:
-        if name not in known and _reverse(name) not in known:
-            raise SettingsError(
-                f"{key}: {name!r:.60} is unknown: known are {', '.join(dict.fromkeys(known))}"
-            )
-
-
-def _reverse(name: str) -> str:
-    """The task that leads back."""
-    first, _, last = name.partition("->")
-    return f"{last}->{first}" if last else name

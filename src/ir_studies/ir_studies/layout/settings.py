@@ -12,7 +12,15 @@ from ir_description import Cell, DescriptionError, load_cell
 from ir_studies.errors import SettingsError
 from ir_studies.layout.example import EXAMPLE
 from ir_studies.layout.freedom import JOINTS, TURNS, Placing, Range, Variable, variables
-from ir_studies.work import Placed, beside, checked_number, read_text, settings_values
+from ir_studies.work import (
+    Placed,
+    beside,
+    checked_known,
+    checked_number,
+    checked_numbers,
+    read_text,
+    settings_values,
+)
 
 __all__ = ["EXAMPLE", "FORMAT", "Condition", "LayoutSettings", "layout_settings", "read_layout"]
 FORMAT = "ir_layout/1"
@@ -64,10 +72,7 @@ class LayoutSettings:
     hang_after: float = 600.0
 
     def __post_init__(self) -> None:
-        for name, low, high in _WHOLE:
-            checked_number(name, getattr(self, name), low, high, whole=True)
-        for name, least, most in _REAL:
-            checked_number(name, getattr(self, name), least, most)
+        checked_numbers(self, _WHOLE, _REAL)
         if self.method not in METHODS:
             raise SettingsError(f"method is {self.method!r:.60}: known are {', '.join(METHODS)}")
         self._check_names()
@@ -106,15 +111,15 @@ class LayoutSettings:
     def _check_names(self) -> None:
         cell = _cell(self.cell)
         machines = [machine.name for machine in cell.equipment]
-        _known("equipment", self.equipment, machines)
-        _known("carried", self.carried, machines)
-        _known("stations", self.stations, [station.name for station in cell.stations])
-        _known("payloads", self.payloads, [part.name for part in cell.parts])
-        _known("park", self.park, JOINTS[: cell.robot.n])
+        checked_known("equipment", self.equipment, machines)
+        checked_known("carried", self.carried, machines)
+        checked_known("stations", self.stations, [station.name for station in cell.stations])
+        checked_known("payloads", self.payloads, [part.name for part in cell.parts])
+        checked_known("park", self.park, JOINTS[: cell.robot.n])
         for name in ("base", "tool"):
-            _known(name, getattr(self, name), TURNS[name])
+            checked_known(name, getattr(self, name), TURNS[name])
         for machine, ranges in self.equipment.items():
-            _known(f"equipment: {machine}", ranges, TURNS["equipment"])
+            checked_known(f"equipment: {machine}", ranges, TURNS["equipment"])
         if self.tool and cell.tool is None:
             raise SettingsError(f"tool: the cell {cell.name} has none")
         if not (self.stations or cell.program):
@@ -204,12 +209,6 @@ def _ranges(key: str, value: Any) -> dict[str, Range]:
             raise SettingsError(f"{key}: {name} is {ends}: the lowest comes first")
         found[name] = float(ends[0]), float(ends[1])
     return found
-
-
-def _known(key: str, names: Any, known: Any) -> None:
-    for name in names:
-        if name not in known:
-            raise SettingsError(f"{key}: {name!r:.60} is unknown: known are {', '.join(known)}")
 
 
 def _cell(name: str) -> Cell:

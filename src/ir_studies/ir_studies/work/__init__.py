@@ -3,7 +3,15 @@
 from ir_studies.work.job import Job, Row, Task
 from ir_studies.work.means import MOST_WORKERS, Means
 from ir_studies.work.results import Results
-from ir_studies.work.settings_file import Placed, beside, checked_number, read_text, settings_values
+from ir_studies.work.settings_file import (
+    Placed,
+    beside,
+    checked_known,
+    checked_number,
+    checked_numbers,
+    read_text,
+    settings_values,
+)
 
 __all__ = [
     "MOST_WORKERS",
@@ -14,7 +22,9 @@ __all__ = [
     "Row",
     "Task",
     "beside",
+    "checked_known",
     "checked_number",
+    "checked_numbers",
     "read_text",
     "settings_values",
 ]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import yaml
 
 from ir_studies.errors import SettingsError
 
 MOST_CHARACTERS = 1_000_000  # of a settings file
+Bounds: TypeAlias = "tuple[str, float, float]"
+"""A key, its least and its largest value."""
 Placed = Callable[[str], str]
 """From the name of a cell as the settings have it to what load_cell takes: a bundled name, or a path."""
 
@@ -76,6 +78,21 @@ def checked_number(key: str, value: Any, low: float, high: float, *, whole: bool
     if isinstance(value, bool) or not isinstance(value, kinds) or not _within(value, low, high):
         number = "a whole number" if whole else "a number"
         raise SettingsError(f"{key} is {value!r:.60}: it must be {number} in {low:g} .. {high:g}")
+
+
+def checked_numbers(settings: object, whole: Sequence[Bounds], real: Sequence[Bounds]) -> None:
+    """SettingsError where an attribute is no number of its range, or no whole one."""
+    for some, integers in ((whole, True), (real, False)):
+        for name, low, high in some:
+            checked_number(name, getattr(settings, name), low, high, whole=integers)
+
+
+def checked_known(key: str, names: Iterable[object], known: Collection[str]) -> None:
+    """SettingsError where a name is none of those that are known."""
+    for name in names:
+        if name not in known:
+            said = ", ".join(dict.fromkeys(known))
+            raise SettingsError(f"{key}: {name!r:.60} is unknown: known are {said}")
 
 
 def _within(value: float, low: float, high: float) -> bool:

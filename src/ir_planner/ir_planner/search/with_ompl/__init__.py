@@ -3,8 +3,7 @@
 from ir_planner.search.port import Search
 from ir_planner.search.with_ompl.aorrtc import Aorrtc
 from ir_planner.search.with_ompl.bkpiece import Bkpiece
-from ir_planner.search.with_ompl.charged import processor_time
-from ir_planner.search.with_ompl.host import missing
+from ir_planner.search.with_ompl.host import charge_to, missing
 from ir_planner.search.with_ompl.kpiece import Kpiece
 from ir_planner.search.with_ompl.lbkpiece import Lbkpiece
 from ir_planner.search.with_ompl.ompl_search import OmplSearch
@@ -20,9 +19,9 @@ __all__ = [
     "Prm",
     "Rrt",
     "RrtConnect",
+    "charge_to",
     "missing",
     "needs_ompl",
-    "processor_time",
 ]
 
 

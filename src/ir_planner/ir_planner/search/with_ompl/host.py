@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
@@ -15,11 +17,12 @@ from multiprocessing.connection import Connection
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Work
-from ir_planner.search.with_ompl.charged import charged
 from ir_planner.search.with_ompl.problem import Outcome, Problem
 
 _LOOK_S = 0.005  # s between two looks whether the request was cancelled or its time is up
 _ATTEMPTS = 2  # a host that died since the last request is started again once
+Charged = Callable[[int], AbstractContextManager[object]]
+_charged: Charged = lambda process: nullcontext()  # noqa: E731 - until somebody asks
 
 
 class Host:
@@ -82,6 +85,24 @@ def missing() -> str:
     return "" if find_spec("ompl") else 'OMPL is missing: pip install "ir_planner[ompl]", or pip install ompl'
 
 
+def charge_to(charged: Charged) -> None:
+    """From now on enter the context of each process in which OMPL answers, by its id; it is left while the
+    process is still there. For who counts what a request costs.
+    """
+    global _charged
+    _charged = charged
+
+
+@contextmanager
+def _killed(process: int) -> Iterator[None]:
+    """Ended with the context: it waits after its answer."""
+    try:
+        yield
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
+
+
 def check_installed(name: str) -> None:
     """Raise RequestError with how to install OMPL where it isn't."""
     if missing():
@@ -95,7 +116,7 @@ def asked(problem: Problem, work: Work) -> Outcome:
     """
     work.check()
     connection, process = _connected()
-    with connection, charged(process):
+    with connection, _killed(process), _charged(process):
         try:
             connection.send(replace(problem, scene=replace(problem.scene)))  # without what it has computed
             while not connection.poll(_LOOK_S):

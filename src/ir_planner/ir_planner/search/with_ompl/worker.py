@@ -59,7 +59,7 @@ def _answer(connection: Connection) -> None:
     except Exception as error:  # goes to who asked, whatever it is: this process has no other voice
         outcome = Outcome(None, 0, f"{type(error).__name__}: {error}")
     connection.send(outcome)
-    connection.poll(None)  # until who asked has read how long this took, and ends it, or is gone
+    connection.poll(None)  # until who asked ends this, or is gone
 
 
 class _Counted:

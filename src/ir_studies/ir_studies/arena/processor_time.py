@@ -5,11 +5,9 @@ A clock for comparisons: on a machine that others use too, seconds of the wall s
 
 from __future__ import annotations
 
-import os
-import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 _SCHEDULED = 2  # Linux: the clock of a process counts what its threads ran
 _running: set[int] = set()
@@ -25,7 +23,7 @@ def processor_time() -> float:
 
 @contextmanager
 def charged(process: int) -> Iterator[None]:
-    """Count a process, which waits to be killed at the end."""
+    """Count a process for as long as this lasts."""
     global _ended
     _running.add(process)
     try:
@@ -33,8 +31,6 @@ def charged(process: int) -> Iterator[None]:
     finally:
         _ended += _used(process)
         _running.discard(process)
-        with suppress(ProcessLookupError):
-            os.kill(process, signal.SIGKILL)
 
 
 def _used(process: int) -> float:
