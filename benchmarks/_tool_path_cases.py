@@ -20,6 +20,7 @@ _LENGTHS, _SPEEDS = (0.15, 0.9), (0.05, 0.4)  # m, m/s
 _TURN = np.radians(30.0)
 _DRAWS = 40  # of the oracle
 _STEP, _JUMP = 5e-3, 0.2  # m between its samples, rad between two of them
+_ERROR, _TURNED = 1e-4, 1e-2  # m that the tool may be off the path, and rad
 _ASKED = 200  # configurations at which torque is asked for
 
 
@@ -73,8 +74,10 @@ def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
 
 
 def oracle(path: CartesianPath, scene: PlanningScene, rng: np.random.Generator) -> bool:
-    """Whether some configuration, followed from the start with an angle that changes evenly, keeps axis
-    limits, distances, speeds, accelerations and torque at the speed asked for.
+    """Whether some configuration, followed from the start with an angle that changes evenly, keeps to the
+    path, axis limits, distances, speeds, accelerations and torque at the speed asked for.
+
+    It keeps the reserve of torque that the planner leaves to the feedback in every movement.
     """
     whole, _ = joined(path, parts_of(path))
     s = np.linspace(0.0, whole.length, max(int(whole.length / _STEP), 20))
@@ -86,11 +89,24 @@ def oracle(path: CartesianPath, scene: PlanningScene, rng: np.random.Generator) 
         turned[:, :3, :3] = poses[:, :3, :3] @ Rotation.from_euler("x", angles[:, None]).as_matrix()
         found = scene.inverse_kinematics.solve(turned)
         sets = [found.of_pose(k) for k in range(len(s))]
+        middle = 0.5 * (s[1:] + s[:-1])
+        between = whole.poses(middle)
+        about = Rotation.from_euler("x", np.interp(middle, s, angles)[:, None]).as_matrix()
+        between[:, :3, :3] = between[:, :3, :3] @ about
         for q in sets[0]:
             chain = _followed(q, sets)
-            if chain is not None and _drivable(chain, s, path.tool_speed, scene):
+            if chain is None or not _on_path(make_interp_spline(s, chain, k=5)(middle), between, scene):
+                continue
+            if _drivable(chain, s, path.tool_speed, scene):
                 return True
     return False
+
+
+def _on_path(q: FloatArray, poses: FloatArray, scene: PlanningScene) -> bool:
+    """Whether configurations between samples, where a spline joins them, are still on the path."""
+    away = scene.chain.tcp_poses(q) - poses
+    turned = np.linalg.norm(away[:, :3, :3], axis=(1, 2)).max()
+    return bool(np.linalg.norm(away[:, :3, 3], axis=1).max() < _ERROR and turned < _TURNED)
 
 
 def _followed(q: FloatArray, sets: list[FloatArray]) -> FloatArray | None:
@@ -118,4 +134,6 @@ def _drivable(q: FloatArray, s: FloatArray, speed: float, scene: PlanningScene) 
     drives = Drives(scene)
     share = np.abs(drives.torque(spline(at), qd, qdd)) / drives.envelope(qd)
     moving = itertools.pairwise(q)
-    return bool(share.max() < 0.97 and all(np.abs(b - a).max() <= _JUMP for a, b in moving))
+    return bool(
+        share.max() < scene.limits.torque_share and all(np.abs(b - a).max() <= _JUMP for a, b in moving)
+    )

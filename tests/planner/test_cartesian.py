@@ -97,6 +97,19 @@ def judged(planner: Planner, seed: int) -> None:
     assert found.speed <= path.speed_tolerance
 
 
+def test_a_path_that_begins_near_a_singularity_is_driven_slowly_there() -> None:
+    """A circle whose first millimetre bends A3 beyond its acceleration at any short ramp."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "deep_box")
+    path = random_path(np.random.default_rng(5069), planner.scene())
+    plan = planned(planner, path)
+    assert plan.status.ok, plan.status.message
+    assert plan.report.certified
+    found = seen(plan.trajectory, path, planner.scene())
+    assert found.error <= plan.tool_error + 1e-6
+    assert found.speed <= path.speed_tolerance
+
+
 @pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 40), marks=pytest.mark.long)], ids=str)
 def test_random_paths_are_kept_or_refused_with_their_place(planner: Planner, seeds: range) -> None:
     for seed in seeds:

@@ -249,6 +249,8 @@ def _edge_joules(
     scene: PlanningScene,
 ) -> FloatArray:
     """What the drives take along each edge (E,) [J], and what keeps the search from too fast ones."""
+    if len(before) == 0:
+        return np.zeros(0)
     seconds = (np.diff(s) / speed)[layer[before]]
     first, second = q[before], q[after]
     qd = (second - first) / seconds[:, None]

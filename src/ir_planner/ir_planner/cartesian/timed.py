@@ -2,6 +2,7 @@
 follow; within the tolerance slower where they can't, else refused with the place and the axis.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import convolve1d, maximum_filter1d
 
-from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.joint_curve import JointCurve, singularity
 from ir_planner.cartesian.refusal import PathRefusedError
@@ -152,28 +153,49 @@ def _ramp(
     curve: JointCurve, spans: tuple[Span, ...], k: int, limits: MotionLimits, scene: PlanningScene
 ) -> float:
     """The shortest ramp [s] between the speeds at boundary k that needs no more of the limits than the
-    constant speed beside it does.
+    constant speed beside it does; where that is too much, one that keeps them: a path that begins near a
+    singularity is driven slowly there.
     """
     _, first, last = ramp_places(spans, k, _RAMPS[:1])
     if first == last:
         return 0.0
+
+    def use(durations: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return _ramps_use(curve, spans, k, durations, limits, scene)
+
+    found = _shortest(lambda durations: np.less_equal(*_beside(*use(durations))))
+    if use(np.array([found]))[0][0] > _ENOUGH:
+        slow = _shortest(lambda durations: use(durations)[0] <= _USED)
+        if use(np.array([slow]))[0][0] <= _ENOUGH:
+            return slow
+    return found
+
+
+def _shortest(fits_of: Callable[[FloatArray], BoolArray]) -> float:
+    """The shortest duration [s] that fits, the longest where none does."""
     durations = _RAMPS
     for _ in range(_ZOOMS):
-        fits = _ramps_fit(curve, spans, k, durations, limits, scene)
+        fits = fits_of(durations)
         d = int(np.argmax(fits)) if fits.any() else len(fits) - 1
         low = durations[max(d - 1, 0)]
         durations, found = np.linspace(low, durations[d], _FINER), float(durations[d])
     return found
 
 
-def _ramps_fit(
+def _beside(ramp: FloatArray, cruise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What ramps (R,) need, and what they may."""
+    return ramp, np.maximum(_USED, cruise)
+
+
+def _ramps_use(
     curve: JointCurve,
     spans: tuple[Span, ...],
     k: int,
     durations: FloatArray,
     limits: MotionLimits,
     scene: PlanningScene,
-) -> np.ndarray:
+) -> tuple[FloatArray, FloatArray]:
+    """What ramps of these durations (R,) s need of the limits (R,), and the constant speed there (R,)."""
     begin, first, last = ramp_places(spans, k, durations)
     x, T = np.linspace(0.0, 1.0, _PER_RAMP), durations[:, None]
     rise = last - first
@@ -185,8 +207,7 @@ def _ramps_fit(
     along = curve.at(np.clip(places, curve.begin, curve.end))
     ramp = use_of(_with_speed(along, none, places, v.ravel(), a.ravel(), j.ravel()), limits, scene)
     cruise = use_of(_with_speed(along, none, places, even, none, none), limits, scene)
-    allowed = np.maximum(_USED, cruise.reshape(s.shape).max(axis=1))
-    return np.asarray(ramp.reshape(s.shape).max(axis=1) <= allowed)
+    return ramp.reshape(s.shape).max(axis=1), cruise.reshape(s.shape).max(axis=1)
 
 
 def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene) -> TimedStroke:
