@@ -28,11 +28,17 @@ from ir_planner.timing import stretched
 SceneOf = Callable[[str], PlanningScene]
 CLEAR = 0.05  # m: of both ends
 SHALLOW = 1.01  # so little do joules depend on the duration near the best one that a descent may end there
-FREE = (  # in the open cell: ends, durations [s] with the drive energy [J] of the best of six IPOPT starts
+NEAR_THE_BEST = 1.01  # times what IPOPT finds
+FREE = (  # in the open cell: ends, durations [s] with the drive energy [J] that IPOPT finds
     (
         [1.66434, -1.271436, 0.446121, 3.491531, -0.372384, 2.864757],
         [1.348422, -1.115561, 0.58982, 3.811623, -0.558967, 3.282405],
-        ((0.7516096, 280.33), (0.939512, 50.92)),
+        ((0.7990652, 206.19), (0.9988315, 19.08)),
+    ),
+    (
+        [-1.927662, -0.716997, -0.889059, -3.74563, -0.76862, -4.975141],
+        [-2.158959, -1.618181, -1.137729, -3.745623, -0.259533, -5.409561],
+        ((1.5526735, 635.51), (1.9408419, 173.61)),
     ),
 )
 
@@ -80,12 +86,12 @@ def ends(scene: PlanningScene, seed: int) -> tuple[FloatArray, FloatArray]:
 def test_short_movements_cost_little_more_than_the_best_known(
     q0: list[float], q1: list[float], known: tuple[tuple[float, float], ...], scene_of: SceneOf
 ) -> None:
-    """Most of their joules depend on when the bus' power passes zero: 20 to 58 % were missed there."""
+    """Most of their joules depend on when the bus' power passes zero: up to 58 % were missed there."""
     scene = scene_of("open")
     for duration, joules in known:
         report = asked(np.array(q0), np.array(q1), scene, duration=duration).report
         assert report.certified
-        assert report.energy - report.base_energy < 1.03 * joules
+        assert drives(report) < NEAR_THE_BEST * joules
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,10 @@ from ir_planner.optimize.path_timing import QUICK_TIMING, PathTiming, TimingEffo
 from ir_planner.optimize.portfolio import Portfolio
 from ir_planner.optimize.refinement import FEWEST, MOST, SPACING, Refinement
 from ir_planner.optimize.rescaling import rescaled
-from ir_planner.optimize.stages import QUICK, THOROUGH
+from ir_planner.optimize.stages import EXACT, QUICK, THOROUGH
 
 __all__ = [
+    "EXACT",
     "FEWEST",
     "MOST",
     "QUICK",

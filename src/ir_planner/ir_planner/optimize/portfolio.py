@@ -17,7 +17,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
 from ir_planner.optimize.estimate import first_looks
 from ir_planner.optimize.refinement import Refinement, Solution
-from ir_planner.optimize.stages import QUICK, THOROUGH, Effort
+from ir_planner.optimize.stages import EXACT, QUICK, THOROUGH, Effort
 from ir_planner.search import COARSE, apart, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
 
@@ -106,6 +106,12 @@ class Portfolio:
         """Refine a path (M, n) thoroughly, though its coarse solution was like a cheaper one."""
         solution = self.refinement.coarse(path, THOROUGH.coarse)
         return self._refine(Candidate(method, path, solution), THOROUGH)
+
+    def refine_exactly(self) -> bool:
+        """Refine the path of the best movement as far as descents go."""
+        method, best = self.found[0]
+        solution = self.refinement.coarse(best.path, EXACT.coarse)
+        return self._refine(Candidate(method, best.path, solution), EXACT)
 
     def deepen(self) -> bool:
         """Optimise the path of the best movement thoroughly; False where that was done."""

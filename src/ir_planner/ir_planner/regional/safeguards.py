@@ -60,7 +60,9 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
             own.refine_anew(method, path)
         best, shortest = own.best(), own.refinement.shortest
         if not np.isfinite(shortest):  # there is time for least energy
-            return best, shortest
+            if not context.work.exhausted:
+                own.refine_exactly()
+            return own.best(), shortest
     if options.duration > 0.0:
         free, duration = _as_asked(_optimised_again(own, context.asking("time_and_energy")), context)
         best, shortest = _cheaper(best, free), min(shortest, duration)
