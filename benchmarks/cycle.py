@@ -1,13 +1,14 @@
 """What does a program cost over its cycle time, and what does it save against the common program?
 
-    python benchmarks/cycle.py [--cell FILE]... [--points N] [--rivals N] [--seeds N] [--quick] [--json FILE]
+    python benchmarks/cycle.py [--cell FILE]... [--variants N] [--points N] [--rivals N] [--seeds N] [--quick]
+                               [--json FILE]
 
 The stations of a cell in turn and back to the posture park, without pauses. Cycle times from the shortest to
 twice the free one; E is the mains energy over the whole cycle, the wait to its end included. The law: a cycle
 that is d longer costs at most d of standing on motors more, and the drive energy of the movements alone never
 rises while the wait at the end stays in its mode. Then the planner has the time of the common program:
 synchronous S-curves at full speed through the same stations, each in the configuration nearest to the last
-one.
+one. Variants are mirrored, turned and jittered cells, by seed.
 """
 
 from __future__ import annotations
@@ -16,17 +17,20 @@ import argparse
 import itertools
 import time
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from _common_program import common_program
 from _program_chains import CEILING, Chains
 from _results import Claim, at_least, at_most, command_line, finish, line_of
+from _variants import variant_files
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, RequestError
 from ir_planner.settings import PlannerSettings
 
 CELL = "demo"
+VARIANTS = Path("out/variants")
 MUCH = 10  # times the default work
 SAME = 1e-2  # s: what a cycle may end before its time
 TOLERANCE = 1e-3  # of E: what two plans may differ by although the law holds
@@ -164,6 +168,7 @@ def arguments() -> argparse.Namespace:
     parser = command_line(__doc__, (CELL,), 1, "3 cycle times, 1 rival")
     parser.add_argument("--rivals", type=int, default=20, help="seeds with ten times the work; default: 20")
     parser.add_argument("--points", type=int, default=12, help="cycle times; default: 12")
+    parser.add_argument("--variants", type=int, default=0, help="of each cell besides; default: 0")
     given = parser.parse_args()
     if given.quick:
         given.points, given.rivals = min(given.points, 3), min(given.rivals, 1)
@@ -175,7 +180,8 @@ def main() -> None:
     given = arguments()
     rows: list[Row] = []
     claims: list[Claim] = []
-    for cell in given.cell or (CELL,):
+    cells = given.cell or [CELL]
+    for cell in [*cells, *variant_files(cells, given.variants, 0, VARIANTS)]:
         for seed in range(given.seeds):
             programs = Programs(cell, seed)
             points = programs.over_cycle_times(given.points)

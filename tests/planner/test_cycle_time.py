@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -17,7 +18,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner import Planner
 from ir_planner.errors import RequestError
+from ir_planner.program.bounds import Rates
 from ir_planner.program.cycle_time import Task, shared_out
+from ir_planner.program.ladder import FASTEST, LADDER, Ladder
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.standby import plan_standby
 from ir_planner.program.station_graph import Part
@@ -112,6 +115,55 @@ def test_a_front_is_convex_and_nothing_lies_below_it(fronts: list[list[tuple[flo
 def test_too_short_a_time_has_no_answer() -> None:
     values = Values([[(1.0, 100.0)], [(2.0, 100.0)]])
     assert shared_out(cast(TimeValues, values), Task(2.9, lambda left: 0.0, values.slower)) is None
+
+
+ACROSS_PART = Part(0, "across", 0, 0)
+
+
+class Rung:
+    """The movement of one part at one value, in the place of Movements."""
+
+    def __init__(self, seconds: float, joules: float) -> None:
+        self.found = invented(seconds, joules)
+        self.context = SimpleNamespace(work=SimpleNamespace(exhausted=False))
+
+    def plan(self, parts: list[Part], improvement: int) -> list[Movement]:
+        return [self.found for _ in parts]
+
+    def movement(self, part: Part) -> Movement:
+        return self.found
+
+
+class Rungs:
+    """A ladder whose movement at one rung, `poor`, takes three times the joules."""
+
+    first, improvement = 2, 0
+
+    def __init__(self, poor: int) -> None:
+        self.rungs = [
+            Rung(3.0 - 0.1 * k, (1000.0 + 50.0 * k) * (3.0 if k == poor else 1.0)) for k in range(FASTEST + 1)
+        ]
+        self.own, self.asked = self.rungs[self.first], dict[int, Movement]()
+        self.better = invented(self.rungs[poor].found.trajectory.duration, 1.0)
+
+    def at(self, rung: int) -> Rung:
+        return self.rungs[rung]
+
+    def rates(self, rung: int) -> Rates:
+        return Rates(0.0, 1.0) if rung == FASTEST else Rates(1.0, LADDER[rung])
+
+    def from_others(self, rung: int, known: dict[Part, Movement]) -> dict[Part, Movement]:
+        self.asked[rung] = known[ACROSS_PART]
+        return {ACROSS_PART: self.better}
+
+
+@pytest.mark.parametrize("poor", [1, 3, 7, FASTEST - 1])
+def test_a_poor_movement_beside_the_cycle_time_is_optimised_again_from_a_better_one(poor: int) -> None:
+    ladder = Rungs(poor)
+    values = TimeValues(cast(Ladder, ladder), [ACROSS_PART])
+    assert values.bracket(3.0 - 0.1 * poor + 0.05) == poor
+    assert ladder.asked[poor] is not ladder.rungs[poor].found
+    assert any(point.movement is ladder.better for point in values.fronts()[ACROSS_PART])
 
 
 STATIONS = ("home", "gauge_measure", "park")

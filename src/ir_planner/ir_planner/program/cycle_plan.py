@@ -72,7 +72,7 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
     if best.timed is None:
         if choice.movements.context.work.exhausted:
             raise StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
-        shortest = best.values.seconds(FASTEST)
+        shortest = best.values.shortest
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"cycle_time is {cycle_time:g} s: the shortest is {shortest + standing:.3f} s, "
@@ -118,8 +118,8 @@ def _fastest(best: _Tried, seconds: float, standing: float, progress: Progress) 
     other = _cheapest_at(FASTEST, best.choice, progress)
     if other is None or other.chain.chosen == best.choice.chain.chosen:
         return best
-    tried = _tried(other, seconds, standing, FASTEST)
-    return tried if tried.values.seconds(FASTEST) < best.values.seconds(FASTEST) else best
+    tried = _tried(other, seconds, standing, FASTEST - 1)
+    return tried if tried.values.shortest < best.values.shortest else best
 
 
 def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None:

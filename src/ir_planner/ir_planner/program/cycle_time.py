@@ -1,9 +1,10 @@
 """A program within a cycle time: the seconds there are go where they save most joules.
 
 The movements of the chain are known at several values of a second (time_values). From the fastest of all,
-parts are slowed down in the order of joules saved per second. Every stage of that is a program that ends
-early and waits, in the mode of least energy for the wait's length; the cheapest of them is the answer. What
-is left of the time is given to the next part in turn where that is cheaper than waiting.
+parts are slowed down in the order of joules saved per second; a step that takes more than the time left is
+passed over. Every stage of that is a program that ends early and waits, in the mode of least energy for the
+wait's length; the cheapest of them is the answer. What is left of the time is given to the next part in turn
+where that is cheaper than waiting.
 """
 
 from collections.abc import Callable
@@ -43,16 +44,21 @@ def shared_out(values: TimeValues, task: Task) -> Timed | None:
     """The cheapest distribution of the time over movements and wait; None where it is too short."""
     fronts = values.fronts()
     chosen = {part: front[0] for part, front in fronts.items()}
+    left = task.seconds - sum(point.seconds for point in chosen.values())
+    if left < 0.0:
+        return None
     steps = slow_downs(fronts)
-    found: list[Timed] = []
-    for count in range(len(steps) + 1):
-        left = task.seconds - sum(point.seconds for point in chosen.values())
-        if left < 0.0:
-            break
-        found += _filled(chosen, left, steps[count:], task)
-        if count < len(steps):
-            step = steps[count]
-            chosen = {**chosen, step.part: fronts[step.part][step.to]}
+    too_long: dict[Part, SlowDown] = {}  # the first step of a part that doesn't fit, and ends it
+    found = _filled(chosen, left, steps, task)
+    for k, step in enumerate(steps):
+        if step.part in too_long:
+            continue
+        if step.seconds > left:
+            too_long[step.part] = step
+            continue
+        chosen = {**chosen, step.part: fronts[step.part][step.to]}
+        left -= step.seconds
+        found += _filled(chosen, left, [*too_long.values(), *steps[k + 1 :]], task)
     found.sort(key=lambda timed: timed.energy)
     whole = [replace(timed, energy=task.spent(timed)) for timed in found[:_NEAREST]]
     return min(whole, key=lambda timed: timed.energy, default=None)

@@ -9,7 +9,6 @@ import numpy as np
 from ir_planner.program.choice import Choice
 from ir_planner.program.cycle_plan import TimedChoice, task_of
 from ir_planner.program.cycle_time import shared_out
-from ir_planner.program.ladder import FASTEST
 from ir_planner.program.request import Progress
 from ir_planner.program.time_values import TimeValues
 
@@ -26,7 +25,8 @@ def front_of(choice: Choice, count: int, standing: float, progress: Progress) ->
     work, values = choice.movements.context.work, TimeValues(choice.ladder, choice.parts)
     if work.exhausted:
         return []
-    shortest = values.seconds(FASTEST) * _FULLEST
+    values.bracket(0.0)
+    shortest = values.shortest * _FULLEST
     longest = max(2.0 * values.own_seconds + standing, shortest)
     times = np.geomspace(shortest, longest, count) if count > 1 else np.array([shortest])
     for k, seconds in enumerate(times.tolist()):

@@ -6,20 +6,38 @@ the rungs beside these they are optimised again from the best of the movements t
 which hardly change with the value, they are those of the searched rungs, slowed down.
 """
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_planner.program.movements import Movements, Near, rates_of
+from ir_planner.program.bounds import Rates
+from ir_planner.program.movements import Failure, Movements, Near, rates_of
+from ir_planner.program.station_graph import Part
+from ir_planner.request import Context
+from ir_planner.timing import Movement
 
 _LEAST = 250.0  # W: a second less of moving and more of waiting on brakes saves more than that
 _STEP = 2.0**0.5  # between two rungs: a mixture of neighbours is within about a percent of the rung between
-_RUNGS = 14  # up to 22 kW, where movements are as fast as they can be within a percent
+# up to 181 kW: from 22 kW on movements are within a percent of the fastest, but a cycle just above the
+# shortest lies there, and the last of that percent costs more than anything before
+_RUNGS = 20
 LADDER = tuple(_LEAST * _STEP**k for k in range(_RUNGS))
 FASTEST = _RUNGS  # the rung on which time alone counts
 _MIDDLE = 8  # 4 kW
-_REACH = 3.01  # rungs: paths change little over three times the value
+_REACH = 3.01  # rungs: paths change little over three times the value, and above the middle
 _SAME = 1e-6  # rungs
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Movements of parts that are known whatever was planned."""
+
+    movements: Mapping[Part, Movement]
+
+    def movement(self, part: Part) -> Movement | None:
+        """The movement of a part; None where none is known."""
+        return self.movements.get(part)
 
 
 class Ladder:
@@ -58,13 +76,30 @@ class Ladder:
         own = self.own
         if abs(rung - self._place) < _SAME:
             return own
-        if rung == FASTEST:
-            context = own.context.asking("time")
-        else:
-            asked = replace(own.context.asking("time_and_energy").options, time_value=LADDER[rung])
-            context = replace(own.context, options=asked)
         near = Near(known, self._lines(rung), self._scaling(rung))
-        return Movements(own.route, own.layers, context, own.searches, near)
+        return Movements(own.route, own.layers, self._context(rung), own.searches, near)
+
+    def _context(self, rung: int) -> Context:
+        own = self.own.context
+        if rung == FASTEST:
+            return own.asking("time")
+        asked = replace(own.asking("time_and_energy").options, time_value=LADDER[rung])
+        return replace(own, options=asked)
+
+    def rates(self, rung: int) -> Rates:
+        """What is minimised at a rung."""
+        return rates_of(self._context(rung))
+
+    def from_others(self, rung: int, known: Mapping[Part, Movement]) -> dict[Part, Movement]:
+        """Movements across at a rung, by descent from given ones; those of the parts for which one is found.
+        None where movements are not found by descent.
+        """
+        own = self.own
+        again = Movements(own.route, own.layers, self._context(rung), own.searches, Near((Kept(known),)))
+        if not again.descends:
+            return {}
+        planned = zip(known, again.plan(list(known), self.improvement), strict=True)
+        return {part: found for part, found in planned if not isinstance(found, Failure)}
 
     def _searched(self, rung: int) -> tuple[Movements, ...]:
         """Searched movements, of the nearest value first, from which those of a rung are optimised; none
@@ -76,7 +111,7 @@ class Ladder:
             places[_MIDDLE] = None
         places[self._place] = self.own
         nearest = sorted(places, key=lambda place: abs(place - rung))
-        if rung in places or abs(nearest[0] - rung) >= _REACH:
+        if rung in places or (rung < _MIDDLE and abs(nearest[0] - rung) >= _REACH):
             return ()
         searched = [place for place in nearest if np.isfinite(place)]
         return tuple(places[place] or self.at(int(place)) for place in searched)

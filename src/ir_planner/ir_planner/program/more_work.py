@@ -12,14 +12,15 @@ from dataclasses import dataclass
 
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain, layers_of
-from ir_planner.program.choice import Choice, Steps
+from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.gap import cycle_gap, free_gap
-from ir_planner.program.ladder import Ladder
+from ir_planner.program.ladder import FASTEST, Ladder
 from ir_planner.program.movements import Movements, Near, cost_of, rates_of
 from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS
+from ir_planner.program.time_values import TimeValues
 from ir_planner.request import Context, Work
 from ir_planner.service import exit_searches
 
@@ -85,7 +86,10 @@ def chosen(request: ProgramRequest, route: Route, context: Context, progress: Pr
 
 def planned(choice: Choice, progress: Progress) -> Answer:
     """The program along a chain, within the cycle time of its request."""
-    cycle, found = choice.request.cycle_time, choice.found(progress)
+    cycle = choice.request.cycle_time
+    found: Found = choice.found(progress)
+    if cycle <= 0.0 and choice.parts and choice.movements.context.options.objective == "time":
+        found = _fastest(choice, found)
     standing, steps = choice.standing(found), choice.steps(found)
     if cycle <= 0.0 or not choice.parts:
         return Answer(choice, steps, standing, free_gap(choice, found, steps))
@@ -94,6 +98,18 @@ def planned(choice: Choice, progress: Progress) -> Answer:
     spent = sum(step.report.energy for step in timed.steps) - sum(pause.report.energy for pause in pauses)
     gap = cycle_gap(timed.choice, len(timed.timed.movements), spent, timed.bound)
     return Answer(choice, timed.steps, standing, gap)
+
+
+def _fastest(choice: Choice, found: Found) -> Found:
+    """The movements of a chain, or faster ones by descent for values at which joules hardly count: within a
+    cycle time these are known too.
+    """
+    movements = choice.movements
+    if not movements.descends or movements.context.work.exhausted:
+        return found
+    values = TimeValues(choice.ladder, choice.parts)
+    values.bracket(0.0, FASTEST - 1)
+    return values.fastest
 
 
 def _again(

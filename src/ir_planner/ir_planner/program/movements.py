@@ -4,6 +4,7 @@ program makes it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
@@ -44,14 +45,21 @@ class Failure:
     status: Status
 
 
+class Known(Protocol):
+    """Movements that were found before."""
+
+    def movement(self, part: Part) -> Movement | None:
+        """The movement of a part that was planned; None where none was found."""
+
+
 @dataclass(frozen=True, eq=False)
 class Near:
     """Known movements from which others are made, instead of searched: across, by descent from the best of
     those of `across`; along service lines, those of `lines` slowed down, or by descent from those of
-    `scaling`.
+    `scaling`. Those of them that can plan do so first.
     """
 
-    across: tuple["Movements", ...] = ()
+    across: tuple[Known, ...] = ()
     lines: tuple["Movements", ...] = ()
     scaling: "Movements | None" = None
 
@@ -70,8 +78,9 @@ class Movements:
         near: Near | None = None,
     ) -> None:
         self.route, self.layers, self.context, self.searches = route, layers, context, searches
-        plain = context.options.planner_id == "" and context.options.timing == "synchronous"
-        self._near = near if near is not None and plain else Near()
+        # whether movements may be made from known ones by descent
+        self.descends = context.options.planner_id == "" and context.options.timing == "synchronous"
+        self._near = near if near is not None and self.descends else Near()
         self._found: dict[Key, Movement | Failure] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
@@ -88,7 +97,7 @@ class Movements:
         near, lines = self._near, [part for part in new.values() if part.kind != ACROSS]
         for known in (*near.lines, *([near.scaling] if near.scaling else [])):
             known.plan(lines, improvement)
-        for known in near.across:
+        for known in (each for each in near.across if isinstance(each, Movements)):
             known.plan([part for part in new.values() if part.kind == ACROSS], improvement)
         planned = self._shared(list(new.values()), improvement)
         for key, found in zip(new, planned, strict=True):
@@ -189,6 +198,6 @@ class Movements:
         return same if same is not None and same.cost < found.cost else found
 
 
-def _known(those: Sequence[Movements | None], part: Part) -> list[Movement]:
+def _known(those: Sequence[Known | None], part: Part) -> list[Movement]:
     """The movements of a part among those that were planned."""
     return [known for one in those if one is not None and (known := one.movement(part)) is not None]

@@ -2,10 +2,13 @@
 
 What a second is worth decides how fast a movement is: planned at the same value, all movements of a program
 trade seconds for joules at the same rate, which is the best distribution of the time there is.
+
+A movement of one value may be in a poorer local minimum than that of another: near the cycle time that is
+asked for, such a one is optimised again from the better one.
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +17,10 @@ from ir_planner.program.bounds import Rates
 from ir_planner.program.ladder import FASTEST, Ladder
 from ir_planner.program.movements import Failure, Movements, cost_of
 from ir_planner.program.request import StageError
-from ir_planner.program.station_graph import Part
+from ir_planner.program.station_graph import ACROSS, Part
 from ir_planner.timing import Movement
+
+_POOR = 1e-3  # of the cost at a value: a movement that costs more than another one by that is optimised again
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +36,10 @@ class Point:
         """The point of a movement."""
         report = movement.report
         return Point(movement, movement.trajectory.duration, cost_of(report, Rates(1.0, 0.0)))
+
+    def cost(self, rates: Rates) -> float:
+        """What it costs by other rates."""
+        return rates.joule * self.joules + rates.second * self.seconds
 
 
 @dataclass(frozen=True)
@@ -50,6 +59,7 @@ class TimeValues:
         self.ladder, self.parts = ladder, tuple(parts)
         self._points: dict[Part, list[Point]] = {part: [] for part in self.parts}
         self._seconds: dict[int, float] = {}
+        self._exchanged: set[tuple[int, Part]] = set()
         self._own_seconds = self._take(ladder.own)
 
     def seconds(self, rung: int) -> float:
@@ -57,6 +67,16 @@ class TimeValues:
         if rung not in self._seconds:
             self._seconds[rung] = self._take(self.ladder.at(rung))
         return self._seconds[rung]
+
+    @property
+    def shortest(self) -> float:
+        """How long the fastest movements take that are known [s]."""
+        return sum(min(point.seconds for point in points) for points in self._points.values())
+
+    @property
+    def fastest(self) -> dict[Part, Movement]:
+        """The fastest movements that are known."""
+        return {part: min(points, key=lambda p: p.seconds).movement for part, points in self._points.items()}
 
     @property
     def own_seconds(self) -> float:
@@ -93,7 +113,25 @@ class TimeValues:
             middle = (slow + fast) // 2
             slow, fast = (middle, fast) if self.seconds(middle) > seconds else (slow, middle)
         self.seconds(fast)
+        self._exchange(rung for rung in (slow, fast) if rung in self._seconds)
         return fast
+
+    def _exchange(self, rungs: Iterable[int]) -> None:
+        """Movements that cost more at a rung than one of another value does are optimised again from it."""
+        ladder = self.ladder
+        for rung in rungs:
+            rates, poor = ladder.rates(rung), dict[Part, Movement]()
+            for part, points in self._points.items():
+                own = ladder.at(rung).movement(part)
+                best = min(points, key=lambda point: point.cost(rates))
+                if own is None or part.kind != ACROSS or (rung, part) in self._exchanged:
+                    continue
+                if best.cost(rates) < (1.0 - _POOR) * Point.of(own).cost(rates):
+                    poor[part] = best.movement
+            self._exchanged.update((rung, part) for part in poor)
+            if poor and not ladder.own.context.work.exhausted:
+                for part, found in ladder.from_others(rung, poor).items():
+                    self._points[part].append(Point.of(found))
 
     def least(self, value: float) -> float:
         """What the chain costs at a value of a second [W], by all movements that are known."""
