@@ -233,3 +233,17 @@ def test_an_error_of_the_drivers_own_is_answered_and_logged_once(caplog: pytest.
     finally:
         server.close()
     assert [record.exc_info[0] for record in caplog.records if record.exc_info] == [ZeroDivisionError]
+
+
+def test_what_the_event_loop_complains_of_is_not_logged(caplog: pytest.LogCaptureFixture) -> None:
+    """Without descriptors it would be a traceback each second."""
+    server = ModbusServer("127.0.0.1", 0, Wall())
+    try:
+        complaint = {"message": "socket.accept() out of system resource", "exception": OSError(24, "full")}
+        server._loop.call_soon_threadsafe(server._loop.call_exception_handler, complaint)
+        with connected(server.port) as link:  # heard after the complaint
+            link.sendall(frame(struct.pack(">BHH", 3, 0, 2)))
+            assert received(link, 13)[7:] == bytes.fromhex("03 04 0007 0008")
+    finally:
+        server.close()
+    assert caplog.records == []

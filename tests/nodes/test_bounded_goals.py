@@ -11,7 +11,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint, MultiDOFJointTrajectoryPoi
 
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py.ros.quality import ACTION_SERVICES
-from ir_sim_driver.node import SimDriver, bounded_goals
+from ir_sim_driver.node import SimDriver, bounded_goals, node
 
 MOST = 10
 
@@ -55,12 +55,14 @@ def test_beyond_it_all_but_the_points_are_there(points: int, multi_dof: int) -> 
     assert request.goal == goal(0)
 
 
-def test_the_driver_refuses_it_with_the_count(
-    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+def test_the_driver_refuses_it_with_the_count_and_forgets_it_soon(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    assert node._RESULT_KEPT <= 60
+    monkeypatch.setattr(node, "_RESULT_KEPT", 1)
     overrides = [Parameter("cell", value="open"), Parameter("backend", value="ideal")]
     overrides += [Parameter("wake_port", value=0), Parameter("execution.max_points", value=MOST)]
-    ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+    driver = ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
     client = ros_executor.run(
         lambda: ActionClient(
             ros_node, ExecuteTrajectory, "/ir_sim_driver/execute_trajectory", **ACTION_SERVICES
@@ -74,3 +76,4 @@ def test_the_driver_refuses_it_with_the_count(
     answer = result.result().result
     assert answer.error_code == ExecuteTrajectory.Result.INVALID_GOAL
     assert f"the trajectory has 3000 points: at most {MOST}" in answer.error_string
+    wait_for(lambda: not driver._actions[0]._goal_handles, what="goal and result are forgotten")
