@@ -55,6 +55,9 @@ def test_insecure_leaves_ros_s_own_variables() -> None:
     assert RANGE not in variables
     assert removed == ()
     assert set(CHOICES) == {"loopback", "secure", "insecure"}
+    assert "fast_discovery.xml" in variables[PROFILES]
+    own = {"IR_NETWORK": "insecure", PROFILES: "/my/own.xml"}
+    assert network_variables(own) == ({}, ())
 
 
 NODE = """

@@ -16,6 +16,7 @@ from ir_description import load_cell
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.clock_guard import heed_times_only
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
@@ -114,6 +115,17 @@ def test_before_the_clock_starts_nothing_passes_and_then_the_grid_begins(driver,
     wait_for(lambda: len(stamps) > 300)
     assert stamps[0] >= 1_000 * NS
     assert set(gaps(stamps[:300])) == {PERIOD}
+
+
+def test_times_that_are_none_are_ignored(driver, ros_executor, clock, stamps, wait_for):
+    ros_executor.run(lambda: heed_times_only(driver))
+    clock.start(-5 * NS)  # it passes 1970 after a while
+    clock.run_at(20.0)
+    wait_for(lambda: clock.now > NS)
+    clock.run_at(1.0)
+    wait_for(lambda: len(stamps) > 50)
+    assert min(stamps) > 0
+    ros_executor._raise_failure()
 
 
 def test_a_frozen_clock_freezes_the_plant_and_nothing_is_skipped_after(

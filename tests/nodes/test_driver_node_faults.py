@@ -21,7 +21,7 @@ from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.node import SimDriver
+from ir_sim_driver.node import SimDriver, node
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -232,6 +232,19 @@ def test_a_cancelled_goal_comes_back_canceled(client, ros_node, wait_for):
     run(lambda: handles[0].cancel_goal_async())  # after the end: harmless
     run(action.destroy)
     assert client.ask(names.QUERY_MODES, QueryModes.Request()).modes
+
+
+def test_a_log_gets_so_many_lines_a_second_and_no_more(driver, client, wait_for, monkeypatch):
+    lines = []
+    monkeypatch.setattr(driver, "_log", lines.append)
+
+    def chatter():
+        for k in range(150):
+            driver._driver.warn(f"line {k}")
+
+    client._executor.run(chatter)
+    wait_for(lambda: any("more messages" in line.sentence for line in list(lines)))
+    assert len(lines) <= 2 * node._LINES_MAX  # the second may end meanwhile
 
 
 @pytest.mark.parametrize("factor", [float("nan"), -1.0, float("inf"), 10.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import threading
@@ -11,12 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from builtin_interfaces.msg import Time
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 
 from ir_cli.nodes import cell_nodes
 from ir_cli.processes import NodeProcesses
 from ir_msgs.srv import CheckState, QueryModes, SetCell, StartRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import CallTimedOutError, ServiceUnavailableError
+from ir_msgs_py.namespaces import NODES
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.status import StatusCode
 from ir_recorder.read.raw import read_raw
@@ -119,6 +124,31 @@ def test_a_planner_that_is_killed_in_set_cell_is_a_sentence_and_the_next_one_ans
     nodes.stop()
     nodes.start(planner)
     wait_for(lambda: client.set_cell("demo"), timeout=START_SECONDS)
+
+
+def test_a_clock_of_times_that_are_none_ends_no_node(
+    nodes: NodeProcesses, client: Client, wait_for: Any
+) -> None:
+    """A node whose callbacks fail fifty times in a minute ends."""
+    simulated = {"use_sim_time": True}
+    driver = {"wake_port": 0, "backend": "ideal", **simulated}
+    nodes.start(cell_nodes("open", driver=driver, planner=simulated, runner=simulated, recorder=simulated))
+    clock = client._executor.run(lambda: client.node.create_publisher(Clock, "/clock", 10))
+    wait_for(lambda: clock.get_subscription_count() == len(NODES), timeout=START_SECONDS)
+    for _ in range(200):
+        clock.publish(Clock(clock=Time(sec=-(2**31))))
+        wait_for(clock.wait_for_all_acked)
+    states: list[Any] = []
+    client.subscribe(names.JOINT_STATES, JointState, states.append)
+    hundredths = itertools.count(10_000)
+
+    def goes_on() -> bool:
+        seconds, rest = divmod(next(hundredths), 100)
+        clock.publish(Clock(clock=Time(sec=seconds, nanosec=10_000_000 * rest)))
+        return len(states) > 100
+
+    wait_for(goes_on, timeout=START_SECONDS, what="the plant follows a time that is one")
+    nodes.check()
 
 
 def test_a_recorder_that_is_killed_leaves_a_file_that_can_be_read(

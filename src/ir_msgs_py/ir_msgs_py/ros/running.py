@@ -23,6 +23,7 @@ from rclpy.node import Node
 
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import ParameterError
+from ir_msgs_py.ros.clock_guard import heed_times_only
 from ir_msgs_py.ros.command_line import CommandLineError, answer_before_start, init_ros
 from ir_msgs_py.ros.network import apply_network
 
@@ -123,6 +124,7 @@ def spin(
 ) -> None:
     """Spin to the end; what a callback raises is logged, and ends the node only when it comes too often."""
     failures: deque[float] = deque(maxlen=FAILURES_MAX)
+    heed_times_only(node)
     while True:
         try:
             return spinning.run(executor, goes_on, look)
