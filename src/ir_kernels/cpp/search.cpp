@@ -10,6 +10,7 @@ namespace {
 // Chosen by benchmarks/search.py on the bundled cells.
 constexpr int batch = 16;            // targets of a round
 constexpr int joined = 8;            // new nodes of a round that are joined, the nearest to the other tree
+constexpr int between_joined = 4;    // configurations of a join that are looked at before it is certified
 constexpr double step = 0.7;         // longest extension, weighted rad
 constexpr double kept = 0.9;         // how much of the proved part of a blocked edge is used
 constexpr double shortest = 0.02;    // weighted rad: parts that are shorter aren't worth a node
@@ -187,8 +188,26 @@ void BidirectionalSearch::extend() {
   std::stable_sort(tried_.begin(), tried_.end(),
                    [](const Candidate& a, const Candidate& b) { return a.length < b.length; });
   if (tried_.size() > joined) tried_.resize(joined);
+  push_joins();
+}
+
+// What waits to be joined; where a configuration in between isn't free it is dropped at once, like an extension.
+void BidirectionalSearch::push_joins() {
+  SearchTree &here = trees_[growing_], &there = trees_[1 - growing_];
+  ends_.clear();
+  for (const Candidate& c : tried_) {
+    const double *a = there.node(c.from), *b = here.node(c.to);
+    for (int k = 1; k <= between_joined; ++k)
+      for (int j = 0; j < n_; ++j) ends_.push_back(a[j] + k / (between_joined + 1.0) * (b[j] - a[j]));
+  }
+  bool free[joined * between_joined];
+  const std::size_t looked = tried_.size() * between_joined;
+  states_.look(ends_.data(), looked, free);
+  owed_ += (looked + batch - 1) / batch;
   prepare(Phase::join);
-  for (const Candidate& c : tried_) push(there.node(c.from), here.node(c.to), c);
+  for (std::size_t k = 0; k < tried_.size(); ++k)
+    if (std::all_of(free + k * between_joined, free + (k + 1) * between_joined, [](bool is_free) { return is_free; }))
+      push(there.node(tried_[k].from), here.node(tried_[k].to), tried_[k]);
 }
 
 void BidirectionalSearch::join() {

@@ -1,8 +1,9 @@
 // Two trees that grow from start and goals towards each other over certified edges.
 //
 // J. Kuffner, S. LaValle, "RRT-Connect", ICRA 2000, in batches of one register of lanes: the smaller tree draws
-// targets, goes one step towards each of them, and every new node is joined with the nearest of the other tree, as far
-// as the path is proved. Most targets lie near nodes or between start and goal, which is what finds narrow passages.
+// targets, goes one step towards each of them, and new nodes are joined with the nearest of the other tree, as far as
+// the path is proved, unless a few configurations in between already say that it is blocked. Most targets lie near nodes
+// or between start and goal, which is what finds narrow passages.
 //
 // Work is counted in certified edges, and sixteen configurations that are only looked at count as one. What is found
 // does not depend on how the work is divided into calls.
@@ -63,6 +64,7 @@ class BidirectionalSearch {
   void draw();
   void target(double* q);
   void extend();
+  void push_joins();
   void join();
   void confirm(int at_start, int at_goal);
   bool confirmed();

@@ -15,6 +15,7 @@ from ir_msgs_py.arrays import FloatArray
 
 BATCH = 16  # targets of a round, and configurations looked at for the price of an edge
 JOINED = 8  # new nodes of a round that are joined, the nearest to the other tree
+BETWEEN_JOINED = 4  # configurations of a join that are looked at before it is certified
 STEP = 0.7  # longest extension, weighted rad
 KEPT = 0.9  # how much of the proved part of a blocked edge is used
 SHORTEST = 0.02  # weighted rad: parts that are shorter aren't worth a node
@@ -211,6 +212,7 @@ class Search:
         if pairs and pairs[0][1] < self._gap:
             ends = [here.nodes[pairs[0][2]], there.nodes[pairs[0][0]]]
             self._gap, self._gap_ends = pairs[0][1], np.array(ends if side == 0 else ends[::-1])
+        pairs = yield from self._maybe_free(pairs, here, there)
         steps = [(there.nodes[other], here.nodes[mine]) for other, _, mine in pairs]
         verdict, share = yield from self._certified(steps)
         free = [(mine, other) for (other, _, mine), v in zip(pairs, verdict, strict=True) if v == FREE]
@@ -219,6 +221,19 @@ class Search:
                 if part * length >= SHORTEST:
                     there.add(q0 + part * (q1 - q0), other)
         return free
+
+    def _maybe_free(self, pairs: list[tuple[int, float, int]], here: Tree, there: Tree) -> Work:
+        """The pairs without those whose movement isn't free at a place in between: dropped at once, like
+        extensions.
+        """
+        if not pairs:
+            return []
+        shares = np.arange(1, BETWEEN_JOINED + 1)[:, None] / (BETWEEN_JOINED + 1.0)
+        ends = [(there.nodes[other], here.nodes[mine]) for other, _, mine in pairs]
+        between = np.concatenate([a + shares * (b - a) for a, b in ends])
+        yield -(-len(between) // BATCH)
+        free = self._model.is_free(between, self._threshold).reshape(len(pairs), -1).all(axis=1)
+        return [pair for pair, is_free in zip(pairs, free, strict=True) if is_free]
 
     def _confirmed(self, at_start: int, at_goal: int) -> Work:
         """Whether every step of a path is proved as it will be driven; what isn't is cut off."""
