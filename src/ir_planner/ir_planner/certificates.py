@@ -35,13 +35,14 @@ def in_scene(scene: PlanningScene) -> Stamp:
         if trajectory is None:
             return report
         within = interval(report.energy, movement_spread(trajectory, scene))
-        report = replace(
+        return replace(
             report,
             energy_low=within.low,
             energy_high=within.high,
             power_parameters=scene.parameters.name,
+            cell_hash=scene.cell_hash if report.certified else report.cell_hash,
+            load=scene.load_text if report.certified else report.load,
         )
-        return stamped(report, scene.cell_hash, scene.load_text)
 
     return stamp
 

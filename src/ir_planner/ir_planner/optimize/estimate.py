@@ -46,7 +46,7 @@ def first_looks(paths: list[FloatArray], refinement: Refinement, evaluations: in
     splines = [UniformSpline(each.control, each.interval) for each in found]
     for each, spline in zip(found, splines, strict=True):
         work.spend(int(np.ceil(each.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
-    return [replace(begin, spline=s, cost=each.value) for s, each in zip(splines, found, strict=True)]
+    return [begin.ended(spline, each.value) for spline, each in zip(splines, found, strict=True)]
 
 
 def estimate(paths: list[FloatArray], refinement: Refinement) -> Solution:

@@ -23,8 +23,10 @@ from ir_planner.timing import Movement, straight_steps
 
 _BETTER = 0.99  # share of the cost below which an alike path replaces another
 _FIRST_LOOK = 12  # evaluations from every guess
-_FOLLOWED = 6  # guesses that are followed further
+_FOLLOWED, _FOLLOWING = 7, 25  # guesses that are followed further, and for how many evaluations
+_PROMISING = 3  # of these, the cheapest: they get as many as a free path
 _OUT_OF_REACH = 1.25  # times the cost of the best: coarse solutions above are not refined
+Look = tuple[Solution, FloatArray]  # a coarse solution, and the guess (M, n) that it came from
 
 
 @dataclass(eq=False)
@@ -68,20 +70,27 @@ class Portfolio:
         return True
 
     def descend(self, method: str, guesses: list[FloatArray], worth: float = np.inf) -> int:
-        """Optimise guesses (M, n), which need not be free: all of them a little, then the cheapest that
-        differ as far as free paths are, if they cost less than `worth` times the best candidate; the number
-        of them that are new.
+        """Optimise guesses (M, n), which need not be free: all of them a little; then the cheapest that
+        differ, if they cost less than `worth` times the best candidate; and the cheapest of these as far as
+        free paths are. The number of them that are new.
         """
         looks = list(zip(first_looks(guesses, self.refinement, _FIRST_LOOK), guesses, strict=True))
         if self.candidates and np.isfinite(worth):
             most = worth * self.candidates[0].solution.cost
             looks = [look for look in looks if look[0].cost < most]
         looks.sort(key=lambda look: look[0].cost)
-        new = 0
-        for look, guess in first_different(looks, _FOLLOWED, COARSE, lambda look: look[0].places):
-            solution = self.refinement.coarse_from(look.spline, guess, QUICK.coarse)
-            new += self._take(Candidate(method, solution.spline.knots()[0], solution))
-        return new
+        followed, left = first_different(looks, _FOLLOWED, COARSE, lambda look: look[0].places), QUICK.coarse
+        if len(followed) > _PROMISING:
+            followed = sorted(self._further(followed, _FOLLOWING), key=lambda look: look[0].cost)
+            left -= _FOLLOWING
+        followed[:_PROMISING] = self._further(followed[:_PROMISING], left)
+        found = [Candidate(method, solution.spline.knots()[0], solution) for solution, _ in followed]
+        return sum(self._take(candidate) for candidate in found)
+
+    def _further(self, looks: list[Look], evaluations: int) -> list[Look]:
+        """The same after a descent more."""
+        coarse = self.refinement.coarse_from
+        return [(coarse(solution.spline, guess, evaluations), guess) for solution, guess in looks]
 
     def adopt(self, other: "Portfolio") -> int:
         """Optimise the candidates of another objective at the requested duration; how many are new."""

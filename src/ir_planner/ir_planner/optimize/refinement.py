@@ -48,11 +48,8 @@ _TIGHTENINGS = 4  # of the limits, where a motion of requested duration exceeds 
 _TIGHTENED = 100  # evaluations after each
 _TIGHTEST = 0.85  # share of the limits' speed, and of torque
 _TIGHTER = 0.999  # than what was exceeded
-SPEED_MARGINS = (
-    0.9995,
-    0.95,
-    0.9,
-)  # shares of the speed tried where a duration is requested, until it is met
+# shares of the speed tried where a duration is requested, until it is met
+SPEED_MARGINS = (0.9995, 0.95, 0.9)
 _ROUNDING = 1e-9  # relative
 _STIFFER = 10.0  # penalties where a duration is requested: a second may be worth much more than usual
 _LEAST_COST = 1.0  # J: of a movement that takes next to nothing
@@ -74,6 +71,10 @@ class Solution:
     kept: FloatArray
     speed: float = 1.0
     torque: float = TORQUE_SHARES[0]
+
+    def ended(self, spline: UniformSpline, cost: float) -> "Solution":
+        """Where its descent came to."""
+        return Solution(spline, self.stage, cost, self.kept, self.speed, self.torque)
 
     @cached_property
     def places(self) -> FloatArray:
@@ -234,7 +235,7 @@ class Refinement:
         work.spend(int(np.ceil(found.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
         # a spline stays within the range of its control points
         control = np.minimum(np.maximum(found.control, robot.position_min), robot.position_max)
-        return replace(solution, spline=UniformSpline(control, found.interval), cost=found.value)
+        return solution.ended(UniformSpline(control, found.interval), found.value)
 
     def cost(self, solution: Solution, path: FloatArray) -> SplineCost:
         """What a solution on a path (M, n) is optimised for."""
@@ -251,10 +252,10 @@ class Refinement:
             self._costs[key] = cost
         return cost
 
-    def _rows(self, spline: UniformSpline) -> RowArray:
-        """Which thresholds hold in each interval: the station's where the tcp stays in the zone."""
+    def _rows(self, spline: UniformSpline) -> RowArray | None:
+        """Which row of thresholds holds in each interval: the station's in its zone; None: there is one."""
         if len(self._kept) == 1:
-            return np.zeros(spline.intervals, np.int32)
+            return None
         context = self.context
         q, _, _ = spline.samples(_ZONE_SAMPLES)
         inside = tcp_inside(q, context.scene, context.station, context.safety_distance)

@@ -9,7 +9,7 @@ from ir_planner.timing import lasting_longer
 
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
 _ROUNDS = 25
-_PLAIN = 8  # rounds as if all of the torque fell with the speed: nearly always enough
+_PLAIN = 3  # rounds as if all of the torque fell with the speed: enough unless weight takes much of it
 _CREEPING = 1e-6  # of the speed: weight and dry friction are left of the torque
 _BELOW = 1.0005  # a little slower than asked for, so that few rounds end it
 

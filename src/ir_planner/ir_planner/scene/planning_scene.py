@@ -75,7 +75,7 @@ class PlanningScene:
     def dynamics(self) -> DynamicsModel:
         """Dynamics with the loads."""
         drives = self.drives
-        return DynamicsModel(drives.robot(self.cell.robot), drives.loads(self.loads), self.cell.base_pose)
+        return DynamicsModel(drives.robot(self.cell.robot), self._attached, self.cell.base_pose)
 
     @cached_property
     def collision(self) -> CollisionModel:
@@ -123,9 +123,14 @@ class PlanningScene:
 
     def tool_watts(self, *, drive_bus: bool) -> float:
         """Watts of what is attached, with its share of the drive bus where that is up."""
-        loads = self.drives.loads(self.loads)
+        loads = self._attached
         bus = sum(load.watts_drive_bus for load in loads) if drive_bus else 0.0
         return sum(load.watts_always for load in loads) + bus
+
+    @cached_property
+    def _attached(self) -> tuple[Load, ...]:
+        """The loads with the masses and watts of the parameters."""
+        return self.drives.loads(self.loads)
 
     @cached_property
     def parameters(self) -> PowerParameters:

@@ -58,6 +58,8 @@ def polynomials_between(
 ) -> tuple[FloatArray, FloatArray]:
     """Coefficients (S, n, 6) and durations (S,) of the part of a trajectory between two times [s]."""
     coefficients, durations = trajectory.coefficients()
+    if begin <= trajectory.times[0] and end >= trajectory.times[-1]:
+        return coefficients, durations
     starts = trajectory.times[:-1]
     first = np.clip(begin - starts, 0.0, durations)
     last = np.clip(end - starts, 0.0, durations)

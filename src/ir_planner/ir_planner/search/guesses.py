@@ -43,7 +43,9 @@ def guesses(
 ) -> list[FloatArray]:
     """Paths (M, n) from start to goal (n,) within the limits low, high (n,); park (n,): the arm well back."""
     paths = [*_over_park(start, goal, park), *_bulges(start, goal), np.stack([start, goal])]
-    return [np.clip(path, low, high) for path in paths]
+    ends = np.cumsum([len(path) for path in paths])
+    within = np.clip(np.concatenate(paths), low, high)
+    return [within[end - len(path) : end] for path, end in zip(paths, ends, strict=True)]
 
 
 def _over_park(start: FloatArray, goal: FloatArray, park: FloatArray) -> Iterator[FloatArray]:

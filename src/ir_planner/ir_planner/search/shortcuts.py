@@ -27,14 +27,12 @@ def fewest_corners(
     free = np.full((count, count), False)
     free[first, last] = space.edges_free(points[first], points[last])
     free[np.arange(count - 1), np.arange(1, count)] = True  # steps of the path itself
-    corner = _CORNER * float(movement_cost(weights, points[0], points[-1]))
-    cost = np.full(count, np.inf)
-    cost[0] = 0.0
+    steps = movement_cost(weights, points[:, None], points[None])
+    steps = np.where(free, steps + _CORNER * steps[0, -1], np.inf)
+    cost = np.zeros(count)
     came = np.zeros(count, dtype=int)
     for k in range(1, count):
-        through = np.where(
-            free[:k, k], cost[:k] + movement_cost(weights, points[:k], points[k]) + corner, np.inf
-        )
+        through = cost[:k] + steps[:k, k]
         came[k] = int(np.argmin(through))
         cost[k] = through[came[k]]
     chosen = [count - 1]
