@@ -35,7 +35,7 @@ from ir_description import (
     load_robot,
 )
 from ir_description.arrays import solid_box_inertia
-from ir_description.cell import ZONE_KINDS, station_at, zone_around
+from ir_description.cell import ZONE_KINDS, StationSearch, station_at, zone_around
 from ir_description.poses import (
     abc_from_rotation,
     pose_of,
@@ -124,7 +124,9 @@ def machines(draw: st.DrawFn, name: str) -> tuple[Equipment, tuple[Station, ...]
     )
     contacts = (AllowedContact("gear_held", own[0].name, draw(st.floats(0.0, 1.0))),)
     approach = draw(st.floats(0.0, 5.0))
-    return machine, (station_at(machine, f"at_{name}", draw(poses()), contacts, approach),)
+    ccd = st.builds(StationSearch, st.just("ccd"), st.integers(1, 10_000), st.sampled_from(["", "tree"]))
+    search = draw(st.just(StationSearch()) | st.just(StationSearch(withdrawal="modified_ga")) | ccd)
+    return machine, (station_at(machine, f"at_{name}", draw(poses()), contacts, approach, search),)
 
 
 @st.composite
@@ -169,7 +171,9 @@ def cells(draw: st.DrawFn) -> Cell:
         program=(
             ProgramStep("POSTURE", "home", set_signals=(Signal("ask"),)),
             ProgramStep("STATION", stations[0].name, draw(st.floats(0.0, 10.0)), attach="gear"),
-            ProgramStep("STATION", stations[-1].name, detach="gear", wait_for=(Signal("open", False),)),
+            ProgramStep(
+                "STATION", stations[-1].name, detach="gear", wait_for=(Signal("open", False),), planner="tree"
+            ),
             ProgramStep("PAUSE", dwell=draw(st.floats(0.1, 1000.0)), power_mode="AUTO"),
         ),
         tasks=(Task("there and back", ROBOT.machine_home, posture),),

@@ -228,7 +228,12 @@ def _moved(station: Station, machine: Equipment) -> Station:
     if station.equipment != machine.name:
         return station
     return station_at(
-        machine, station.name, station.pose_in_equipment, station.allowed_contacts, station.approach_distance
+        machine,
+        station.name,
+        station.pose_in_equipment,
+        station.allowed_contacts,
+        station.approach_distance,
+        station.search,
     )
 
 

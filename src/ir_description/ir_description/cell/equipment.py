@@ -22,6 +22,9 @@ APPROACH_MAX = 5.0
 """Longest approach [m]."""
 ZONE_MAX = 10.0 * SIZE_MAX
 """Largest edge [m] of a zone: it holds bodies far apart."""
+CONFIGURATION_SEARCHES = ("analytic", "ccd")
+STARTS_MAX = 10_000
+"""Most random starts of a search for configurations."""
 SWITCH_MAX = 3600.0
 """Longest change of a machine's state [s]."""
 
@@ -176,6 +179,25 @@ class AllowedContact:
             raise InvalidValueError(f"an allowed contact pairs {self.body_a} with itself")
 
 
+@dataclass(frozen=True)
+class StationSearch:
+    """How a program finds the configurations at a station and the path out of it.
+
+    configurations: "analytic" for all of the closed form, "ccd" for those that cyclic coordinate descent
+    finds from `starts` random starts. withdrawal: the search that finds the path out even where a straight
+    line is free; "": a straight line where that is free.
+    """
+
+    configurations: str = CONFIGURATION_SEARCHES[0]
+    starts: int = 32
+    withdrawal: str = ""
+
+    def __post_init__(self) -> None:
+        in_range(self.starts, 1, STARTS_MAX, "", "starts")
+        if self.configurations not in CONFIGURATION_SEARCHES:
+            raise UnknownNameError("search for configurations", self.configurations, CONFIGURATION_SEARCHES)
+
+
 @dataclass(frozen=True, eq=False)
 class Station:
     """Where the tool works: pose (4, 4) of the tcp in the WORLD, and the same in its machine's frame.
@@ -191,6 +213,7 @@ class Station:
     pose_in_equipment: FloatArray
     allowed_contacts: tuple[AllowedContact, ...] = ()
     approach_distance: float = 0.0
+    search: StationSearch = StationSearch()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
@@ -206,6 +229,7 @@ def station_at(
     pose_in_equipment: FloatArray,
     allowed_contacts: tuple[AllowedContact, ...] = (),
     approach_distance: float = 0.0,
+    search: StationSearch = StationSearch(),
 ) -> Station:
     """Return a station of a machine from its pose (4, 4) in the machine's frame."""
     return Station(
@@ -216,4 +240,5 @@ def station_at(
         pose_in_equipment=pose_in_equipment,
         allowed_contacts=allowed_contacts,
         approach_distance=approach_distance,
+        search=search,
     )

@@ -50,7 +50,7 @@ class ProgramStep:
 
     dwell [s] after arrival, or the length of a pause. attach and detach name a part ("" for none).
     power_mode is one of PAUSE_POWER_MODES for a pause and "" otherwise; AUTO leaves the choice to whoever
-    plans.
+    plans. planner: which search looks for the regional movement to the target, "": as the request says.
     """
 
     kind: StepKind
@@ -61,6 +61,7 @@ class ProgramStep:
     wait_for: tuple[Signal, ...] = ()
     set_signals: tuple[Signal, ...] = ()
     power_mode: str = ""
+    planner: str = ""
 
     def __post_init__(self) -> None:
         in_range(self.dwell, 0.0, PAUSE_MAX, "s", "dwell")
@@ -76,6 +77,8 @@ class ProgramStep:
             )
         if self.kind != "PAUSE" and self.power_mode:
             raise InvalidValueError("only a pause has a power mode")
+        if self.kind == "PAUSE" and self.planner:
+            raise InvalidValueError("a pause has no planner")
         if self.kind != "STATION" and (self.attach or self.detach):
             raise InvalidValueError("parts are attached and detached at stations only")
         if self.attach and self.detach:

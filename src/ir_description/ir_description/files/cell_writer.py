@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from ir_description.cell import (
+    CONFIGURATION_SEARCHES,
     Cell,
     CellSignal,
     Equipment,
@@ -149,6 +150,12 @@ def _station(station: Station) -> Iterator[str]:
     yield f"name: {station.name}"
     yield f"pose: {{{_pose(station.pose_in_equipment)}}}"
     yield f"approach_distance: {_number(station.approach_distance)}"
+    search = station.search
+    if search.configurations != CONFIGURATION_SEARCHES[0]:
+        yield f"configurations: {search.configurations}"
+        yield f"starts: {search.starts}"
+    if search.withdrawal:
+        yield f"withdrawal: {search.withdrawal}"
     yield from _block(
         "allowed_contacts",
         (
@@ -171,6 +178,8 @@ def _step(step: ProgramStep) -> str:
         fields.append(f"{step.kind.lower()}: {step.target}")
         if step.dwell:
             fields.append(f"dwell: {_number(step.dwell)}")
+        if step.planner:
+            fields.append(f"planner: {step.planner}")
     for key, part in (("attach", step.attach), ("detach", step.detach)):
         if part:
             fields.append(f"{key}: {part}")

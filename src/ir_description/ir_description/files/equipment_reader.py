@@ -10,6 +10,8 @@ import numpy as np
 from ir_description.cell import (
     APPROACH_MAX,
     BODIES_MAX,
+    CONFIGURATION_SEARCHES,
+    STARTS_MAX,
     SWITCH_MAX,
     ZONE_KINDS,
     ZONE_MAX,
@@ -18,6 +20,7 @@ from ir_description.cell import (
     EquipmentState,
     StateSwitch,
     Station,
+    StationSearch,
     Zone,
     station_at,
     zone_around,
@@ -26,6 +29,8 @@ from ir_description.files.body_reader import POSE_KEYS, BodyReader, pose_in, rea
 from ir_description.files.items import Item, Table
 from ir_description.shapes import Body
 from ir_msgs_py.arrays import FloatArray
+
+_SEARCH_KEYS = ("configurations", "starts", "withdrawal")
 
 
 def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tuple[Item, Station]]]:
@@ -105,7 +110,7 @@ def _switch(item: Item, states: tuple[EquipmentState, ...]) -> StateSwitch:
 
 
 def _station(item: Item, machine: Equipment) -> Station:
-    table = item.table(("name", "pose"), ("approach_distance", "allowed_contacts"))
+    table = item.table(("name", "pose"), ("approach_distance", "allowed_contacts", *_SEARCH_KEYS))
     contacts = table["allowed_contacts"].list(0, 1000) if "allowed_contacts" in table else []
     approach = table.get("approach_distance")
     return station_at(
@@ -114,7 +119,22 @@ def _station(item: Item, machine: Equipment) -> Station:
         read_pose(table["pose"]),
         tuple(read_contact(contact) for contact in contacts),
         0.0 if approach is None else approach.number(0.0, APPROACH_MAX, "m"),
+        _search(table),
     )
+
+
+def _search(table: Table) -> StationSearch:
+    default = StationSearch()
+    configurations = (
+        table["configurations"].choice(CONFIGURATION_SEARCHES)
+        if "configurations" in table
+        else default.configurations
+    )
+    if "starts" in table and configurations != "ccd":
+        table["starts"].fail("belongs to a station with configurations: ccd")
+    starts = table["starts"].integer(1, STARTS_MAX) if "starts" in table else default.starts
+    withdrawal = table["withdrawal"].name() if "withdrawal" in table else ""
+    return StationSearch(configurations, starts, withdrawal)
 
 
 def read_contact(item: Item) -> AllowedContact:

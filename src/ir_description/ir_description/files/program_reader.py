@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from typing import TypedDict
+
 from ir_description.cell import PAUSE_MAX, PAUSE_POWER_MODES, POSTURES, CellSignal, ProgramStep
 from ir_description.files.items import Item, Table
 from ir_msgs_py.plc import Signal
 
 _COMMON = ("wait_for", "set_signals")
-_STEP_KEYS = ("station", "posture", "path", "pause", "dwell", "attach", "detach", "power_mode", *_COMMON)
+_STEP_KEYS = (
+    *("station", "posture", "path", "pause", "dwell", "attach", "detach", "power_mode", "planner"),
+    *_COMMON,
+)
 _KEYS = {
-    "station": ("station", "dwell", "attach", "detach", *_COMMON),
-    "posture": ("posture", "dwell", *_COMMON),
-    "path": ("path", "dwell", *_COMMON),
+    "station": ("station", "dwell", "attach", "detach", "planner", *_COMMON),
+    "posture": ("posture", "dwell", "planner", *_COMMON),
+    "path": ("path", "dwell", "planner", *_COMMON),
     "pause": ("pause", "power_mode", *_COMMON),
 }
+
+
+class _Moving(TypedDict):
+    """What every step that goes somewhere has."""
+
+    dwell: float
+    wait_for: tuple[Signal, ...]
+    set_signals: tuple[Signal, ...]
+    planner: str
 
 
 def read_signal(item: Item) -> CellSignal:
@@ -48,21 +62,22 @@ def read_step(item: Item) -> ProgramStep:
             set_signals=set_signals,
             power_mode=mode,
         )
-    dwell = table["dwell"].number(0.0, PAUSE_MAX, "s") if "dwell" in table else 0.0
+    moving: _Moving = {
+        "dwell": table["dwell"].number(0.0, PAUSE_MAX, "s") if "dwell" in table else 0.0,
+        "wait_for": wait_for,
+        "set_signals": set_signals,
+        "planner": table["planner"].name() if "planner" in table else "",
+    }
     if kind == "posture":
-        posture = table["posture"].choice(POSTURES)
-        return ProgramStep("POSTURE", posture, dwell, wait_for=wait_for, set_signals=set_signals)
+        return ProgramStep("POSTURE", table["posture"].choice(POSTURES), **moving)
     if kind == "path":
-        path = table["path"].name()
-        return ProgramStep("PATH", path, dwell, wait_for=wait_for, set_signals=set_signals)
+        return ProgramStep("PATH", table["path"].name(), **moving)
     return ProgramStep(
         kind="STATION",
         target=table["station"].name(),
-        dwell=dwell,
         attach=table["attach"].name() if "attach" in table else "",
         detach=table["detach"].name() if "detach" in table else "",
-        wait_for=wait_for,
-        set_signals=set_signals,
+        **moving,
     )
 
 

@@ -26,11 +26,17 @@ _PATIENCE = 3  # sweeps without that gain
 
 @dataclass(eq=False)
 class Descent:
-    """q (K, n) of the accepted starts (eq. 6), the rejected by reason, and the sweeps done."""
+    """q (K, n) of the accepted starts (eq. 6), the rejected by reason, and the sweeps done.
+
+    tracks: the configurations (M, n) of each start from sweep to sweep. outcome: of each start, why it was
+    rejected, "": accepted.
+    """
 
     q: FloatArray
     sweeps: int
     rejected: Counter[str] = field(default_factory=Counter)
+    tracks: list[FloatArray] = field(default_factory=list)
+    outcome: list[str] = field(default_factory=list)
 
 
 def descend(
@@ -56,9 +62,12 @@ class _Descent:
         robot = scene.cell.robot
         self.low, self.high, self.axis = robot.position_min, robot.position_max, robot.joint_axis
         self.rejected: Counter[str] = Counter()
+        self.outcome: list[str] = []
 
     def run(self, starts: FloatArray, work: Work) -> Descent:
-        q, found = starts.copy(), [starts[:0]]
+        q, found, start = starts.copy(), [starts[:0]], np.arange(len(starts))
+        self.outcome = [""] * len(starts)
+        tracks = [[one] for one in starts]
         distance = self.scene.collision.distances(q)
         psi, stalled = self._psi(q), np.zeros(len(q), dtype=int)
         blocked = np.full(len(q), -1)  # the pair that last set a start back
@@ -67,24 +76,25 @@ class _Descent:
             work.spend(len(q))
             q, distance, blocked = self._sweep(q, distance, blocked)
             sweeps += 1
+            for k, reached in zip(start.tolist(), q, strict=True):
+                tracks[k].append(reached)
             now = self._psi(q)
             stalled = np.where((now > (1.0 - _STALLED) * psi) & (blocked >= 0), stalled + 1, 0)
             psi = now
             keep = np.ones(len(q), dtype=bool)
             if sweeps % self.settings.finish_every == 0 or sweeps == self.settings.sweeps:
-                arrived, free = self._finish(q)
+                arrived, free = self._finish(q, start, tracks)
                 found.append(free)
                 keep &= ~arrived
             given_up = keep & (stalled >= _PATIENCE)
-            self._count(blocked[given_up], "set back for good")
+            self._reject(start[given_up], blocked[given_up], "set back for good")
             keep &= ~given_up
-            q, distance, psi = q[keep], distance[keep], psi[keep]
+            q, distance, psi, start = q[keep], distance[keep], psi[keep], start[keep]
             stalled, blocked = stalled[keep], blocked[keep]
-        self._count(blocked[blocked >= 0], "not converged, set back")
-        left = int((blocked < 0).sum())
-        if left:
-            self.rejected["not converged"] += left
-        return Descent(np.concatenate(found), sweeps, self.rejected)
+        self._reject(start, blocked, "not converged, set back")
+        return Descent(
+            np.concatenate(found), sweeps, self.rejected, [np.array(track) for track in tracks], self.outcome
+        )
 
     def _sweep(
         self, q: FloatArray, distance: FloatArray, blocked: IntArray
@@ -142,17 +152,23 @@ class _Descent:
             after[rows] = start[back] if last else self.scene.collision.distances(q[rows])
         return q, after, blocked
 
-    def _finish(self, q: FloatArray) -> tuple[BoolArray, FloatArray]:
-        """Which starts arrive by Newton's steps, and the configurations among them that are free (eq. 6)."""
+    def _finish(
+        self, q: FloatArray, start: IntArray, tracks: list[list[FloatArray]]
+    ) -> tuple[BoolArray, FloatArray]:
+        """Which of `start` (K,) arrive by Newton's steps, and the configurations among them that are free
+        (eq. 6).
+        """
         settings = CcdSettings(ROTATION_LENGTH, self.settings.xi, 0, self.settings.newton_steps)
         end = ccd(self.scene.chain, self.pose, q, self.low, self.high, settings)
         arrived = np.asarray(end.psi < self.settings.xi)
         reached = end.q[arrived]
         if len(reached) == 0:
             return arrived, reached
+        for k, at_pose in zip(start[arrived].tolist(), reached, strict=True):
+            tracks[k].append(at_pose)
         near = self.scene.collision.min_distance(reached, self.threshold)
         free = (near.pair < 0) | (near.distance > self.threshold[near.pair])
-        self._count(near.pair[~free], "at the pose")
+        self._reject(start[arrived][~free], near.pair[~free], "at the pose")
         return arrived, reached[free]
 
     def _psi(self, q: FloatArray) -> FloatArray:
@@ -162,10 +178,13 @@ class _Descent:
         wo = ROTATION_LENGTH**2 / 2.0
         return np.asarray((step**2).sum(axis=1) + wo * (turn**2).sum(axis=(1, 2)))
 
-    def _count(self, pairs: IntArray, what: str) -> None:
-        for z, count in zip(*np.unique(pairs, return_counts=True), strict=True):
-            pair = self.scene.collision.pairs[int(z)]
-            self.rejected[f"{what}: {pair.body_a} too near {pair.body_b}"] += int(count)
+    def _reject(self, starts: IntArray, pairs: IntArray, what: str) -> None:
+        """Count starts (K,) out, each by the pair (K,) that was too near; -1: not converged, by no pair."""
+        for k, z in zip(starts.tolist(), pairs.tolist(), strict=True):
+            pair = self.scene.collision.pairs[z] if z >= 0 else None
+            named = f"{what}: {pair.body_a} too near {pair.body_b}" if pair else "not converged"
+            self.outcome[k] = named
+            self.rejected[named] += 1
 
 
 def _rotations(axis: FloatArray, angle: FloatArray) -> FloatArray:

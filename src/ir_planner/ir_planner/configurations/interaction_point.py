@@ -57,7 +57,14 @@ def searched_configurations(
     order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
     q = np.ascontiguousarray(q[order])
     collided = sum(n for reason, n in found.rejected.items() if reason.startswith("at the pose"))
-    return Configurations(q, branches(q, scene), len(found.q) + collided, found.rejected)
+    return Configurations(
+        q,
+        branches(q, scene),
+        len(found.q) + collided,
+        found.rejected,
+        tracks=tuple(found.tracks),
+        outcome=tuple(found.outcome),
+    )
 
 
 def distinct_configurations(q: FloatArray) -> FloatArray:

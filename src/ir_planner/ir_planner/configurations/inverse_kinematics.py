@@ -22,6 +22,7 @@ class Configurations:
     """Free configurations q (K, n), ranked; branch (K,); and why the others were dropped.
 
     nearest: where none is free, the obstructing pair of the one that lacks least ("" where it is not known).
+    tracks, outcome: of a search from random starts, as in `Descent`; else empty.
     """
 
     q: FloatArray
@@ -29,6 +30,8 @@ class Configurations:
     reached: int
     rejected: Counter[str]
     nearest: str = ""
+    tracks: tuple[FloatArray, ...] = ()
+    outcome: tuple[str, ...] = ()
 
 
 def free_configurations(

@@ -36,3 +36,7 @@ class InteractionSettings:
 
     def __post_init__(self) -> None:
         check_settings(self)
+
+
+INTERACTION = InteractionSettings()
+"""The default settings."""

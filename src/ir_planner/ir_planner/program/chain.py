@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
+from ir_planner.configurations import INTERACTION, InteractionSettings
 from ir_planner.program.edges import CostEdges, TravelEdges
 from ir_planner.program.movements import Movements
 from ir_planner.program.node import Node
@@ -34,8 +35,11 @@ def layers_of(
     context: Context,
     searches: Mapping[str, ExitSearch],
     progress: Progress,
+    interaction: InteractionSettings = INTERACTION,
 ) -> list[list[Node]]:
-    """Nodes of the start (n,) and of every stop. Raises StageError for a stop that has none."""
+    """Nodes of the start (n,) and of every stop; searches: for paths out of stations; interaction: for their
+    configurations, where a station asks for that. Raises StageError for a stop that has none.
+    """
     layers = [[Node(ServiceLine(start[None]))]]
     with context.journal.stage("configurations") as notes:
         for place in range(len(route)):
@@ -48,7 +52,7 @@ def layers_of(
             else:
                 near = layers[-1][0].departure
                 at = arriving.at(step.target)
-                found, status = station_nodes(at, route.leaving(place), near, searches)
+                found, status = station_nodes(at, route.leaving(place), near, searches, interaction)
             if not status.ok:
                 raise StageError(status)
             layers.append(found)

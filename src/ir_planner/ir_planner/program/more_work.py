@@ -73,13 +73,14 @@ def best_answer(request: ProgramRequest, route: Route, context: Context, progres
 
 def chosen(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Choice:
     """The cheapest chain of configurations. Raises StageError where there is none."""
-    layers = layers_of(route, request.start, context, exit_searches(request.settings.withdrawal), progress)
-    searches = request.settings.searches
+    settings = request.settings
+    exits, searches = exit_searches(settings.withdrawal), settings.searches
+    layers = layers_of(route, request.start, context, exits, progress, settings.interaction)
     near = None
     if context.options.objective == "time":  # the fastest lines are found from slower ones
         near = Near(scaling=Movements(route, layers, context.asking("time_and_energy"), searches))
     movements = Movements(route, layers, context, searches, near)
-    improvement = min(request.settings.improvement_iterations, _CHOOSING)
+    improvement = min(settings.improvement_iterations, _CHOOSING)
     chain = cheapest_chain(movements, improvement, progress)
     return Choice(request, Ladder(movements, improvement), chain)
 

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import TimingError
 from ir_planner.program.bounds import Rates
@@ -82,6 +83,7 @@ class Movements:
         self.descends = context.options.planner_id == "" and context.options.timing == "synchronous"
         self._near = near if near is not None and self.descends else Near()
         self._found: dict[Key, Movement | Failure] = {}
+        self._logs: dict[Key, list[SearchLog]] = {}
         self.unreachable = Status(
             StatusCode.PLANNING_FAILED, "no chain of configurations connects the stations"
         )
@@ -125,6 +127,10 @@ class Movements:
         found = self._found[self._key(part)]
         return found if isinstance(found, Movement) else None
 
+    def logs(self, part: Part) -> list[SearchLog]:
+        """What the search for the movement of a part did, where it keeps a log."""
+        return self._logs.get(self._key(part), [])
+
     def better(self, parts: Sequence[Part], improvement: int) -> None:
         """Plan parts again with more work, and keep what is cheaper."""
         rates = rates_of(self.context)
@@ -145,7 +151,12 @@ class Movements:
         names = self.route.name(part.hop - 1), self.route.name(part.hop)
         lines = first.line.points.tobytes(), second.line.points.tobytes()
         ends = lines if part.kind != ACROSS else (first.departure.tobytes(), second.arrival.tobytes())
-        return id(self.route.arriving(part.hop)), part.kind, names, ends
+        kind = part.kind if part.kind != ACROSS else f"{part.kind} {self._planner(part)}"
+        return id(self.route.arriving(part.hop)), kind, names, ends
+
+    def _planner(self, part: Part) -> str:
+        """The search that a regional movement is asked for by its step, else by the request."""
+        return self.route.at(part.hop).step.planner or self.context.options.planner_id
 
     def nodes(self, part: Part) -> tuple[Node, Node]:
         """The configurations of a part; the same twice where it is a service movement."""
@@ -172,7 +183,9 @@ class Movements:
         if known and (again := optimised_near(known, context)) is not None:
             return again
         first, second = self.ends(part)
-        status, found = search_regional(first, second, context, self.searches)
+        asked = context.planned_by(self._planner(part))
+        status, found = search_regional(first, second, asked, self.searches)
+        self._logs[self._key(part)] = context.journal.logs
         here, there = self.route.name(part.hop - 1), self.route.name(part.hop)
         what = f"from {here or 'the start'} to {there}"
         return found or Failure(Status(status.code, f"{what}: {status.message}"))

@@ -30,14 +30,15 @@ class Outlook:
 def outlook(request: ProgramRequest, work: Work) -> Outlook:
     """The outlook of a request; its cycle time doesn't count. Raises RequestError for one without sense."""
     route, context = prepared(replace(request, cycle_time=0.0), Journal(work, request.options.seed))
-    searches = exit_searches(request.settings.withdrawal)
+    settings = request.settings
+    searches = exit_searches(settings.withdrawal)
     try:
-        layers = layers_of(route, request.start, context, searches, nobody)
+        layers = layers_of(route, request.start, context, searches, nobody, settings.interaction)
     except StageError as failed:
         return Outlook(failed.status, np.inf)
     if not len(route):
         return Outlook(Status.success(), 0.0)
-    edges = CostEdges(Movements(route, layers, context, request.settings.searches), 0)
+    edges = CostEdges(Movements(route, layers, context, settings.searches), 0)
 
     def coarse(parts: list[Part]) -> list[Settled]:
         return [replace(found, exact=True) for found in edges.settle(parts)]

@@ -20,6 +20,7 @@ from ir_planner.program.choice import Steps
 from ir_planner.program.comparison import held_against_common
 from ir_planner.program.doors import doors_advice, doors_text
 from ir_planner.program.front import front_of
+from ir_planner.program.logs import check_searches, logs_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
 from ir_planner.program.route import Route
@@ -63,6 +64,8 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
             f"(is {request.front_points}) must be 0",
         )
     plan = replace(_planned(steps), gap=answer.gap)
+    for log in logs_of(choice):
+        context.journal.keep(log)
     if choice.parts and request.options.objective == "energy" and cycle <= 0.0:
         moving = plan.report.duration - standing
         plan = replace(plan, status=Status.success(_SLOW.format(moving)))
@@ -115,6 +118,7 @@ def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]
     request.check()
     cell = request.cell
     steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start(), request.doors)
+    check_searches(cell, steps, request.settings.searches)
     settings, bare = request.settings, request.options.load == NO_LOAD
     scenes = Scenes(cell, request.power, settings.drives, bare)
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)

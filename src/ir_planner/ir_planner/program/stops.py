@@ -5,10 +5,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ir_description import Station
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace, too_near
-from ir_planner.configurations import free_configurations, no_configuration
+from ir_planner.configurations import (
+    INTERACTION,
+    Configurations,
+    InteractionSettings,
+    configuration_log,
+    free_configurations,
+    no_configuration,
+    searched_configurations,
+)
 from ir_planner.program.node import Node
 from ir_planner.program.withdrawals import leaves_zone, withdrawn_lines
 from ir_planner.request import Context
@@ -29,17 +38,21 @@ def posture_nodes(name: str, arriving: Context) -> tuple[list[Node], Status]:
 
 
 def station_nodes(
-    arriving: Context, leaving: PlanningScene, near: FloatArray, searches: Mapping[str, ExitSearch]
+    arriving: Context,
+    leaving: PlanningScene,
+    near: FloatArray,
+    searches: Mapping[str, ExitSearch],
+    interaction: InteractionSettings = INTERACTION,
 ) -> tuple[list[Node], Status]:
     """Configurations at the context's station, cheapest from `near` (n,) first, with a free path in and out;
     or none and why.
 
     The path is the straight service line where it is free and ends outside the machine's zone, else a
-    withdrawal; where neither leaves the zone, a free line within it.
+    withdrawal; where neither leaves the zone, a free line within it. A station may ask for the withdrawal.
     """
     scene, journal, name = arriving.scene, arriving.journal, arriving.station
     station = scene.station(name)
-    found = free_configurations(station.pose, scene, arriving.thresholds(), near)
+    found = _configurations(station, arriving, near, interaction)
     journal.rejected.update(found.rejected)
     if len(found.q) == 0:
         return [], no_configuration(station.pose, scene, found, f"station {name}")
@@ -50,7 +63,7 @@ def station_nodes(
         free = lines_free(lines, context, rejected)
         lines = [line for line, is_free in zip(lines, free, strict=True) if is_free]
     out = leaves_zone(lines, arriving)
-    if any(out):
+    if any(out) and not station.search.withdrawal:
         lines = [line for line, leaves in zip(lines, out, strict=True) if leaves]
     else:
         lines = withdrawn_lines(found.q[:_MOST], both, searches, rejected) or lines
@@ -63,3 +76,20 @@ def station_nodes(
             f"{station.approach_distance:g} m, nor a withdrawal: {reasons}",
         )
     return [Node(line) for line in lines], Status.success()
+
+
+def _configurations(
+    station: Station, arriving: Context, near: FloatArray, settings: InteractionSettings
+) -> Configurations:
+    """Free configurations at a station, cheapest from `near` (n,) first, by the search that it asks for."""
+    scene, journal, search = arriving.scene, arriving.journal, station.search
+    threshold = arriving.thresholds()
+    if search.configurations == "analytic":
+        return free_configurations(station.pose, scene, threshold, near)
+    with journal.stage("ccd") as notes:
+        found = searched_configurations(
+            station.pose, scene, threshold, near, search.starts, journal.seed, settings, journal.work
+        )
+        notes.append(f"{found.reached} of {search.starts} starts reach {station.name}")
+    journal.keep(configuration_log(station.name, found, scene))
+    return found

@@ -14,7 +14,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.request import Context, Journal
 from ir_planner.scene import path_cost
 from ir_planner.search import EXIT, first_different
-from ir_planner.service import Exit, ExitSearch, ServiceLine, WorkArea, withdrawal
+from ir_planner.service import Exit, ExitPath, ExitSearch, ServiceLine, WorkArea, withdrawal
 
 _WANTED = 2  # paths per search: the second is for the scene in which the first collides
 _SEARCHES = 3  # per branch, whatever the seed, which adds to them: chance decided up to 2 % of a program's J
@@ -42,7 +42,7 @@ def withdrawn_lines(
 ) -> list[ServiceLine]:
     """Paths out of the zone from interaction configurations (K, n), free on arriving and on leaving."""
     found: list[ServiceLine] = []
-    searched: list[tuple[FloatArray, list[FloatArray]]] = []
+    searched: list[tuple[FloatArray, list[ExitPath]]] = []
     robot = both[0].scene.cell.robot
     for q in interaction:
         known = next((paths for other, paths in searched if _turned(q, other)), None)
@@ -51,10 +51,10 @@ def withdrawn_lines(
             searched.append((q, paths))
             if not paths:
                 rejected[f"no withdrawal from {both[0].station} found"] += 1
-        for points in paths:
-            shifted = points + (q - points[0])
+        for path in paths:
+            shifted = path.points + (q - path.points[0])
             if (shifted >= robot.position_min).all() and (shifted <= robot.position_max).all():
-                found.append(ServiceLine(shifted, straight=False))
+                found.append(ServiceLine(shifted, straight=False, exit=path))
     return found
 
 
@@ -65,11 +65,12 @@ def _turned(a: FloatArray, b: FloatArray) -> bool:
 
 def _exit_paths(
     q: FloatArray, both: tuple[Context, Context], searches: Mapping[str, ExitSearch]
-) -> list[FloatArray]:
+) -> list[ExitPath]:
     """Different paths (M, n) that are free in both scenes, of several searches in each of them; which serves
     best is decided with the chain.
     """
-    found: list[FloatArray] = []
+    found: list[ExitPath] = []
+    method = both[0].scene.station(both[0].station).search.withdrawal
     more = min(both[0].work.improvement // _FOR_ANOTHER, _MOST)
     for here, there in (both, both[::-1]):
         inside = FreeSpace.of(here.scene, here.safety_distance, here.work, here.station)
@@ -77,16 +78,16 @@ def _exit_paths(
             return []
         problem, other = Exit.of(q, here), Exit.of(q, there)
         for seed in (*range(_SEARCHES), here.journal.seed, *range(_SEARCHES, _SEARCHES + more)):
-            paths: list[FloatArray] = []
+            paths: list[ExitPath] = []
             inner = Journal(here.work, seed)
-            for path in withdrawal(problem, _WANTED, "", searches, inner).paths:
+            for path in withdrawal(problem, _WANTED, method, searches, inner).paths:
                 points = path.points
                 free = other.inside.edges_free(points[:-1], points[1:]).all()
                 if free and other.is_out(points[-1:])[0] and other.contacts_end(points):
-                    paths.append(points)
-            found += sorted(paths, key=lambda points: path_cost(here.scene.weights, points))
+                    paths.append(path)
+            found += sorted(paths, key=lambda path: path_cost(here.scene.weights, path.points))
             if not found:
                 break
         if found or here.scene is there.scene:
             break
-    return first_different(found, _KEPT + more, EXIT, lambda points: points[-1])
+    return first_different(found, _KEPT + more, EXIT, lambda path: path.points[-1])

@@ -14,7 +14,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.optimize import QUICK, THOROUGH, Portfolio, Refinement
 from ir_planner.request import Context
-from ir_planner.search import Ends, Search, guesses, quick
+from ir_planner.search import Ends, Search, correction_log, guesses, quick
 
 Searches = Mapping[str, Search]
 Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)
@@ -45,6 +45,8 @@ def first_paths(
                 notes.append(f"first feasible: {len(found.paths)} free, {len(found.paths[0])} points")
             else:
                 notes.append("nothing free" + (f", {found.note}" if found.note else ""))
+        if found.correction is not None:
+            journal.keep(correction_log(found.correction, found.paths[0], ends.start, space.scene))
         if found.paths:
             return [(name, path) for path in found.paths]
         if journal.work.exhausted:  # not before the first: what is free at once is found in any time

@@ -53,6 +53,10 @@ class Context:
         """The same with another objective and requested duration [s], 0: free."""
         return replace(self, options=replace(self.options, objective=objective, duration=duration))
 
+    def planned_by(self, planner_id: str) -> "Context":
+        """The same asking for another search."""
+        return replace(self, options=replace(self.options, planner_id=planner_id))
+
     def with_timing(self, timing: str) -> "Context":
         """The same with "synchronous" or "asynchronous" joints."""
         return replace(self, options=replace(self.options, timing=timing))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
+from ir_msgs_py.search_log import ConfigurationLog, SearchLog, stage_of
 from ir_planner.request.work import Work
 
 
@@ -23,6 +24,7 @@ class Journal:
     timing: str = ""  # which the answer is
     stages: list[PlanningStage] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
+    logs: list[SearchLog] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.begin = self.work.clock()
@@ -47,6 +49,12 @@ class Journal:
         if count:
             self.rejected[reason] += count
 
+    def keep(self, log: SearchLog) -> None:
+        """Let a log of a search travel with the answer; of searches at one station the first."""
+        known = [other.station for other in self.logs if isinstance(other, ConfigurationLog)]
+        if not (isinstance(log, ConfigurationLog) and log.station in known):
+            self.logs.append(log)
+
     def info(self, start: FloatArray | None, joint_names: tuple[str, ...]) -> PlanningInfo:
         """The record of a request from start (n,), as it goes into the answer."""
         return PlanningInfo(
@@ -57,7 +65,7 @@ class Journal:
             iterations=self.work.iterations,
             truncated=self.work.truncated,
             planning_time=self.work.clock() - self.begin,
-            stages=tuple(self.stages),
+            stages=(*self.stages, *map(stage_of, self.logs)),
             rejected=tuple(Rejection(reason, count) for reason, count in sorted(self.rejected.items())),
             timing=self.timing,
         )

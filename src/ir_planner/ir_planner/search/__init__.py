@@ -1,5 +1,6 @@
 """Searches for free paths between configurations: one port, one file each, one registry."""
 
+from ir_planner.search.correction_log import correction_log
 from ir_planner.search.guesses import guesses
 from ir_planner.search.port import Ends, Found, Search, quick, repeatable
 from ir_planner.search.registry import SEARCHES, registered
@@ -17,6 +18,7 @@ __all__ = [
     "apart",
     "at_nine_shares",
     "connect",
+    "correction_log",
     "fewest_corners",
     "first_different",
     "guesses",

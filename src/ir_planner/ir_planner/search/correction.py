@@ -23,11 +23,23 @@ _WIDER = 4.0  # by how much each further attempt widens the margin
 
 
 @dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch that collided, between its free ends begin and end (n,), and the fitness of the best
+    individual of every generation that was bred for it; the straight stretch's cost counts 1.
+    """
+
+    begin: FloatArray
+    end: FloatArray
+    fitness: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Correction:
     """Paths (M_k, n) of certified straight steps, cheapest by W first.
 
     Without one: the best individual of a stretch that was given up lacked `shortfall` m of what pair `pair`
-    must keep, at `q` (n,); pair -1: there was none. generations: of all populations together.
+    must keep, at `q` (n,); pair -1: there was none. generations: of all populations together. stretches:
+    those that were corrected, in order.
     """
 
     paths: list[FloatArray]
@@ -35,6 +47,7 @@ class Correction:
     pair: int
     q: FloatArray
     generations: int
+    stretches: tuple[Stretch, ...] = ()
 
 
 def corrected(
@@ -53,6 +66,7 @@ def corrected(
     clean: list[FloatArray] = []
     missed = Evolution([], np.inf, -1, start, 0)
     generations = 0
+    stretches: list[Stretch] = []
     for _ in range(settings.stretches + 1):
         following: list[FloatArray] = []
         wanted = max((settings.paths - len(clean)) // len(open_paths), 1)
@@ -61,7 +75,8 @@ def corrected(
             if (proof.verdict == FREE).all():
                 clean.append(path)
             elif not space.work.exhausted:
-                found = _round_stretch(path, proof, space, settings, rng, wanted)
+                found, stretch = _round_stretch(path, proof, space, settings, rng, wanted)
+                stretches.append(stretch)
                 generations += found.generations
                 following.extend(found.paths)
                 if not found.paths and found.shortfall < missed.shortfall:
@@ -71,7 +86,7 @@ def corrected(
             break
     clean.sort(key=lambda path: path_cost(weights, path))
     paths = first_different(clean, settings.paths, settings.difference, evenly)
-    return Correction(paths, missed.shortfall, missed.pair, missed.q, generations)
+    return Correction(paths, missed.shortfall, missed.pair, missed.q, generations, tuple(stretches))
 
 
 def _round_stretch(
@@ -81,27 +96,29 @@ def _round_stretch(
     settings: GeneticSettings,
     rng: np.random.Generator,
     wanted: int,
-) -> Evolution:
-    """Up to `wanted` different forms of the whole path, its first colliding stretch replaced."""
+) -> tuple[Evolution, Stretch]:
+    """Up to `wanted` different forms of the whole path, its first colliding stretch replaced; and that
+    stretch.
+    """
     generations = 0
+    fitness: list[float] = []
     best = Evolution([], np.inf, -1, path[0], 0)
     for attempt in range(settings.attempts):
         before, after = colliding_stretch(path, proof, space, settings.margin * _WIDER**attempt)
         finer = replace(settings, samples=min(settings.samples * (attempt + 1), SAMPLES_MAX))
         found = evolve(before[-1], after[0], space, finer, rng)
         generations += found.generations
+        fitness += found.fitness
+        stretch = Stretch(before[-1], after[0], tuple(fitness))
         if found.paths:
             whole = [np.concatenate([before[:-1], part, after[1:]]) for part in found.paths]
-            return replace(
-                found,
-                paths=first_different(whole, wanted, settings.difference, evenly),
-                generations=generations,
-            )
+            different = first_different(whole, wanted, settings.difference, evenly)
+            return replace(found, paths=different, generations=generations), stretch
         if found.shortfall < best.shortfall:
             best = found
         if space.work.exhausted:
             break
-    return replace(best, generations=generations)
+    return replace(best, generations=generations), stretch
 
 
 def colliding_stretch(

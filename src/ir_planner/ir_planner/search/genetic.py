@@ -27,7 +27,7 @@ class Genetic(GeneticSettings):
         for goal in ends.goals[:NEAREST_GOALS]:
             found = corrected(ends.start, goal, space, self, rng)
             if found.paths:
-                return Found(found.paths)
+                return Found(found.paths, correction=found)
             if found.pair >= 0 and found.shortfall < nearest[0]:
                 pair = space.scene.collision.pairs[found.pair]
                 sentence = (

@@ -31,6 +31,7 @@ class Evolution:
     """What a population found: certified paths (M_k, n) from a to b, cheapest by W first.
 
     Where there is none: the individual that came nearest lacks `shortfall` m at `pair` in configuration `q`.
+    fitness: of the best individual of every generation; the straight stretch's cost counts 1.
     """
 
     paths: list[FloatArray]
@@ -38,6 +39,7 @@ class Evolution:
     pair: int
     q: FloatArray
     generations: int
+    fitness: tuple[float, ...] = ()
 
 
 @dataclass(eq=False)
@@ -120,7 +122,9 @@ class _Breeder:
         s = self.settings
         people = self._first()
         generations, since = 1, 0
+        fitness: list[float] = []
         while True:
+            fitness.append(float(people.fitness.min()))
             self._collect(people)
             since += bool(self.found)
             if since > s.settle or generations >= s.generations or self.space.work.exhausted:
@@ -131,7 +135,7 @@ class _Breeder:
         best = int(np.argmin(lack))
         paths = sorted(self.found, key=lambda path: path_cost(self.weights, path))
         q = self.samples(people.vias[best : best + 1])[people.sample[best], 0]
-        return Evolution(paths, float(lack[best]), int(people.pair[best]), q, generations)
+        return Evolution(paths, float(lack[best]), int(people.pair[best]), q, generations, tuple(fitness))
 
     def samples(self, vias: FloatArray) -> FloatArray:
         """(S, N, n): the paths of individuals."""

@@ -11,6 +11,7 @@ from typing import Protocol, runtime_checkable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
+from ir_planner.search.correction import Correction
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +25,12 @@ class Ends:
 @dataclass(frozen=True, eq=False)
 class Found:
     """Free paths (M_k, n) of straight joint steps from the start to any of the goals, cheapest by W first;
-    `note`: how near a search came that found none.
+    `note`: how near a search came that found none. correction: what was corrected on a straight movement.
     """
 
     paths: list[FloatArray]
     note: str = ""
+    correction: Correction | None = None
 
 
 class Search(Protocol):

@@ -6,22 +6,39 @@ from typing import Protocol
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.request import Work
 from ir_planner.service.exit import Exit
+
+
+@dataclass(frozen=True, eq=False)
+class WalkRecord:
+    """Configurations (N, n) that were kept, the interaction configuration first, each with the index of its
+    parent (N,); `dropped` (M, n): those that came too near something. distance: the total metric distance D
+    [m] at the interaction configuration and the largest one.
+    """
+
+    kept: FloatArray
+    parents: IntArray
+    dropped: FloatArray
+    generations: int
+    candidates: int
+    distance: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class ExitsFound:
     """Free paths (M_k, n) from the interaction configuration to outside the zone; `note`: what was done.
 
-    farthest (n,): the configuration farthest out; rejected: dropped candidates by reason.
+    farthest (n,): the configuration farthest out; rejected: dropped candidates by reason. walk: every step
+    of a search that goes on from configurations it has reached.
     """
 
     paths: list[FloatArray]
     farthest: FloatArray
     note: str = ""
     rejected: Counter[str] = field(default_factory=Counter)
+    walk: WalkRecord | None = None
 
 
 class ExitSearch(Protocol):

@@ -18,7 +18,7 @@ from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.settings import check_settings, setting
 from ir_planner.request import Work
 from ir_planner.service.exit import Exit
-from ir_planner.service.exit_search import ExitsFound
+from ir_planner.service.exit_search import ExitsFound, WalkRecord
 from ir_planner.service.step_weights import step_weights
 
 _DAMPING = 0.02  # m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)
@@ -75,7 +75,7 @@ class ModifiedGa:
         """Perturb and rank until `wanted` paths have left the zone, generations or work end."""
         walk = withdraw(problem, self, np.random.default_rng(seed), wanted)
         note = f"{len(walk.paths)} paths, {walk.generations} generations, {walk.candidates} candidates"
-        return ExitsFound(walk.paths, walk.best, note, walk.rejected)
+        return ExitsFound(walk.paths, walk.best, note, walk.rejected, walk.record)
 
 
 @dataclass(eq=False)
@@ -91,6 +91,7 @@ class Walk:
     generations: int
     candidates: int
     rejected: Counter[str] = field(default_factory=Counter)
+    record: WalkRecord | None = None
 
 
 @dataclass(eq=False)
@@ -130,7 +131,8 @@ class _Walker:
         first = problem.interaction
         self.nodes: list[FloatArray] = [first]
         self.parents: list[int] = [0]
-        self.first_total = max(float(self.area.total_distance(first[None])[0]), _SMALLEST_D)
+        self.dropped: list[FloatArray] = [first[None][:0]]
+        self.first_total = self.largest = max(float(self.area.total_distance(first[None])[0]), _SMALLEST_D)
         self.walk = Walk([], first, 0, 0)
         self.best_zone = float(self.area.zone_distance(first[None])[0])
 
@@ -150,6 +152,14 @@ class _Walker:
             population = self._next(
                 population, max(self.settings.offspring * count // len(population), _FEWEST_OFFSPRING)
             )
+        self.walk.record = WalkRecord(
+            np.array(self.nodes),
+            np.array(self.parents, dtype=np.int64),
+            np.concatenate(self.dropped),
+            self.walk.generations,
+            self.walk.candidates,
+            (self.first_total, self.largest),
+        )
         return self.walk
 
     def _next(self, parents: _Population, offspring: int) -> _Population:
@@ -223,6 +233,7 @@ class _Walker:
         near = self.scene.collision.min_distance(q, self.inside.threshold)
         free = (near.pair < 0) | (near.distance > self.inside.threshold[near.pair])
         self._count_pairs(near.pair[~free], "too near")
+        self.dropped.append(q[~free])
         return q[free], owner[free], ~np.isin(np.arange(count), owner[free])
 
     def _certified(self, parents: _Population, q: FloatArray, owner: IntArray) -> IntArray:
@@ -254,6 +265,7 @@ class _Walker:
         sigma = np.clip(
             parents.sigma[owner] * shrink, self.settings.spread_least, self.settings.collision_spread
         )
+        self.largest = max(self.largest, float(total.max(initial=0.0)))
         node = np.arange(len(self.nodes), len(self.nodes) + len(q))
         self.nodes.extend(q)
         self.parents.extend(int(k) for k in parents.node[owner])

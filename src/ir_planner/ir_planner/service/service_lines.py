@@ -18,6 +18,7 @@ from ir_planner.errors import TimingError
 from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
+from ir_planner.service.withdrawals import ExitPath
 from ir_planner.timing import Movement, best_stretch, stretched, time_spline, within_torque
 
 SPACING = 0.03  # m between points of the line: in between, the tool leaves it by less than a millimetre
@@ -28,11 +29,13 @@ _JUMP = 0.35  # rad: a larger step between neighbours is another branch or a sin
 class ServiceLine:
     """Configurations (L, n) from the interaction configuration to the outer end.
 
-    straight: points of a straight line of the tool; else waypoints of a withdrawal (eq. 7).
+    straight: points of a straight line of the tool; else waypoints of a withdrawal (eq. 7), with the `exit`
+    that they are of: the same points, but for whole turns.
     """
 
     points: FloatArray
     straight: bool = True
+    exit: ExitPath | None = None
     _quickest: dict[tuple[object, ...], JointTrajectory] = field(default_factory=dict, repr=False)
 
     @property

@@ -7,7 +7,7 @@ has just been left; all of it over certified edges.
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ir_planner.request import Journal
 from ir_planner.scene import path_cost
 from ir_planner.search import EXIT, fewest_corners, first_different
 from ir_planner.service.exit import Exit
-from ir_planner.service.exit_search import ExitSearch
+from ir_planner.service.exit_search import ExitSearch, ExitsFound
 from ir_planner.service.exit_tree import ExitTree
 from ir_planner.service.modified_ga import ModifiedGa
 
@@ -32,12 +32,13 @@ _CORNERS = 11  # points of a path between which shortcuts are tried: their numbe
 
 @dataclass(frozen=True, eq=False)
 class ExitPath:
-    """A free path (M, n) from the interaction configuration to outside the zone, and the method that found
-    it.
+    """A free path (M, n) from the interaction configuration to outside the zone, the method that found it,
+    and all that the method did.
     """
 
     method: str
     points: FloatArray
+    search: ExitsFound
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def withdrawal(
         distance = float(problem.area.zone_distance(found.farthest[None])[0])
         if distance > depth:
             farthest, depth = found.farthest, distance
-        paths = [ExitPath(name, path) for path in found.paths]
+        paths = [ExitPath(name, path, found) for path in found.paths]
     if paths:
         with journal.stage("shorten") as notes:
             paths = _cheapest(paths, problem, wanted)
@@ -98,7 +99,7 @@ def _cheapest(paths: list[ExitPath], problem: Exit, wanted: int) -> list[ExitPat
     shortened = []
     for path in sorted(paths, key=cost)[: _SEARCHED * wanted]:
         points = _end_retracted(fewest_corners(path.points, space, weights, _CORNERS), problem)
-        shortened.append(ExitPath(path.method, points if problem.contacts_end(points) else path.points))
+        shortened.append(replace(path, points=points) if problem.contacts_end(points) else path)
     return first_different(sorted(shortened, key=cost), wanted, EXIT, lambda path: path.points[-1])
 
 

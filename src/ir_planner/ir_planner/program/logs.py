@@ -1,0 +1,84 @@
+"""The searches that a cell asks for at its stations and steps: whether they are known, and what they did for
+the chain that was chosen.
+"""
+
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ir_description import Cell, Station
+from ir_msgs_py.search_log import CorrectionLog, SearchLog, WithdrawalLog
+from ir_msgs_py.status import StatusCode
+from ir_planner.errors import RequestError
+from ir_planner.program.choice import Choice
+from ir_planner.program.node import Node
+from ir_planner.program.steps import PlacedStep
+from ir_planner.regional import Searches
+from ir_planner.scene import PlanningScene
+from ir_planner.service import EXIT_SEARCHES, ExitPath
+
+_DROPPED = 300  # configurations that came too near something, kept for a picture
+_BETWEEN = 12  # positions of the tool along a step of a path
+
+
+def check_searches(cell: Cell, steps: Sequence[PlacedStep], searches: Searches) -> None:
+    """Raise RequestError for a step or a station that asks for a search nobody has."""
+    visited = {placed.step.target for placed in steps}
+    for k, placed in enumerate(steps):
+        _known(f"step {k} of the program: planner", placed.step.planner, searches)
+    for station in cell.stations:
+        if station.name in visited:
+            _known(f"station {station.name}: withdrawal", station.search.withdrawal, EXIT_SEARCHES)
+
+
+def _known(what: str, name: str, known: Container[str] | Searches) -> None:
+    if name and name not in known:
+        listed = ", ".join(known)  # type: ignore[arg-type]
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS, f"{what} {name[:60]!a} is unknown: known are {listed}"
+        )
+
+
+def logs_of(choice: Choice) -> Iterator[SearchLog]:
+    """Of the withdrawals and genetic corrections along a chain, each once."""
+    movements, seen = choice.movements, set[int]()
+    for place, chosen in enumerate(choice.chain.chosen):
+        node: Node = movements.layers[place][chosen]
+        found = node.line.exit
+        if found is not None and id(found) not in seen:
+            seen.add(id(found))
+            scene = movements.route.arriving(place - 1)
+            yield _withdrawal_log(scene.station(movements.route.name(place - 1)), found, scene)
+    for part in choice.parts:
+        for log in movements.logs(part):
+            if isinstance(log, CorrectionLog) and id(log) not in seen:
+                seen.add(id(log))
+                names = movements.route.name(part.hop - 1), movements.route.name(part.hop)
+                yield replace(log, start=names[0], goal=names[1])
+
+
+def _withdrawal_log(station: Station, found: ExitPath, scene: PlanningScene) -> WithdrawalLog:
+    share = np.linspace(0.0, 1.0, _BETWEEN)[:, None, None]
+    steps = found.points[:-1] + share * np.diff(found.points, axis=0)
+    along = np.ascontiguousarray(steps.transpose(1, 0, 2).reshape(-1, found.points.shape[1]))
+    walk, rejected = found.search.walk, found.search.rejected
+
+    def tool(q: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> np.ndarray:
+        return scene.chain.tcp_poses(np.ascontiguousarray(q))[:, :3, 3] if len(q) else np.zeros((0, 3))
+
+    kept = found.points[:1] if walk is None else walk.kept
+    dropped = kept[:0] if walk is None else walk.dropped
+    every = max(-(-len(dropped) // _DROPPED), 1)
+    return WithdrawalLog(
+        station=station.name,
+        method=found.method,
+        generations=0 if walk is None else walk.generations,
+        candidates=0 if walk is None else walk.candidates,
+        rejected=tuple(sorted(rejected.items(), key=lambda item: (-item[1], item[0]))),
+        distance=(0.0, 0.0) if walk is None else walk.distance,
+        kept=tool(kept),
+        parents=np.zeros(1, dtype=np.int64) if walk is None else walk.parents,
+        dropped=tool(dropped[::every]),
+        path=tool(along),
+    )
