@@ -28,11 +28,12 @@ Counts = tuple[tuple[str, int], ...]
 class WithdrawalLog:
     """A withdrawal from a station (eq. 7). kept (N, 3) m: positions of the tool at the configurations that
     were kept, the station first, each with the index of its parent (N,); dropped (M, 3): some of those that
-    came too near something. path (L, 3): along what was left of the best path. distance: the total metric
-    distance D [m] at the station and the largest one reached.
+    came too near something. path (L, 3): along what was left of the best path. load: what was held.
+    distance: the total metric distance D [m] at the station and the largest one reached.
     """
 
     station: str
+    load: str
     method: str
     generations: int
     candidates: int
@@ -127,6 +128,7 @@ def _withdrawal(data: Mapping[str, Any]) -> WithdrawalLog:
         raise ValueError
     return WithdrawalLog(
         str(data["station"]),
+        str(data["load"]),
         str(data["method"]),
         int(data["generations"]),
         int(data["candidates"]),
@@ -141,8 +143,14 @@ def _withdrawal(data: Mapping[str, Any]) -> WithdrawalLog:
 
 def _configurations(data: Mapping[str, Any]) -> ConfigurationLog:
     tracks = tuple(Track(str(each["outcome"]), _points(each["points"])) for each in data["tracks"])
-    numbers = (int(data[key]) for key in ("starts", "accepted", "distinct"))
-    return ConfigurationLog(str(data["station"]), *numbers, _counts(data["rejected"]), tracks)
+    return ConfigurationLog(
+        str(data["station"]),
+        int(data["starts"]),
+        int(data["accepted"]),
+        int(data["distinct"]),
+        _counts(data["rejected"]),
+        tracks,
+    )
 
 
 def _correction(data: Mapping[str, Any]) -> CorrectionLog:

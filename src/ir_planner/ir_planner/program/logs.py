@@ -72,6 +72,7 @@ def _withdrawal_log(station: Station, found: ExitPath, scene: PlanningScene) -> 
     every = max(-(-len(dropped) // _DROPPED), 1)
     return WithdrawalLog(
         station=station.name,
+        load=scene.load_text,
         method=found.method,
         generations=0 if walk is None else walk.generations,
         candidates=0 if walk is None else walk.candidates,

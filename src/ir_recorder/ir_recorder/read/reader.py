@@ -39,6 +39,7 @@ from ir_recorder.read.recording import (
     TextEvent,
     TopicSummary,
 )
+from ir_recorder.read.search_logs import search_logs
 
 _T = TypeVar("_T")
 _OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PROGRAM_STATE)
@@ -104,6 +105,7 @@ class _Reader:
             urdf=self._attached(contents.URDF) or self._text(names.ROBOT_DESCRIPTION),
             power_yaml=self._attached(contents.POWER),
             plant_yaml=self._text(names.PLANT),
+            searches=search_logs(self._channel(f"{names.PLANNER}/{names.CALLS}")),
             facts=raw.facts,
             problems=tuple(map(one_line, self._problems)),
         )

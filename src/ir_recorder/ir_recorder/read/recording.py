@@ -10,6 +10,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings
+from ir_msgs_py.search_log import SearchLog
 
 
 class _ReadOnlyArrays:
@@ -143,7 +144,8 @@ class Recording:
     urdf are "" where none is attached, so are power_yaml (data of the controller) and plant_yaml (the
     simulated plant with its figures). facts: texts by key. planned: steps of the last planned program, where
     nothing was driven. machines: their states by name, "closed>open" while they change; contacts: what the
-    robot touched, by body.
+    robot touched, by body. searches: what the searches of the last planned program did, where they keep a
+    log.
     """
 
     path: Path
@@ -171,6 +173,7 @@ class Recording:
     planned: tuple[PlannedMovement, ...] = ()
     machines: tuple[TextEvent, ...] = ()
     contacts: tuple[TextEvent, ...] = ()
+    searches: tuple[SearchLog, ...] = ()
 
     @property
     def only_planned(self) -> bool:

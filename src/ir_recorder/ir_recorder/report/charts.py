@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.agreement import agreement
 from ir_recorder.report.bars import joule_bars
+from ir_recorder.report.methods import methods_section
 from ir_recorder.report.sankey import sankey_section
 from ir_recorder.report.savings import savings_section
 from ir_recorder.report.tables import (
@@ -32,6 +33,7 @@ CHARTS: Mapping[str, Chart] = {
     "flows": sankey_section,
     "steps": step_table,
     "savings": savings_section,
+    "methods": methods_section,
     "stations": station_table,
     "modes": mode_table,
     "resting": resting_table,

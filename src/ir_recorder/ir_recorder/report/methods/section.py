@@ -1,0 +1,43 @@
+"""The section of the page: one figure for each log, with its sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ir_description import Cell
+from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog, WithdrawalLog
+from ir_recorder.analysis import Analysis
+from ir_recorder.report.methods import configurations, correction, withdrawal
+from ir_recorder.report.words import text
+
+_MOST = 24  # figures
+_KEY = (
+    '<p class="hint">Black: the path that was taken on from there. Green: kept or accepted. Red: dropped, '
+    "rejected or colliding. Grey: bodies of the machines, those behind or before the drawn plane as "
+    "outlines.</p>"
+)
+
+
+def methods_section(analysis: Analysis) -> str:
+    """What the paper's methods did for the recorded program; "" where none was asked for."""
+    logs, cell = analysis.recording.searches[:_MOST], analysis.cell
+    figures = "".join(_figures(logs, cell))
+    if not figures:
+        return ""
+    return f'<section id="methods"><h2>What the paper\'s methods did</h2>{_KEY}{figures}</section>'
+
+
+def _figures(logs: tuple[SearchLog, ...], cell: Cell | None) -> Iterator[str]:
+    for number, log in enumerate(logs):
+        words, drawn = _shown(log, cell, number)
+        yield f"<figure><figcaption>{text(words)}</figcaption>{drawn}</figure>"
+
+
+def _shown(log: SearchLog, cell: Cell | None, number: int) -> tuple[str, str]:
+    """Sentence and drawing of a log; no drawing without the cell."""
+    if isinstance(log, WithdrawalLog):
+        return withdrawal.sentence(log), withdrawal.picture(log, cell, number) if cell else ""
+    if isinstance(log, ConfigurationLog):
+        return configurations.sentence(log), configurations.picture(log, cell, number) if cell else ""
+    assert isinstance(log, CorrectionLog)
+    return correction.sentence(log), correction.picture(log, cell, number) if cell else ""

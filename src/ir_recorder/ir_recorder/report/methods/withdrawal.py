@@ -1,0 +1,46 @@
+"""A withdrawal: what eq. (7) kept, what it dropped, and the path that was left."""
+
+from __future__ import annotations
+
+from ir_description import Cell
+from ir_msgs_py.search_log import WithdrawalLog
+from ir_recorder.report.methods.view import View, drawing
+from ir_recorder.report.methods.words import reasons
+
+_DEPTH = 0.12  # m: bodies farther from the plane of the drawing are outlines
+
+
+def sentence(log: WithdrawalLog) -> str:
+    """What was done at the station."""
+    if not log.generations:
+        return f"Leaving {log.station}: no straight line was free, and two trees found the path out."
+    dropped, first = sum(count for _, count in log.rejected), len(log.kept) - 1
+    said = (
+        f"Leaving {log.station} by eq. (7): {log.generations} generations drew {log.candidates} "
+        f"configurations around those before; {first} were kept, {dropped} dropped"
+    )
+    said += f" ({reasons(log.rejected)})" if log.rejected else ""
+    return (
+        f"{said}. The total metric distance D to the machine grew from {log.distance[0]:.1f} m to "
+        f"{log.distance[1]:.1f} m, and the best path out was shortened. Entering is the same path reversed."
+    )
+
+
+def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
+    """The machine from the side with all of the search; "" for a station that the cell hasn't."""
+    station = next((each for each in cell.stations if each.name == log.station), None)
+    if station is None or len(log.path) < 2:
+        return ""
+    view = View.from_the_side(log.path, station.pose[:3, 0], 0.55)
+    child, parent = log.kept[1:], log.kept[log.parents[1:]]
+    content = (
+        view.machines(cell, log.station, log.path[0], _DEPTH),
+        view.held(cell, log.load, station.pose),
+        view.segments(parent, child, "tried"),
+        view.dots(log.dropped, "dropped", 1.6),
+        view.dots(child, "kept", 2.2),
+        view.line(log.path, "path"),
+        view.dots(log.path[:1], "place", 4.5),
+    )
+    label = f"Withdrawal from {log.station}, seen from the side: {len(log.kept)} kept configurations"
+    return drawing(content, label, f"withdrawal_{number}")
