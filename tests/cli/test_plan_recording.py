@@ -11,6 +11,7 @@ from rosbags.highlevel import AnyReader
 from ir_cli.main import main
 from ir_msgs.msg import RecordedCall
 from ir_msgs.srv import PlanProgram
+from ir_msgs_py.search_log import ConfigurationLog
 from ir_recorder import Analysis, Verdict, analyse, findings, read_recording, summary
 from ir_recorder.read.raw import RawRecording, read_raw
 from ir_recorder.report import report_html
@@ -40,7 +41,7 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    plan = ["plan", "demo", "--stations", "infeed_pick", "--seed", "3", "--record", "plan.mcap"]
+    plan = ["plan", "demo", "--stations", "outfeed_place", "--seed", "3", "--record", "plan.mcap"]
     assert main(plan) == 0
     raw = read_raw(tmp_path / "plan.mcap")
     assert raw.problems == ()
@@ -54,6 +55,9 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     analysis = analyse(read_recording(tmp_path / "plan.mcap"))
     assert summary(findings(analysis))[0] is Verdict.NOT_CHECKED  # nothing was driven
     assert_planned_figures_are_those_of_the_answer(analysis, raw)
+    (search,) = analysis.recording.searches  # configurations above the conveyor are searched
+    assert isinstance(search, ConfigurationLog)
+    assert f"of {search.starts} random starts {search.accepted} were accepted" in report_html(analysis, ())
     capsys.readouterr()
     assert main(["replan", "plan.mcap"]) == 0
     assert "1 of 1 requests planned again with equal ids" in capsys.readouterr().out

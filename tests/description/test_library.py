@@ -112,10 +112,11 @@ def test_zone_kinds_say_how_closed_a_machine_is() -> None:
     assert {n for n, kind in kinds.items() if kind == "CLOSED"} == {"bin", "tun"}
 
 
-def test_the_demo_has_four_stations_of_which_one_is_semi_closed() -> None:
+def test_the_demo_has_five_stations_of_which_two_are_semi_closed() -> None:
     cell = load_cell("demo")
-    assert len(cell.stations) == 4
-    assert sorted(station.zone for station in cell.stations) == ["OPEN", "OPEN", "OPEN", "SEMI_CLOSED"]
+    zones = {station.name: station.zone for station in cell.stations}
+    assert [name for name, zone in zones.items() if zone == "SEMI_CLOSED"] == ["lathe_work", "washer_rinse"]
+    assert len(zones) == 5
     pauses = [step.power_mode for step in cell.program if step.kind == "PAUSE"]
     assert {"BUS_POWER_OFF", "HIBERNATION"} <= set(pauses)
     assert cell.program[0].target == cell.program[-1].target == "home"
@@ -136,8 +137,10 @@ def test_the_demo_s_postures_are_free(state: str) -> None:
     assert model(cell).min_distance(postures).distance.min() > REQUIRED
 
 
-def test_every_station_of_the_demo_can_be_entered_and_left_straight() -> None:
-    """There is a configuration that keeps 30 mm along the whole retraction, allowed contacts apart."""
+def test_every_station_of_the_demo_but_the_washer_s_can_be_entered_and_left_straight() -> None:
+    """There is a configuration that keeps 30 mm along the whole retraction, allowed contacts apart; in the
+    washer only the line from the station to outside is in the path of a plate.
+    """
     cell = load_cell("demo")
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)
     ik = SphericalWristIk(chain, cell.robot.position_min, cell.robot.position_max)
@@ -159,7 +162,8 @@ def test_every_station_of_the_demo_can_be_entered_and_left_straight() -> None:
             branches = [
                 set(solutions.branch[(solutions.pose_index == k) & free].tolist()) for k in range(len(steps))
             ]
-            assert set.intersection(*branches), station.name
+            assert bool(set.intersection(*branches)) is (station.name != "washer_rinse"), station.name
+            assert branches[-1], station.name
         places = after
 
 

@@ -195,6 +195,12 @@ def rosbag2_metadata(summary: Any) -> str:
 def test_report_and_picture_stand_alone(run: Run) -> None:
     report = (run.folder / "report.html").read_text(encoding="utf-8")
     assert "pauses and the transitions of the power modes" in report
+    for method in (
+        "Leaving washer_rinse by eq. (7)",
+        "by cyclic coordinate descent",
+        "The genetic correction",
+    ):
+        assert method in report
     assert 'src="http' not in report
     assert 'href="http' not in report
     assert (run.folder / "demo.png").read_bytes().startswith(b"\x89PNG")

@@ -14,8 +14,9 @@ def sentence(log: ConfigurationLog) -> str:
     """What was done at the station."""
     rejected = sum(count for _, count in log.rejected)
     said = (
-        f"Configurations at {log.station} by cyclic coordinate descent, eqs. (1) to (6): of "
-        f"{log.starts} random starts {log.accepted} were accepted, {log.distinct} of them distinct; {rejected} were rejected"
+        f"Configurations at {log.station} by cyclic coordinate descent, eqs. (1) to (6): "
+        f"of {log.starts} random starts {log.accepted} were accepted, {log.distinct} of them distinct; "
+        f"{rejected} were rejected"
     )
     return f"{said}: {reasons(log.rejected)}." if rejected else f"{said}."
 

@@ -24,8 +24,8 @@ def sentence(log: CorrectionLog) -> str:
     more = percent(after / before - 1.0) if before > 0.0 else ""
     return (
         f"{where}: the straight movement of least W (eq. 9) collides. The genetic correction replaced what "
-        f"collides by {log.generations} generations in {parts}; W of the path changed by {more}. The movement "
-        "that was made of it is certified."
+        f"collides by {log.generations} generations in {parts}; W of the path changed by {more}. The "
+        "movement that was made of it is certified."
     )
 
 

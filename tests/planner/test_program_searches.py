@@ -1,0 +1,167 @@
+"""Cells ask for searches of the paper at stations and steps; what these did travels with the plan."""
+
+from __future__ import annotations
+
+import time
+from importlib.resources import files
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from ir_description import Cell, PowerData, cell_from_yaml, cell_to_yaml
+from ir_description.errors import DescriptionError
+from ir_kernels import Chain
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import MovementKind
+from ir_msgs_py.search_log import LOG, ConfigurationLog, CorrectionLog, SearchLog, WithdrawalLog, log_of
+from ir_planner.errors import RequestError
+from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.request.work import Work
+
+Log = TypeVar("Log", WithdrawalLog, ConfigurationLog, CorrectionLog)
+BENCH = (files("ir_description") / "data" / "cells" / "kr6_bench.yaml").read_text(encoding="utf-8")
+PICK = "abc_deg: [0, 90, 0]}, approach_distance: 0.1}"
+PLACE = "{station: place, dwell: 0.5}"
+ROUNDED = 2e-3  # m: positions in a log are whole millimetres, in three axes
+AT_THE_POSE = 1e-3  # m: Psi below xi (1e-8 m^2), and the rounding
+
+
+def bench(at_pick: str = "", to_place: str = "") -> str:
+    """The bench with more keys at its first station and its second step."""
+    text = BENCH.replace(PICK, PICK.replace("}, app", f"}}, {at_pick} app"), 1) if at_pick else BENCH
+    return text.replace(PLACE, f"{{station: place, {to_place} dwell: 0.5}}", 1) if to_place else text
+
+
+def planned(cell: Cell, power: PowerData, *stations: str, seed: int = 0) -> ProgramPlan:
+    options = PlanOptions(seed=seed, planning_time=60.0)
+    request = ProgramRequest(cell, power, stations, np.array(cell.machine_home), options)
+    return plan_program(request, Work(100_000, time.monotonic() + 60.0, time.monotonic))
+
+
+def logs_of(plan: ProgramPlan) -> list[SearchLog]:
+    found = [log_of(stage.name, stage.note) for stage in plan.info.stages]
+    return [log for log in found if log is not None]
+
+
+@pytest.fixture(scope="module")
+def asked() -> Cell:
+    return cell_from_yaml(
+        bench("configurations: ccd, starts: 40, withdrawal: modified_ga,", "planner: genetic,")
+    )
+
+
+@pytest.fixture(scope="module")
+def plan(asked: Cell, power: PowerData) -> ProgramPlan:
+    found = planned(asked, power)
+    assert found.report.certified
+    return found
+
+
+def one(plan: ProgramPlan, kind: type[Log]) -> Log:
+    (log,) = [log for log in logs_of(plan) if isinstance(log, kind)]
+    return log
+
+
+def test_a_station_that_asks_for_a_withdrawal_is_left_by_it(plan: ProgramPlan, asked: Cell) -> None:
+    log, station = one(plan, WithdrawalLog), asked.station("pick")
+    assert (log.station, log.method, log.load) == ("pick", "modified_ga", "gripper")
+    for places in (log.path, log.kept):
+        assert np.abs(places[0] - station.pose[:3, 3]).max() < ROUNDED
+    assert (log.parents[1:] < np.arange(1, len(log.parents))).all()
+    assert len(log.kept) - 1 + sum(count for _, count in log.rejected) <= log.candidates
+    assert log.distance[1] > log.distance[0]
+    (out,) = [m for m in plan.movements if m.kind == MovementKind.SERVICE_EXIT and m.to_station == "pick"]
+    assert out.trajectory is not None
+    chain = Chain(asked.robot, asked.base_pose, asked.tcp)
+    tcp = chain.tcp_poses(out.trajectory.positions[[0, -1]])[:, :3, 3]
+    assert np.abs(tcp - log.path[[0, -1]]).max() < ROUNDED
+
+
+def test_a_station_may_name_the_trees(power: PowerData) -> None:
+    log = one(planned(cell_from_yaml(bench("withdrawal: tree,")), power, "pick"), WithdrawalLog)
+    assert (log.method, log.generations) == ("tree", 0)
+    assert len(log.path) > 1
+
+
+def test_configurations_of_a_station_come_from_counted_starts(plan: ProgramPlan, asked: Cell) -> None:
+    log, reached = one(plan, ConfigurationLog), asked.station("pick").pose[:3, 3]
+    assert (log.station, log.starts) == ("pick", 40)
+    assert log.accepted + sum(count for _, count in log.rejected) == log.starts == len(log.tracks)
+    assert 1 <= log.distinct <= log.accepted
+    for track in log.tracks:
+        if not track.outcome:
+            assert np.abs(track.points[-1] - reached).max() < AT_THE_POSE
+    reasons = [track.outcome for track in log.tracks if track.outcome]
+    assert {(reason, reasons.count(reason)) for reason in reasons} == set(log.rejected)
+
+
+def test_a_step_s_planner_corrects_its_movement(plan: ProgramPlan) -> None:
+    log = one(plan, CorrectionLog)
+    assert (log.start, log.goal) == ("pick", "place")
+    assert log.generations == sum(len(each) for each in log.fitness) > 0
+    assert all(later <= earlier for each in log.fitness for earlier, later in pairwise(each))
+    assert log.costs[1] > log.costs[0] > 0.0
+    assert np.abs(log.straight[[0, -1]] - log.path[[0, -1]]).max() < ROUNDED
+
+
+def test_what_the_searches_did_is_the_same_for_the_same_seed(
+    plan: ProgramPlan, asked: Cell, power: PowerData
+) -> None:
+    again = planned(cell_from_yaml(cell_to_yaml(asked)), power)
+    assert _notes(again) == _notes(plan)
+    assert len(_notes(plan)) == 3
+    assert again.program_id == plan.program_id
+
+
+def _notes(plan: ProgramPlan) -> list[str]:
+    return [stage.note for stage in plan.info.stages if stage.name.startswith(LOG)]
+
+
+def test_what_a_cell_asks_for_is_written_and_read_again() -> None:
+    text = bench("configurations: ccd, starts: 7, withdrawal: tree,", "planner: genetic,")
+    cell = cell_from_yaml(cell_to_yaml(cell_from_yaml(text)))
+    assert cell.station("pick").search == cell_from_yaml(text).station("pick").search
+    assert (cell.station("pick").search.starts, cell.program[1].planner) == (7, "genetic")
+
+
+@pytest.mark.parametrize(
+    ("at_pick", "to_place", "sentence"),
+    [
+        ("configurations: guess,", "", "analytic, ccd"),
+        ("starts: 8,", "", "belongs to a station with configurations: ccd"),
+        ("configurations: ccd, starts: 0,", "", "[1, 10000]"),
+        ("", "planner: 3,", "planner"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused_at_their_line(
+    at_pick: str, to_place: str, sentence: str
+) -> None:
+    with pytest.raises(DescriptionError) as refused:
+        cell_from_yaml(bench(at_pick, to_place))
+    assert sentence in str(refused.value)
+
+
+def test_a_pause_has_no_planner() -> None:
+    with pytest.raises(DescriptionError, match="does not belong to a pause step"):
+        cell_from_yaml(BENCH.replace("{pause: 30,", "{pause: 30, planner: tree,"))
+
+
+@pytest.mark.parametrize(
+    ("at_pick", "to_place", "sentence"),
+    [
+        (
+            "withdrawal: genetic,",
+            "",
+            "station pick: withdrawal 'genetic' is unknown: known are modified_ga, tree",
+        ),
+        ("", "planner: genetik,", "step 1 of the program: planner 'genetik' is unknown: known are direct, "),
+    ],
+)
+def test_a_search_that_nobody_has_is_refused_with_those_that_are_known(
+    at_pick: str, to_place: str, sentence: str, power: PowerData
+) -> None:
+    with pytest.raises(RequestError) as refused:
+        planned(cell_from_yaml(bench(at_pick, to_place)), power)
+    assert sentence in refused.value.status.message

@@ -1,0 +1,105 @@
+"""What the paper's methods did, on the page: a sentence and a drawing each, from the logs alone."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ir_description import load_cell
+from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog, Track, WithdrawalLog
+from ir_recorder import Analysis
+from ir_recorder.report.methods import methods_section
+from ir_recorder.report.methods.view import HEIGHT, WIDTH, View
+
+ROWS = np.array([[1.8, -1.1, 1.0], [1.7, -1.0, 1.2], [1.4, -0.9, 1.2], [1.3, -0.8, 1.3]])
+WITHDRAWAL = WithdrawalLog(
+    *("washer_rinse", "gripper+gear", "modified_ga", 3, 90, (("gear_held too near washer_plate", 80),)),
+    *((50.0, 66.0), ROWS, np.array([0, 0, 1, 1]), ROWS[:2] + 0.1, ROWS[[0, 1, 3]]),
+)
+CONFIGURATIONS = ConfigurationLog(
+    *("outfeed_place", 5, 2, 1, (("set back for good: gear_held too near outfeed_belt", 3),)),
+    (Track("", ROWS), Track("set back for good: gear_held too near outfeed_belt", ROWS[:2])),
+)
+CORRECTION = CorrectionLog(
+    *("lathe_work", "gauge_measure", 4, ((7.0, 3.0, 1.1), (1.05,)), (100.0, 104.0)),
+    *(ROWS, (ROWS[1:3],), ROWS + 0.2),
+)
+
+
+@pytest.fixture
+def analysis(analysis: Analysis) -> Analysis:
+    """The recording, of the demonstration's cell."""
+    return replace(analysis, cell=load_cell("demo"))
+
+
+def section(analysis: Analysis, *logs: SearchLog) -> str:
+    return methods_section(replace(analysis, recording=replace(analysis.recording, searches=logs)))
+
+
+def test_each_method_has_a_sentence_with_its_figures_and_a_drawing(analysis: Analysis) -> None:
+    html = section(analysis, WITHDRAWAL, CONFIGURATIONS, CORRECTION)
+    first, second, third = re.findall(r"<figcaption>(.*?)</figcaption>", html)
+    assert first.startswith("Leaving washer_rinse by eq. (7): 3 generations drew 90 configurations")
+    assert "3 were kept, 80 dropped (80 gear_held too near washer_plate)" in first
+    assert "from 50.0 m to 66.0 m" in first
+    assert "of 5 random starts 2 were accepted, 1 of them distinct; 3 were rejected" in second
+    assert "From lathe_work to gauge_measure" in third
+    assert "4 generations in 2 populations" in third
+    assert "+4.00 %" in third
+    drawings = [ElementTree.fromstring(svg) for svg in re.findall(r"<svg.*?</svg>", html)]
+    assert len(drawings) == 3
+    assert "http" not in html
+
+
+def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(analysis: Analysis) -> None:
+    (withdrawal,) = re.findall(r"<svg.*?</svg>", section(analysis, WITHDRAWAL))
+    tree = ElementTree.fromstring(withdrawal)
+    groups = {group.get("class"): len(group) for group in tree.iter("g")}
+    assert groups == {"dropped": 2, "kept": 3, "place": 1}
+    assert {path.get("class") for path in tree.iter("path")} == {"tool", "part", "tried"}
+    names = {title.text for title in tree.iter("title")}
+    assert {"washer_plate", "gear_held", "t_f1"} <= names
+    (configurations,) = re.findall(r"<svg.*?</svg>", section(analysis, CONFIGURATIONS))
+    lines = [line.get("class") for line in ElementTree.fromstring(configurations).iter("polyline")]
+    assert sorted(lines) == ["accepted", "tried"]
+
+
+def test_a_recording_without_logs_has_no_such_section(analysis: Analysis) -> None:
+    assert section(analysis) == ""
+
+
+def test_logs_of_another_cell_are_said_in_words_and_texts_are_escaped(analysis: Analysis) -> None:
+    html = section(analysis, replace(WITHDRAWAL, station="<script>"), replace(CORRECTION, goal="a&b"))
+    assert "<script>" not in html
+    assert "&lt;script&gt;" in html
+    assert "a&amp;b" in html
+    assert html.count("<svg") == 1  # the station that isn't there has no drawing
+
+
+@pytest.mark.parametrize("log", [WITHDRAWAL, CONFIGURATIONS, CORRECTION])
+def test_a_log_without_its_cell_is_a_sentence(log: SearchLog, analysis: Analysis) -> None:
+    html = section(replace(analysis, cell=None), log)
+    assert "<figcaption>" in html
+    assert "<svg" not in html
+
+
+@settings(max_examples=50)
+@given(st.lists(st.tuples(*[st.floats(-5.0, 5.0)] * 3), min_size=1, max_size=6), st.floats(-3.2, 3.2))
+def test_all_points_of_a_view_lie_in_it_and_lengths_keep_their_ratio(
+    rows: list[tuple[float, float, float]], turn: float
+) -> None:
+    points, along = np.array(rows), np.array([np.cos(turn), np.sin(turn), 0.3])
+    view = View.from_the_side(points, along, 0.1)
+    flat = view.flat(points)
+    assert (flat >= 0.0).all()
+    assert (flat <= [WIDTH, HEIGHT]).all()
+    right = np.array([np.cos(turn), np.sin(turn), 0.0])
+    for axis, wanted in ((right, [1.0, 0.0]), (np.array([0.0, 0.0, 1.0]), [0.0, -1.0])):
+        moved = view.flat(points[:1] + axis) - view.flat(points[:1])
+        assert moved[0] == pytest.approx(np.array(wanted) * view.scale, abs=1e-6)
