@@ -141,7 +141,7 @@ EXPERIMENT = Experiment(
     "zones, some open, some semi-closed, and movements of two kinds, service movements into and out of a "
     "machine's zone and regional ones from zone to zone. (The figures themselves are not part of this "
     "repository; this is their description.)",
-    "The demonstration cell was made after them: four stations of equipment around the robot, one of "
+    "The demonstration cell was made after them: five stations of equipment around the robot, two of "
     "them semi-closed. Drawn: the cell with its zones and the robot at its park posture; the path of the "
     "tool in the planned program, by kind of movement.",
     measure,

@@ -24,13 +24,14 @@ def methods_section(analysis: Analysis) -> str:
     figures = "".join(_figures(logs, cell))
     if not figures:
         return ""
-    return f'<section id="methods"><h2>What the paper\'s methods did</h2>{_KEY}{figures}</section>'
+    head = "<h2>What the paper's methods did</h2>"
+    return f'<section id="methods">{head}{_KEY}<div class="methods">{figures}</div></section>'
 
 
 def _figures(logs: tuple[SearchLog, ...], cell: Cell | None) -> Iterator[str]:
     for number, log in enumerate(logs):
         words, drawn = _shown(log, cell, number)
-        yield f"<figure><figcaption>{text(words)}</figcaption>{drawn}</figure>"
+        yield f"<figure>{drawn}<figcaption>{text(words)}</figcaption></figure>"
 
 
 def _shown(log: SearchLog, cell: Cell | None, number: int) -> tuple[str, str]:
