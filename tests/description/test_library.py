@@ -139,7 +139,7 @@ def test_the_demo_s_postures_are_free(state: str) -> None:
 
 def test_every_station_of_the_demo_but_the_washer_s_can_be_entered_and_left_straight() -> None:
     """There is a configuration that keeps 30 mm along the whole retraction, allowed contacts apart; in the
-    washer only the line from the station to outside is in the path of a plate.
+    washer a plate of nozzles is in the path of the blank.
     """
     cell = load_cell("demo")
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)

@@ -19,7 +19,7 @@ from ir_recorder.report.methods.view import HEIGHT, WIDTH, View
 
 ROWS = np.array([[1.8, -1.1, 1.0], [1.7, -1.0, 1.2], [1.4, -0.9, 1.2], [1.3, -0.8, 1.3]])
 WITHDRAWAL = WithdrawalLog(
-    *("washer_rinse", "gripper+gear", "modified_ga", 3, 90, (("gear_held too near washer_plate", 80),)),
+    *("washer_rinse", "gripper+gear", "modified_ga", 3, 90, (("gear_held too near washer_nozzles", 80),)),
     *((50.0, 66.0), ROWS, np.array([0, 0, 1, 1]), ROWS[:2] + 0.1, ROWS[[0, 1, 3]]),
 )
 CONFIGURATIONS = ConfigurationLog(
@@ -46,7 +46,7 @@ def test_each_method_has_a_sentence_with_its_figures_and_a_drawing(analysis: Ana
     html = section(analysis, WITHDRAWAL, CONFIGURATIONS, CORRECTION)
     first, second, third = re.findall(r"<figcaption>(.*?)</figcaption>", html)
     assert first.startswith("Leaving washer_rinse by eq. (7): 3 generations drew 90 configurations")
-    assert "3 were kept, 80 dropped (80 gear_held too near washer_plate)" in first
+    assert "3 were kept, 80 dropped (80 gear_held too near washer_nozzles)" in first
     assert "from 50.0 m to 66.0 m" in first
     assert "of 5 random starts 2 were accepted, 1 of them distinct; 3 were rejected" in second
     assert "From lathe_work to gauge_measure" in third
@@ -64,7 +64,7 @@ def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(anal
     assert groups == {"dropped": 2, "kept": 3, "place": 1}
     assert {path.get("class") for path in tree.iter("path")} == {"tool", "part", "tried"}
     names = {title.text for title in tree.iter("title")}
-    assert {"washer_plate", "gear_held", "t_f1"} <= names
+    assert {"washer_nozzles", "gear_held", "t_f1"} <= names
     (configurations,) = re.findall(r"<svg.*?</svg>", section(analysis, CONFIGURATIONS))
     lines = [line.get("class") for line in ElementTree.fromstring(configurations).iter("polyline")]
     assert sorted(lines) == ["accepted", "tried"]

@@ -152,15 +152,13 @@ class _Walker:
             population = self._next(
                 population, max(self.settings.offspring * count // len(population), _FEWEST_OFFSPRING)
             )
-        self.walk.record = WalkRecord(
-            np.array(self.nodes),
-            np.array(self.parents, dtype=np.int64),
-            np.concatenate(self.dropped),
-            self.walk.generations,
-            self.walk.candidates,
-            (self.first_total, self.largest),
-        )
+        self.walk.record = self._record()
         return self.walk
+
+    def _record(self) -> WalkRecord:
+        kept, parents = np.array(self.nodes), np.array(self.parents, dtype=np.int64)
+        counts, distance = (self.walk.generations, self.walk.candidates), (self.first_total, self.largest)
+        return WalkRecord(kept, parents, np.concatenate(self.dropped), *counts, distance)
 
     def _next(self, parents: _Population, offspring: int) -> _Population:
         """One generation: perturb, drop, rank, certify, keep the best."""
@@ -184,13 +182,8 @@ class _Walker:
         stuck = np.flatnonzero(collided if survivors else np.ones(len(parents), dtype=bool))
         if len(stuck):  # all of its offspring collide, or all steps do: look 1 rad around it
             stay = parents.of(stuck)
-            again = _Population(
-                stay.q,
-                stay.total,
-                np.full(len(stuck), self.settings.collision_spread),
-                stay.step * 0.0,
-                stay.node,
-            )
+            wide = np.full(len(stuck), self.settings.collision_spread)
+            again = _Population(stay.q, stay.total, wide, stay.step * 0.0, stay.node)
             children = _joined(children, again)
         return children
 
@@ -300,10 +293,5 @@ class _Walker:
 
 
 def _joined(a: _Population, b: _Population) -> _Population:
-    return _Population(
-        np.concatenate([a.q, b.q]),
-        np.concatenate([a.total, b.total]),
-        np.concatenate([a.sigma, b.sigma]),
-        np.concatenate([a.step, b.step]),
-        np.concatenate([a.node, b.node]),
-    )
+    both = ((getattr(a, name), getattr(b, name)) for name in a.__dataclass_fields__)
+    return _Population(*(np.concatenate(pair) for pair in both))

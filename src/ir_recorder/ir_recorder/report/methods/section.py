@@ -13,7 +13,7 @@ from ir_recorder.report.words import text
 _MOST = 24  # figures
 _KEY = (
     '<p class="hint">Black: the path that was taken on from there. Green: kept or accepted. Red: dropped, '
-    "rejected or colliding. Grey: bodies of the machines, those behind or before the drawn plane as "
+    "rejected or colliding. Grey: bodies of the machines, those that are not near the drawn plane as "
     "outlines.</p>"
 )
 

@@ -71,14 +71,15 @@ class View:
     def machines(
         self, cell: Cell, station: str, near: FloatArray | None = None, depth: float = np.inf
     ) -> str:
-        """The bodies of the machines; as outlines only those of machines other than the station's ("": of
-        none), and those that don't come within `depth` m of the plane through `near` (3,).
+        """The bodies of the machines, those of others than the station's as outlines ("": of none); with
+        `near` (3,) those of its own machine alone, as outlines what isn't within `depth` m of the plane there.
         """
         own = cell.station(station).equipment if station else ""
         parts = []
         for machine in cell.equipment:
             within = depth if own in ("", machine.name) else -np.inf
-            parts += [self._outline(body, near, within) for body in machine.world_bodies()]
+            if near is None or own == machine.name:
+                parts += [self._outline(body, near, within) for body in machine.world_bodies()]
         return "".join(parts)
 
     def _outline(self, body: Body, near: FloatArray | None, depth: float) -> str:

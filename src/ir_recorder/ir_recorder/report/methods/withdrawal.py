@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ir_description import Cell
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.search_log import WithdrawalLog
 from ir_recorder.report.methods.view import View, drawing
 from ir_recorder.report.methods.words import reasons
 
+_LEAST = 0.05  # m: a path that goes less far sideways is seen across the direction to the robot
 _DEPTH = 0.12  # m: bodies farther from the plane of the drawing are outlines
 
 
@@ -31,11 +35,11 @@ def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
     station = next((each for each in cell.stations if each.name == log.station), None)
     if station is None or len(log.path) < 2:
         return ""
-    view = View.from_the_side(log.path, station.pose[:3, 0], 0.55)
+    view = View.from_the_side(log.path, _sideways(log, station.pose[:3, 3] - cell.base_pose[:3, 3]), 0.4)
     child, parent = log.kept[1:], log.kept[log.parents[1:]]
     content = (
-        view.machines(cell, log.station, log.path[0], _DEPTH),
         view.held(cell, log.load, station.pose),
+        view.machines(cell, log.station, log.path[0], _DEPTH),
         view.segments(parent, child, "tried"),
         view.dots(log.dropped, "dropped", 1.6),
         view.dots(child, "kept", 2.2),
@@ -44,3 +48,13 @@ def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
     )
     label = f"Withdrawal from {log.station}, seen from the side: {len(log.kept)} kept configurations"
     return drawing(content, label, f"withdrawal_{number}")
+
+
+def _sideways(log: WithdrawalLog, radial: FloatArray) -> FloatArray:
+    """The horizontal direction (3,) in which the path goes farthest, away from the robot; `radial` (3,): from
+    the robot to the station.
+    """
+    away = (log.path - log.path[0]) * [1.0, 1.0, 0.0]
+    reach = np.linalg.norm(away, axis=1)
+    farthest: FloatArray = away[int(np.argmax(reach))] if reach.max() > _LEAST else radial
+    return farthest if farthest @ radial >= 0.0 else -farthest
