@@ -72,7 +72,7 @@ class View:
         self, cell: Cell, station: str, near: FloatArray | None = None, depth: float = np.inf
     ) -> str:
         """The bodies of the machines, those of others than the station's as outlines ("": of none); with
-        `near` (3,) those of its own machine alone, as outlines what isn't within `depth` m of the plane there.
+        `near` (3,) those of its machine alone, as outlines what isn't within `depth` m of the plane there.
         """
         own = cell.station(station).equipment if station else ""
         parts = []
