@@ -202,7 +202,9 @@ class Cell:
         """Return the cell with a station elsewhere at its machine, whose default zone follows."""
         old = self.station(name)
         machine = self.machine(old.equipment)
-        moved = station_at(machine, name, pose_in_equipment, old.allowed_contacts, old.approach_distance)
+        moved = station_at(
+            machine, name, pose_in_equipment, old.allowed_contacts, old.approach_distance, old.search
+        )
         stations = tuple(moved if station is old else station for station in self.stations)
         mine = [tuple(s for s in each if s.equipment == machine.name) for each in (self.stations, stations)]
         equipment = self.equipment
