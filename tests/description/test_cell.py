@@ -82,7 +82,7 @@ def test_a_part_is_a_body_where_it_lies_and_a_load_while_it_is_held(cell: Cell) 
     assert "gear_lying" in [body.name for body in cell.bodies(start)]
     assert "gear_lying" not in [body.name for body in cell.bodies(held)]
     assert [load.name for load in cell.loads(held.held)] == ["gripper", "gear"]
-    put = held.after(cell.program[4])
+    put = held.after(next(step for step in cell.program if step.detach))
     lying = next(body for body in cell.bodies(put) if body.name == "gear_lying")
     held_centre = (
         cell.station("outfeed_place").pose @ inverse(cell.tcp) @ np.append(cell.loads("gear")[1].com, 1.0)
