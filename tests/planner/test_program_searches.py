@@ -151,12 +151,8 @@ def test_a_pause_has_no_planner() -> None:
 @pytest.mark.parametrize(
     ("at_pick", "to_place", "sentence"),
     [
-        (
-            "withdrawal: genetic,",
-            "",
-            "station pick: withdrawal 'genetic' is unknown: known are modified_ga, tree",
-        ),
-        ("", "planner: genetik,", "step 1 of the program: planner 'genetik' is unknown: known are direct, "),
+        ("withdrawal: genetic,", "", "station pick: withdrawal 'genetic' is unknown: known are "),
+        ("", "planner: genetik,", "step 1 of the program: planner 'genetik' is unknown: known are "),
     ],
 )
 def test_a_search_that_nobody_has_is_refused_with_those_that_are_known(
@@ -165,3 +161,4 @@ def test_a_search_that_nobody_has_is_refused_with_those_that_are_known(
     with pytest.raises(RequestError) as refused:
         planned(cell_from_yaml(bench(at_pick, to_place)), power)
     assert sentence in refused.value.status.message
+    assert "tree" in refused.value.status.message

@@ -2,19 +2,19 @@
 the chain that was chosen.
 """
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ir_description import Cell, Station
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.search_log import CorrectionLog, SearchLog, WithdrawalLog
-from ir_msgs_py.status import StatusCode
-from ir_planner.errors import RequestError
 from ir_planner.program.choice import Choice
 from ir_planner.program.node import Node
 from ir_planner.program.steps import PlacedStep
 from ir_planner.regional import Searches
+from ir_planner.request import chosen
 from ir_planner.scene import PlanningScene
 from ir_planner.service import EXIT_SEARCHES, ExitPath
 
@@ -26,25 +26,18 @@ def check_searches(cell: Cell, steps: Sequence[PlacedStep], searches: Searches) 
     """Raise RequestError for a step or a station that asks for a search nobody has."""
     visited = {placed.step.target for placed in steps}
     for k, placed in enumerate(steps):
-        _known(f"step {k} of the program: planner", placed.step.planner, searches)
+        chosen(placed.step.planner, ("", *searches), f"step {k} of the program: planner")
     for station in cell.stations:
         if station.name in visited:
-            _known(f"station {station.name}: withdrawal", station.search.withdrawal, EXIT_SEARCHES)
-
-
-def _known(what: str, name: str, known: Container[str] | Searches) -> None:
-    if name and name not in known:
-        listed = ", ".join(known)  # type: ignore[arg-type]
-        raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS, f"{what} {name[:60]!a} is unknown: known are {listed}"
-        )
+            known = ("", *EXIT_SEARCHES)
+            chosen(station.search.withdrawal, known, f"station {station.name}: withdrawal")
 
 
 def logs_of(choice: Choice) -> Iterator[SearchLog]:
     """Of the withdrawals and genetic corrections along a chain, each once."""
     movements, seen = choice.movements, set[int]()
-    for place, chosen in enumerate(choice.chain.chosen):
-        node: Node = movements.layers[place][chosen]
+    for place, row in enumerate(choice.chain.chosen):
+        node: Node = movements.layers[place][row]
         found = node.line.exit
         if found is not None and id(found) not in seen:
             seen.add(id(found))
@@ -64,7 +57,7 @@ def _withdrawal_log(station: Station, found: ExitPath, scene: PlanningScene) -> 
     along = np.ascontiguousarray(steps.transpose(1, 0, 2).reshape(-1, found.points.shape[1]))
     walk, rejected = found.search.walk, found.search.rejected
 
-    def tool(q: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> np.ndarray:
+    def tool(q: FloatArray) -> FloatArray:
         return scene.chain.tcp_poses(np.ascontiguousarray(q))[:, :3, 3] if len(q) else np.zeros((0, 3))
 
     kept = found.points[:1] if walk is None else walk.kept
