@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 from _drives import Drives
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.arrays import FloatArray
@@ -21,7 +21,8 @@ _TURN = np.radians(30.0)
 _DRAWS = 40  # of the oracle
 _STEP, _JUMP = 5e-3, 0.2  # m between its samples, rad between two of them
 _ERROR, _TURNED = 1e-4, 1e-2  # m that the tool may be off the path, and rad
-_ASKED = 200  # configurations at which torque is asked for
+_SHORTEST, _RAMPS = 0.02, 9  # s of a ramp, and how many are tried at each end
+_ASKED = 100  # configurations at which torque is asked for
 
 
 def random_path(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
@@ -75,7 +76,7 @@ def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
 
 def oracle(path: CartesianPath, scene: PlanningScene, rng: np.random.Generator) -> bool:
     """Whether some configuration, followed from the start with an angle that changes evenly, keeps to the
-    path, axis limits, distances, speeds, accelerations and torque at the speed asked for.
+    path, axis limits, distances, speeds, accelerations and torque at the speed asked for, from rest to rest.
 
     It keeps the reserve of torque that the planner leaves to the feedback in every movement.
     """
@@ -122,18 +123,47 @@ def _followed(q: FloatArray, sets: list[FloatArray]) -> FloatArray | None:
 
 
 def _drivable(q: FloatArray, s: FloatArray, speed: float, scene: PlanningScene) -> bool:
-    robot = scene.cell.robot
+    """Whether the chain is free and can be driven from rest to rest, with one of some ramps at each end."""
     if not scene.collision.is_free(q, scene.thresholds(MARGIN)).all():
         return False
+    if any(np.abs(b - a).max() > _JUMP for a, b in itertools.pairwise(q)):
+        return False
     spline = make_interp_spline(s, q, k=5)
-    at = np.linspace(s[0], s[-1], _ASKED)
-    qd, qdd, qddd = (spline(at, nu=k) * speed**k for k in (1, 2, 3))
+    ramps = np.geomspace(_SHORTEST, max(s[-1] / speed, 2.0 * _SHORTEST), _RAMPS)
+    return all(
+        any(_within(_half(spline, s[-1], speed, ramp, back), scene) for ramp in ramps) for back in (0, 1)
+    )
+
+
+def _half(
+    spline: BSpline, length: float, speed: float, ramp: float, back: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """q and its derivatives by time (M, n) from one end to the middle, speed rising as 3 x^2 - 2 x^3."""
+    x = np.linspace(0.0, 1.0, _ASKED)
+    v, a, j = speed * x**2 * (3 - 2 * x), speed / ramp * 6 * x * (1 - x), speed / ramp**2 * (6 - 12 * x)
+    at = speed * ramp * x**3 * (1.0 - 0.5 * x)
+    even = np.linspace(at[-1], max(0.5 * length, at[-1]), _ASKED)
+    at, v = np.concatenate([at, even]), np.concatenate([v, np.full(_ASKED, speed)])
+    a, j = (np.concatenate([one, np.zeros(_ASKED)])[:, None] for one in (a, j))
+    if at[-1] > length:  # no room for the ramp
+        return tuple(np.full((1, spline.c.shape[1]), np.inf) for _ in range(4))  # type: ignore[return-value]
+    sign = -1.0 if back else 1.0  # a motion back in time keeps the same limits
+    q, first, second, third = (spline(length - at if back else at, nu=k) * sign**k for k in range(4))
+    v = v[:, None]
+    return (
+        q,
+        first * v,
+        second * v**2 + first * a,
+        third * v**3 + 3.0 * second * v * a + first * j,
+    )
+
+
+def _within(motion: tuple[FloatArray, FloatArray, FloatArray, FloatArray], scene: PlanningScene) -> bool:
+    q, qd, qdd, qddd = motion
+    robot = scene.cell.robot
     bounds = ((qd, robot.velocity_max), (qdd, robot.acceleration_max), (qddd, robot.jerk_max))
     if any((np.abs(values) > bound).any() for values, bound in bounds):
         return False
     drives = Drives(scene)
-    share = np.abs(drives.torque(spline(at), qd, qdd)) / drives.envelope(qd)
-    moving = itertools.pairwise(q)
-    return bool(
-        share.max() < scene.limits.torque_share and all(np.abs(b - a).max() <= _JUMP for a, b in moving)
-    )
+    share = np.abs(drives.torque(q, qd, qdd)) / drives.envelope(qd)
+    return bool(share.max() < scene.limits.torque_share)

@@ -114,13 +114,15 @@ def timed_stroke(
     scene: PlanningScene,
 ) -> TimedStroke:
     """The stroke from rest to rest within the limits. Raises PathRefusedError with place and axis."""
+    slow = True
     while True:
-        ramps = np.array([_ramp(curve, spans, k, limits, scene) for k in range(len(spans) + 1)])
+        ramps = np.array([_ramp(curve, spans, k, limits, scene, slow) for k in range(len(spans) + 1)])
         try:
             made = TimedStroke(curve, law_of(spans, ramps))
             break
         except TooShortError as error:
-            spans = _slower(spans, error, tolerance, ramps)
+            spans = spans if slow else _slower(spans, error, tolerance, ramps)
+            slow = False
     tau = _instants(made.law)
     if use_of(made.at(tau), limits, scene).max() <= _ENOUGH:
         return made
@@ -150,11 +152,16 @@ def _instants(law: SpeedLaw) -> FloatArray:
 
 
 def _ramp(
-    curve: JointCurve, spans: tuple[Span, ...], k: int, limits: MotionLimits, scene: PlanningScene
+    curve: JointCurve,
+    spans: tuple[Span, ...],
+    k: int,
+    limits: MotionLimits,
+    scene: PlanningScene,
+    slow: bool,
 ) -> float:
     """The shortest ramp [s] between the speeds at boundary k that needs no more of the limits than the
-    constant speed beside it does; where that is too much, one that keeps them: a path that begins near a
-    singularity is driven slowly there.
+    constant speed beside it does. slow: where that is too much, one that keeps them, if there is one; a path
+    that begins near a singularity is driven slowly there.
     """
     _, first, last = ramp_places(spans, k, _RAMPS[:1])
     if first == last:
@@ -164,10 +171,10 @@ def _ramp(
         return _ramps_use(curve, spans, k, durations, limits, scene)
 
     found = _shortest(lambda durations: np.less_equal(*_beside(*use(durations))))
-    if use(np.array([found]))[0][0] > _ENOUGH:
-        slow = _shortest(lambda durations: use(durations)[0] <= _USED)
-        if use(np.array([slow]))[0][0] <= _ENOUGH:
-            return slow
+    if slow and use(np.array([found]))[0][0] > _ENOUGH:
+        longer = _shortest(lambda durations: use(durations)[0] <= _USED)
+        if use(np.array([longer]))[0][0] <= _ENOUGH:
+            return longer
     return found
 
 
