@@ -57,6 +57,7 @@ from ir_description.library import (
 from ir_description.robot import (
     AXIS_UNITS,
     DATA_SHEET,
+    IDLE,
     RELATIVE_DEVIATION,
     Counterbalance,
     FramePose,
@@ -77,6 +78,7 @@ from ir_msgs_py.plc import Signal
 __all__ = [
     "AXIS_UNITS",
     "DATA_SHEET",
+    "IDLE",
     "RELATIVE_DEVIATION",
     "AllowedContact",
     "Body",

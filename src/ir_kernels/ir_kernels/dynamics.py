@@ -129,10 +129,11 @@ class DynamicsModel:
         return power + self.further_losses(qd, tau) if self.lossy else power
 
     def further_losses(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Losses (N, n) W that most data have at zero: k_fe qd^2 + k_i |tau / ratio| + k_g |tau qd|."""
+        """Losses (N, n) W that most data have at zero: k_fe qd^2 + k_i |tau / ratio| + k_g |tau qd| + P_0."""
         speed, torque, d = np.asarray(qd, float), np.abs(np.asarray(tau, float)), self.data
         inverter = d.inverter_loss / np.abs(d.gear_ratio)
-        return np.asarray(d.iron_loss * speed**2 + torque * (inverter + d.gear_loss * np.abs(speed)))
+        by_torque = torque * (inverter + d.gear_loss * np.abs(speed))
+        return np.asarray(d.iron_loss * speed**2 + by_torque + d.idle_loss)
 
     def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
         """Power (N, n) W each axis takes from the DC bus along a motion: `axis_power` of

@@ -14,7 +14,7 @@ from ir_kernels.robot_like import CounterbalanceLike, LoadLike, RobotLike
 from ir_msgs_py.arrays import FloatArray
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
-FURTHER_LOSSES = ("iron_loss", "inverter_loss", "gear_loss")  # a robot without them has none
+FURTHER_LOSSES = ("iron_loss", "inverter_loss", "gear_loss", "idle_loss")  # a robot without them has none
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class DynamicsData:
     origin (n, 4, 4), axis (n, 3): the joints, each in the frame of the link before. mass (n,), com (n, 3),
     inertia (n, 3, 3) about the centre of mass: the moving links 1..n with the loads in the last one. gravity
     (3,): the acceleration of free fall in the frame of link 0. rotor_inertia, viscous, coulomb,
-    gear_ratio, copper_loss, iron_loss, inverter_loss, gear_loss (n,): the drives. envelope_speed (n, K),
-    envelope_torque (n, K + 1): torque available, a step down at the first speed.
+    gear_ratio, copper_loss, iron_loss, inverter_loss, gear_loss, idle_loss (n,): the drives. envelope_speed
+    (n, K), envelope_torque (n, K + 1): torque available, a step down at the first speed.
     """
 
     origin: FloatArray
@@ -60,6 +60,7 @@ class DynamicsData:
     iron_loss: FloatArray
     inverter_loss: FloatArray
     gear_loss: FloatArray
+    idle_loss: FloatArray
     envelope_speed: FloatArray
     envelope_torque: FloatArray
     counterbalance: CounterbalanceData | None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_cli.excitation.pool import Excursion
-from ir_description import Load, PowerParameters
+from ir_description import IDLE, Load, PowerParameters
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.measure import PowerModel, planned_samples
 
@@ -89,7 +89,7 @@ class Design:
             watts += sum(load.watts_drive_bus for load in loads)
         still[self._prior.index("tool_watts")] = watts
         if mode == "STAND_ON_MOTORS":
-            still[self._prior.index("drives_watts")] = 1.0
+            still[self._prior.index("drives_watts")] = still[self._prior.index(IDLE)] = 1.0
         scaled = still * self._scale
         self._information = self._information + np.outer(scaled, scaled) * seconds / WINDOW / NOISE**2
 

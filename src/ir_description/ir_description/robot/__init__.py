@@ -15,6 +15,7 @@ from ir_description.robot.power import (
 )
 from ir_description.robot.power_parameters import (
     AXIS_UNITS,
+    IDLE,
     SCALARS,
     PowerParameters,
     parameter_names,
@@ -27,6 +28,7 @@ from ir_description.robot.robot import Counterbalance, RobotModel
 __all__ = [
     "AXIS_UNITS",
     "DATA_SHEET",
+    "IDLE",
     "MASS_MAX",
     "NO_TABLE",
     "RELATIVE_DEVIATION",

@@ -1,7 +1,8 @@
 """What the joules of a robot follow from, as one named vector with its covariance.
 
 Per joint the friction, the copper losses and three losses that the data sheet does not have (zero there);
-for the whole robot scales of masses and of watts, the rectifier and the controller's watts by mode. A fit
+for the whole robot scales of masses and of watts, the rectifier, idle inverters and the controller's watts by
+mode. A fit
 gives the same vector with another mean and covariance, so planner, driver and report load both alike.
 """
 
@@ -43,6 +44,9 @@ SCALARS = (
 )
 """Factors of what the data say (1: as they say), and the share of the mains power that reaches the bus."""
 
+IDLE = "idle_watts"
+"""W that the inverters of all axes together take from the DC link while the motors are on, whatever moves."""
+
 _HIGHEST = {"gear": 0.9, "rectifier_efficiency": 1.0} | dict.fromkeys(SCALARS[:5], 10.0)
 _LOWEST = {"rectifier_efficiency": 0.5, "rotor_inertia": 0.1, "link_mass": 0.1}
 _MOST = 1e9
@@ -50,11 +54,14 @@ _SYMMETRIC = 1e-9  # relative to the variances: rounding of a file's digits
 
 
 def parameter_names(joints: Iterable[str], modes: Iterable[str]) -> tuple[str, ...]:
-    """Names in their order: "viscous.joint_a1" .., the scalars, "drives_watts", "watts.STAND_ON_MOTORS" .."""
+    """Names in their order: "viscous.joint_a1" .., the scalars, "idle_watts", "drives_watts",
+    "watts.STAND_ON_MOTORS" ..
+    """
     axes = tuple(joints)
     return (
         *(f"{term}.{joint}" for term in AXIS_UNITS for joint in axes),
         *SCALARS,
+        IDLE,
         "drives_watts",
         *(f"watts.{mode}" for mode in modes),
     )
@@ -63,7 +70,7 @@ def parameter_names(joints: Iterable[str], modes: Iterable[str]) -> tuple[str, .
 def parameter_unit(name: str) -> str:
     """The unit of a parameter, "" for factors and shares."""
     kind = name.partition(".")[0]
-    return "W" if kind in ("watts", "drives_watts") else AXIS_UNITS.get(kind, "")
+    return "W" if kind in ("watts", "drives_watts", IDLE) else AXIS_UNITS.get(kind, "")
 
 
 def physical_bounds(names: Iterable[str]) -> tuple[FloatArray, FloatArray]:
@@ -172,6 +179,7 @@ class PowerParameters:
             iron_loss=self.axis("iron"),
             inverter_loss=self.axis("inverter"),
             gear_loss=self.axis("gear"),
+            idle_loss=np.full(robot.n, self.value(IDLE) / robot.n),
             reflected_inertia=robot.reflected_inertia * self.value("rotor_inertia"),
             link_mass=robot.link_mass * mass,
             link_inertia=robot.link_inertia * mass,

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ir_description.robot.power import PowerData
-from ir_description.robot.power_parameters import SCALARS, PowerParameters, parameter_names
+from ir_description.robot.power_parameters import IDLE, SCALARS, PowerParameters, parameter_names
 from ir_description.robot.robot import RobotModel
 
 DATA_SHEET = "data_sheet"
@@ -40,6 +40,10 @@ INVERTER_WATTS = 3.0
 GEAR_SHARE = 0.04
 """Loss of the gears that grows with the torque, beyond the friction that the data have; half normal."""
 
+IDLE_WATTS = 10.0
+"""Per axis: switching losses of an inverter without a current; half normal. The data count them with the
+drives; but they come from the DC link, where braking axes pay for them."""
+
 RECTIFIER_LOSS = 0.02
 """Diode rectifier and mains filter; half normal below 1."""
 
@@ -60,7 +64,11 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
     """The parameters as the data have them, independent, with the deviations of this module."""
     joints, modes = robot.joint_names, tuple(mode.name for mode in power.modes)
     names = parameter_names(joints, modes)
-    watts = [power.drives_and_brake_release, *(mode.controller_watts for mode in power.modes)]
+    watts = [
+        float(robot.idle_loss.sum()),
+        power.drives_and_brake_release,
+        *(mode.controller_watts for mode in power.modes),
+    ]
     means = (
         robot.friction_viscous,
         robot.friction_coulomb,
@@ -98,6 +106,7 @@ def _assumed(robot: RobotModel) -> dict[str, float]:
         "counterbalance": COUNTERBALANCE,
         "tool_watts": TOOL_WATTS,
         "rectifier_efficiency": RECTIFIER_LOSS,
+        IDLE: IDLE_WATTS * robot.n,
     }
 
 

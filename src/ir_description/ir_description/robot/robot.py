@@ -52,6 +52,9 @@ class Counterbalance:
             object.__setattr__(self, name, value)
 
 
+_NOT_IN_DATA = ("iron_loss", "inverter_loss", "gear_loss", "idle_loss")
+
+
 @dataclass(frozen=True, eq=False)
 class RobotModel:
     """One robot. SI, all arrays float64 and read-only.
@@ -62,7 +65,8 @@ class RobotModel:
     link_mass (n+1,) kg, link_com (n+1, 3) m in the link frame, link_inertia (n+1, 3, 3) kg m^2 about the com.
     gear_ratio (n,), reflected_inertia kg m^2, friction_viscous Nm s/rad, friction_coulomb Nm (joint side),
     copper_loss W/Nm^2 of MOTOR torque; iron_loss W s^2/rad^2 of joint speed squared, inverter_loss W/Nm of
-    motor torque magnitude, gear_loss share of |joint torque x speed|: none where not given.
+    motor torque magnitude, gear_loss share of |joint torque x speed|, idle_loss W of an inverter that is on:
+    none where not given.
     envelope_speed (n, K) rad/s, envelope_torque (n, K+1) Nm: the torque available is envelope_torque[:, 0]
     below the first speed, steps down to [:, 1] there, is linear between (speed[k], torque[k+1]) and stays at
     the last value. It bounds the total torque, rotor inertia and friction included.
@@ -102,6 +106,7 @@ class RobotModel:
     iron_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
     inverter_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
     gear_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    idle_loss: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
     title: str = field(default="", repr=False)
     controller: PowerData = field(default_factory=without_table, repr=False)
     marks: Mapping[str, str] = field(default_factory=dict, repr=False)
@@ -109,7 +114,7 @@ class RobotModel:
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
-        for name in ("iron_loss", "inverter_loss", "gear_loss"):
+        for name in _NOT_IN_DATA:
             if len(getattr(self, name)) == 0:
                 object.__setattr__(self, name, np.zeros(n))
         shapes: dict[str, tuple[int | None, ...]] = {
@@ -129,6 +134,7 @@ class RobotModel:
             "iron_loss": (n,),
             "inverter_loss": (n,),
             "gear_loss": (n,),
+            "idle_loss": (n,),
             "envelope_speed": (n, None),
             "envelope_torque": (n, None),
             "machine_home": (n,),
@@ -155,7 +161,7 @@ class RobotModel:
         for name in positive:
             if (getattr(self, name) <= 0.0).any():
                 raise InvalidValueError(f"{name} must be above 0 everywhere")
-        losses = ("copper_loss", "iron_loss", "inverter_loss", "gear_loss")
+        losses = ("copper_loss", *_NOT_IN_DATA)
         for name in ("reflected_inertia", "friction_viscous", "friction_coulomb", *losses):
             if (getattr(self, name) < 0.0).any():
                 raise InvalidValueError(f"{name} must not be negative")

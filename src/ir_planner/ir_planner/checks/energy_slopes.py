@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import AXIS_UNITS
+from ir_description import AXIS_UNITS, IDLE
 from ir_kernels import DcBus, dc_bus
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory, Samples
@@ -139,6 +139,7 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     }
     for term in AXIS_UNITS:
         slope[parameters.places(term)] = axes[term].sum(axis=0)
+    slope[parameters.index(IDLE)] = at.price.mean(axis=1).sum()  # of all axes alike
     rotor, balance = d.rotor_inertia * qdd, model.counterbalance(q)
     body = at.torque - rotor - d.viscous * qd - d.coulomb * direction + balance
     carried = _carried(at, scene)

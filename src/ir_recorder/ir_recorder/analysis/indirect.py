@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ir_description import Load, PowerParameters, RobotModel
+from ir_description import IDLE, Load, PowerParameters, RobotModel
 from ir_description.robot import DcLink
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import RecorderError
@@ -82,8 +82,9 @@ class IndirectMeter:
         step = float((end - start) / len(time))
         motor = torque / self._robot.gear_ratio
         axes = torque * speed + of("copper") * motor**2 + of("inverter") * np.abs(motor)
-        flow = bus_flow(self._link, (axes + of("iron") * speed**2).sum(axis=1), step)
         value = self._parameters.value
+        wanted = (axes + of("iron") * speed**2).sum(axis=1) + value(IDLE)
+        flow = bus_flow(self._link, wanted, step)
         base = value("watts.STAND_ON_MOTORS") + value("drives_watts")
         tool = sum(load.watts_always + load.watts_drive_bus for load in loads)
         bus = flow.watts.mean() / value("rectifier_efficiency")

@@ -17,25 +17,24 @@ from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import FitError
 from ir_recorder.fit.plausible import check_explained
 from ir_recorder.fit.residuals import (
-    FOLDS,
     WINDOW,
     by_window,
     correlation_length,
     inverse,
-    left_out,
     rests,
     safe,
     scaled,
 )
+from ir_recorder.fit.widening import Stretch, fold_of, widening
 from ir_recorder.measure import PowerModel, Samples, movements
 
 DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
 LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
+SOFTNESS = (10.0, 2.0, 0.3)  # J: of the DC link, where the descent begins; its kinks make local minima
 _ROUNDS = 30
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)  # of a step: the DC link makes kinks
 _DONE = 1e-4  # of a deviation: the largest change of a last step
 _REWEIGHTED = 3  # times that the noise is estimated anew
-_MOST_WIDENED = 1e4  # of the variance of the noise
 _SHORTEST = 100  # residuals that a fit needs
 
 
@@ -105,17 +104,24 @@ class _Estimate:
         self._free = prior.deviation > 0.0
 
     def result(self, name: str) -> Fit:  # long: one field per line
-        """Both noises and the parameters in turn, then once more with what is not determined as before."""
+        """Both noises and the parameters in turn, then with the noise that explains what was left out, and
+        once more with what is not determined as before.
+        """
         noise, correlated, mean = (50.0, 50.0), (1.0, 1.0), self._prior.mean.copy()
+        for softness in SOFTNESS:
+            mean, _ = self._solve(mean, self._weight(noise, correlated), self._free, softness)
         for _ in range(_REWEIGHTED):
-            mean, precision = self._solve(mean, noise, correlated, self._free)
+            mean, _ = self._solve(mean, self._weight(noise, correlated), self._free)
             noise, correlated = self._noise(mean)
-        mean, precision = self._solve(mean, noise, correlated, self._free)
+        weight = self._weight(noise, correlated)
+        mean, _ = self._solve(mean, weight, self._free)
+        inflation = self._widening(mean, weight)
+        weight = weight / np.sqrt(inflation)
+        mean, precision = self._solve(mean, weight, self._free)
+        left = np.sqrt(np.diag(inverse(precision, self._prior.deviation))) / safe(self._prior.deviation)
+        determined = np.asarray(self._free & (left < DETERMINED))
+        mean, precision = self._solve(mean, weight, determined)
         covariance = inverse(precision, self._prior.deviation)
-        left = np.sqrt(np.diag(covariance)) / safe(self._prior.deviation)
-        determined = self._free & (left < DETERMINED)
-        mean, _ = self._solve(mean, noise, correlated, determined)
-        covariance, inflation = self._widened(mean, noise, correlated)
         sources = np.where(determined, "fit", self._prior.sources)
         found = replace(
             self._prior,
@@ -128,7 +134,7 @@ class _Estimate:
         check_explained(self._watts, self._reduced(after), self._moving)
         return Fit(
             found,
-            np.asarray(determined),
+            determined,
             self._movements(before, after),
             self._reduced(self._samples.time),
             self._watts,
@@ -142,25 +148,24 @@ class _Estimate:
     def _reduced(self, values: FloatArray) -> FloatArray:
         return np.asarray(by_window(values)[self._windows])
 
+    def _weight(self, noise: tuple[float, float], correlated: tuple[float, float]) -> FloatArray:
+        """One over the deviation (W,) [W] with which a window counts."""
+        rest, moving = (n * np.sqrt(c) for n, c in zip(noise, correlated, strict=True))
+        return np.asarray(1.0 / np.where(self._moving, moving, rest))
+
     def _solve(
-        self,
-        start: FloatArray,
-        noise: tuple[float, float],
-        correlated: tuple[float, float],
-        free: BoolArray,
+        self, start: FloatArray, weight: FloatArray, free: BoolArray, softness: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """The parameters of least cost with those that are not free as in the prior; and the precision
         (P, P).
         """
         mean = np.where(free, start, self._prior.mean)
-        rest, moving = (n * np.sqrt(c) for n, c in zip(noise, correlated, strict=True))
-        weight = 1.0 / np.where(self._moving, moving, rest)
-        cost, residual, slopes = self._at(mean, weight)
+        cost, residual, slopes = self._at(mean, weight, softness)
         for _ in range(_ROUNDS):
             step = self._step(mean, residual, slopes, free)
             for share in _SHARES:
                 trial = np.clip(mean + share * step, self._low, self._high)
-                better = self._at(trial, weight)
+                better = self._at(trial, weight, softness)
                 if better[0] <= cost:
                     break
             else:
@@ -171,9 +176,11 @@ class _Estimate:
                 break
         return mean, slopes.T @ slopes + self._pull.T @ self._pull
 
-    def _at(self, mean: FloatArray, weight: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    def _at(
+        self, mean: FloatArray, weight: FloatArray, softness: float
+    ) -> tuple[float, FloatArray, FloatArray]:
         """Cost, weighted residuals (W,) and their slopes (W, P)."""
-        watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
+        watts, slopes = self._model.watts_and_slopes(mean, self._prepared, softness)
         residual = weight * (self._watts - self._reduced(watts))
         weighted = weight[:, None] * by_window(slopes)[self._windows]
         pulled = self._pull @ (mean - self._prior.mean)
@@ -215,44 +222,23 @@ class _Estimate:
             if np.isfinite(watts[first:behind]).all()
         )
 
-    def _widened(  # long: one computation
-        self, mean: FloatArray, noise: tuple[float, float], correlated: tuple[float, float]
-    ) -> tuple[FloatArray, float]:
-        """The covariance (P, P) that explains the residual energies of movements and rests, each predicted
-        without its part of the data, and the factor on the noise that it takes.
-
-        What residuals of neighbouring windows share is no noise of the meter but what the model lacks; other
-        movements will meet it too.
-        """
+    def _widening(self, mean: FloatArray, weight: FloatArray) -> float:
+        """The factor on the noise that the residual energies of movements and rests take."""
         watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
-        missing, reduced = self._samples.watts - watts, by_window(slopes)[self._windows]
+        missing, step = self._samples.watts - watts, WINDOW
         residual = self._watts - self._reduced(watts)
         moved = residual[self._moving]
         white = 0.5 * float(np.mean(np.diff(moved) ** 2)) if len(moved) > 1 else 0.0
-        rest, moving = (
-            reduced[rows].T @ reduced[rows] / (n**2 * c)
-            for rows, n, c in zip((~self._moving, self._moving), noise, correlated, strict=True)
-        )
-        pull = self._pull.T @ self._pull
-        weight = 1.0 / np.where(
-            self._moving, *(n * np.sqrt(c) for n, c in zip(noise[::-1], correlated[::-1], strict=True))
-        )
-        shifts = left_out(weight[:, None] * reduced, weight * residual, pull)
-        part = self._windows[-1] * WINDOW / FOLDS + 1.0  # samples of a fold
-        runs = [
-            (
-                slope,
-                missing[a:b].sum() - slope @ shifts[min(int(a / part), FOLDS - 1)],
-                white * WINDOW * (b - a),
+        stretches = [
+            Stretch(
+                fold_of(int(np.searchsorted(self._windows, (a + b) // 2 // step)), len(residual)),
+                float(missing[a:b].sum()),
+                slopes[a:b].sum(axis=0),
+                white * step * (b - a),
             )
             for a, b in (*movements(self._samples), *rests(self._samples))
             if np.isfinite(missing[a:b]).all()
-            for slope in (slopes[a:b].sum(axis=0),)
         ]
-        factor = 1.0
-        while True:
-            covariance = inverse((rest + moving) / factor + pull, self._prior.deviation)
-            ratios = [error**2 / (slope @ covariance @ slope + own) for slope, error, own in runs]
-            if not ratios or np.mean(ratios) <= 1.0 or factor >= _MOST_WIDENED:
-                return covariance, factor
-            factor *= 1.25
+        weighted = weight[:, None] * by_window(slopes)[self._windows]
+        pull = self._pull.T @ self._pull
+        return widening(weighted, weight * residual, pull, self._prior.deviation, stretches)

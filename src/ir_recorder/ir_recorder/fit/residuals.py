@@ -1,4 +1,4 @@
-"""What a fit needs of matrices and residuals: windows, folds, correlation, inverses."""
+"""What a fit needs of matrices and residuals: windows, correlation, inverses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from ir_description import PowerParameters
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.measure import Samples
 
-FOLDS = 8  # of a recording, each left out once: what a fit says of movements that it has not seen
 WINDOW = 5  # samples whose mean is one residual: 50 ms
 _SHORTEST_REST = 0.3  # s
 
@@ -18,17 +17,6 @@ def rests(samples: Samples) -> list[tuple[int, int]]:
     still = samples.known & ~samples.moving
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     return [(a, b) for a, b in edges.reshape(-1, 2).tolist() if (b - a) * samples.step >= _SHORTEST_REST]
-
-
-def left_out(slopes: FloatArray, residual: FloatArray, pull: FloatArray) -> list[FloatArray]:
-    """How the parameters (P,) would move if a fold of consecutive windows had not been measured, to first
-    order; slopes (W, P) and residual (W,) are weighted, pull (P, P) is the prior's precision.
-    """
-    whole, shifts = slopes.T @ slopes + pull, []
-    for rows in np.array_split(np.arange(len(residual)), FOLDS):
-        own = slopes[rows]
-        shifts.append(np.asarray(np.linalg.solve(whole - own.T @ own, -own.T @ residual[rows])))
-    return shifts
 
 
 def by_window(values: FloatArray) -> FloatArray:

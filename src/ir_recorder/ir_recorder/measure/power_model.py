@@ -2,7 +2,8 @@
 
 Per axis: torque times speed, copper loss of the motor torque squared, inverter loss of its magnitude, iron
 loss of the speed squared; friction viscous, Coulomb, and a share of the torque through the gear. The axes
-share the DC link; the rectifier's efficiency and the standing watts come on top.
+share the DC link, which feeds idle inverters too; the rectifier's efficiency and the standing watts come on
+top.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import PowerParameters, RobotModel
+from ir_description import IDLE, PowerParameters, RobotModel
 from ir_description.robot import DcLink
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.errors import FitError
@@ -75,11 +76,13 @@ class PowerModel:
         flow = bus_flow(self._link, wanted, prepared.samples.step)
         return self._base(mean, prepared) + flow.watts / self._one(mean, "rectifier_efficiency")
 
-    def watts_and_slopes(self, mean: FloatArray, prepared: Prepared) -> tuple[FloatArray, FloatArray]:
-        """The same with derivatives (M, P) by all parameters."""
+    def watts_and_slopes(
+        self, mean: FloatArray, prepared: Prepared, softness: float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """The same with derivatives (M, P) by all parameters; softness [J]: that of `bus_flow`."""
         slopes = np.zeros((len(prepared.samples), len(mean)))
         wanted = self._wanted(mean, prepared, slopes)
-        flow = bus_flow(self._link, wanted, prepared.samples.step, slopes)
+        flow = bus_flow(self._link, wanted, prepared.samples.step, slopes, softness=softness)
         efficiency = self._one(mean, "rectifier_efficiency")
         result = flow.slopes / efficiency
         result[:, self.layout.index("rectifier_efficiency")] = -flow.watts / efficiency**2
@@ -134,4 +137,5 @@ class PowerModel:
                 ("counterbalance", -arm.counterbalance),
             ):
                 slopes[:, self.layout.index(name)] = (by_body * body).sum(axis=1)
-        return np.asarray((on * axes).sum(axis=1))
+            slopes[:, self.layout.index(IDLE)] = prepared.samples.motors
+        return np.asarray((on * axes).sum(axis=1) + self._one(mean, IDLE) * prepared.samples.motors)
