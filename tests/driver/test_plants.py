@@ -16,6 +16,7 @@ from ir_sim_driver.plant import (
     PlantFileError,
     nominal_plant,
     plant_from_yaml,
+    plant_hash,
     plant_named,
     plant_to_yaml,
     typical_plant,
@@ -101,6 +102,27 @@ def test_a_file_without_sense_is_refused_with_its_place(cell, data, tmp_path, te
         plant_named(str(file), cell.robot, data)
     assert said in str(refused.value)
     assert str(file) in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "content", [b"root:*:20228:0:99999:7:::\n", b"secret\n", b"\xffsecret: 1\n", b"a: {b"]
+)
+def test_nothing_of_a_file_that_is_no_plant_is_quoted(cell, data, tmp_path, content):
+    file = tmp_path / "shadow.yaml"
+    file.write_bytes(content)
+    with pytest.raises(PlantFileError, match="this is no plant file") as refused:
+        plant_named(str(file), cell.robot, data)
+    said = str(refused.value).replace(str(file), "")
+    assert not any(word in said for word in ("root", "20228", "secret", "xff", "{b"))
+
+
+def test_the_hash_of_a_plant_is_that_of_its_figures(cell, data, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(HEAD)
+    nominal = plant_hash(nominal_plant(cell.robot, data))
+    assert plant_hash(plant_named(str(file), cell.robot, data)) == nominal
+    file.write_text(HEAD + "dc_link: {mains_v: 540}\n")
+    assert plant_hash(plant_named(str(file), cell.robot, data)) != nominal
 
 
 @pytest.mark.parametrize("text", ["clay", "typical:x", "typical:-1", ""])

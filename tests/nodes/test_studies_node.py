@@ -29,6 +29,7 @@ rounds: 1
 keep: 1
 seeds: 1
 """
+PLANT = "format: ir_statistics/1\ncell: demo\nplant: {}\n"
 HANGS = SETTINGS + "hang_after: 86400\n"
 Goal = Callable[..., Any]
 
@@ -125,6 +126,11 @@ def test_a_study_is_made_with_progress_and_its_files_lie_below_the_output(
         ({"settings": SETTINGS + "a: &a [1]\nb: *a\n"}, "aliases are not read"),
         ({"settings": SETTINGS.replace("demo", "/etc/passwd")}, "outside of the folders that may be used"),
         ({"settings": SETTINGS.replace("demo", "../x.yaml")}, "outside of the folders that may be used"),
+        (
+            {"kind": "statistics", "settings": PLANT.format("/etc/passwd")},
+            "outside of the folders that may be",
+        ),
+        ({"kind": "statistics", "settings": PLANT.format("../x.yaml")}, "outside of the folders that may be"),
         ({"settings": SETTINGS.replace("20", "1000000000")}, "placements is 1000000000"),
         ({"output_folder": "/etc"}, "outside of the folders that may be used"),
         ({"output_folder": "../b"}, "outside of the folders that may be used"),

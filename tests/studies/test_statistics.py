@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import bootstrap, ttest_1samp
 
+from ir_cli.main import main
 from ir_planner import Planner
-from ir_studies import Means, SettingsError, study_of
+from ir_studies import FolderError, Means, SettingsError, read_study, study_of
 from ir_studies.statistics.figures import findings_of
 from ir_studies.statistics.maker import maker
 from ir_studies.statistics.outputs import columns, page_html
@@ -106,6 +108,37 @@ def test_settings_without_sense_name_the_key(line: str, word: str) -> None:
         statistics_settings(f"format: ir_statistics/1\n{cell}{line}\n", str)
 
 
+@pytest.mark.parametrize(
+    "content", ["secret: 1\n", "format: ir_sim_driver/plant/1\nname: x\nrobot: y\n", None]
+)
+def test_a_plant_that_is_refused_is_a_sentence_without_its_content(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str | None
+) -> None:
+    if content is not None:
+        (tmp_path / "plant.yaml").write_text(content)
+    study = tmp_path / "study.yaml"
+    study.write_text("format: ir_statistics/1\ncell: open\nplant: plant.yaml\n")
+    with pytest.raises(SettingsError, match=f"plant: {tmp_path}") as refused:
+        read_study(study)
+    assert "secret" not in str(refused.value)
+    assert main(["study", "statistics", str(study), "--output", str(tmp_path / "out")]) == 2
+    assert "plant" in capsys.readouterr().err
+
+
+def test_plant_files_are_placed_and_bundled_plants_stay(tmp_path: Path) -> None:
+    text = "format: ir_statistics/1\ncell: open\nplant: {}\n"
+    placed: list[str] = []
+
+    def place(name: str) -> str:
+        placed.append(name)
+        return name
+
+    statistics_settings(text.format("nominal"), place)
+    with pytest.raises(SettingsError, match="plant: "):
+        statistics_settings(text.format("/nowhere/plant.yaml"), place)
+    assert placed == ["open", "open", "/nowhere/plant.yaml"]
+
+
 def test_the_example_can_be_read() -> None:
     assert study_of(EXAMPLE).settings == StatisticsSettings("demo")
 
@@ -151,3 +184,9 @@ def test_a_study_leaves_table_and_page(tmp_path: Path) -> None:
     assert heard[-1][1:] == (1, 1)
     assert answer.table.startswith("comparison,")
     assert study.run(tmp_path, Means(1)).summary == answer.summary  # nothing is left to make
+    results = tmp_path / "results.jsonl"
+    head = json.loads(results.read_text().splitlines()[1])
+    digest = head["cells"]["plant nominal"]
+    results.write_text(results.read_text().replace(digest, digest[::-1]))
+    with pytest.raises(FolderError, match="results of another plant nominal"):
+        study.run(tmp_path, Means(1))

@@ -121,7 +121,7 @@ class StudiesNode(Node):
         return Means(own.workers, own.scheduler, progress, stopped, own.command)
 
     def _placed(self, name: str) -> str:
-        """A cell file by its path, where it may be read; a bundled name as it is."""
+        """A cell or plant file by its path, where it may be read; a bundled name as it is."""
         return str(self._roots.inside(name)) if is_path(name) else name
 
     def _folder(self, name: str) -> Path:

@@ -6,7 +6,13 @@ from ir_sim_driver.plant.base_power import BasePower
 from ir_sim_driver.plant.control import ControlSettings
 from ir_sim_driver.plant.ideal_backend import IdealBackend
 from ir_sim_driver.plant.loads import CUSTOM, Carried, carried, custom_load
-from ir_sim_driver.plant.plant_file import PlantFileError, plant_from_yaml, plant_to_yaml, read_plant
+from ir_sim_driver.plant.plant_file import (
+    PlantFileError,
+    plant_from_yaml,
+    plant_hash,
+    plant_to_yaml,
+    read_plant,
+)
 from ir_sim_driver.plant.plant_parameters import NOMINAL, Plant, nominal_plant, standing_watts
 from ir_sim_driver.plant.plants import IDEAL, ideal_plant, plant_named
 from ir_sim_driver.plant.power_meter import MeterReading, PowerMeter
@@ -37,6 +43,7 @@ __all__ = [
     "make_backend",
     "nominal_plant",
     "plant_from_yaml",
+    "plant_hash",
     "plant_named",
     "plant_to_yaml",
     "read_plant",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,6 +25,7 @@ from ir_sim_driver.plant.plant_parameters import (
 )
 
 FORMAT = "ir_sim_driver/plant/1"
+_FORMAT = re.compile(rf"""["']?\bformat["']?\s*:\s*["']?{re.escape(FORMAT)}\b""")
 BYTES_MAX = 1_000_000
 """Largest plant file [bytes]."""
 Figures = TypeVar("Figures", DriveFigures, GearFigures, LinkFigures)
@@ -69,11 +72,15 @@ class PlantFileError(DescriptionFileError):
 
 
 def read_plant(path: str, robot: RobotModel, data: PowerData) -> Plant:
-    """The plant of a file for this robot. Raises PlantFileError."""
+    """The plant of a file for this robot. Raises PlantFileError, which quotes nothing of other files."""
     try:
         text = read_regular_file(Path(path), BYTES_MAX).decode("utf-8")
-    except (InvalidValueError, UnicodeDecodeError) as error:
+    except InvalidValueError as error:
         raise PlantFileError(path, 0, str(error)) from error
+    except UnicodeDecodeError as error:
+        raise PlantFileError(path, 0, "this is no plant file: it is no text in UTF-8") from error
+    if not _FORMAT.search(text):
+        raise PlantFileError(path, 0, f"this is no plant file: it has no format: {FORMAT}")
     return plant_from_yaml(text, robot, data, path)
 
 
@@ -128,6 +135,11 @@ def plant_to_yaml(plant: Plant) -> str:
     if robot.counterbalance is not None:
         content["charge_pressure_pa"] = robot.counterbalance.charge_pressure
     return str(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110))
+
+
+def plant_hash(plant: Plant) -> str:
+    """Hash of all figures of a plant, whatever file or seed they are from."""
+    return sha256(plant_to_yaml(replace(plant, name="")).encode()).hexdigest()
 
 
 def _robot(links: Item | None, robot: RobotModel) -> RobotModel:

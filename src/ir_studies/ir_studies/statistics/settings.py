@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from ir_description import DescriptionError, load_cell, load_power_data
+from ir_description import DescriptionError, is_path, load_cell, load_power_data
 from ir_msgs_py.options import OBJECTIVES
 from ir_planner import PlannerError
 from ir_planner.scene import scene_with
@@ -78,7 +78,7 @@ class StatisticsSettings:
             raise SettingsError(f"cell: {error}") from error
         try:
             plant_named(self.plant, cell.robot, cell.robot.controller)
-        except DriverError as error:
+        except (DriverError, DescriptionError, OSError) as error:
             raise SettingsError(f"plant: {error}") from error
 
 
@@ -87,10 +87,13 @@ _REAL = (("safety_distance", 0.0, 10.0), ("hang_after", 1.0, 86_400.0))
 
 
 def statistics_settings(content: str, placed: Placed) -> StatisticsSettings:
-    """The settings of a text. placed: where the cell is."""
+    """The settings of a text. placed: where cell and plant are."""
     values = settings_values(content, FORMAT, [field.name for field in fields(StatisticsSettings)])
     if "cell" not in values:
         raise SettingsError("cell is missing: the name of a bundled cell, or a file")
     if isinstance(values["cell"], str):
         values["cell"] = placed(values["cell"])
+    plant = values.get("plant")
+    if isinstance(plant, str) and is_path(plant):
+        values["plant"] = placed(plant)
     return StatisticsSettings(**values)

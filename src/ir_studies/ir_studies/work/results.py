@@ -17,14 +17,16 @@ from ir_studies.errors import FolderError
 from ir_studies.work.job import Job, Row
 
 NAME = "results.jsonl"
+PLANT = "plant "
+"""Before the name of a plant, whose content counts like that of a cell."""
 _TITLES = {"arena": "an arena", "layout": "a layout study", "statistics": "statistics"}
 
 
 class Results:
     """The file of a folder, for one program at a time; rows by the keys of their jobs.
 
-    kind: of the study. budget: settings that all rows depend on. cells: content hash by name; others may be
-    added later, none may change.
+    kind: of the study. budget: settings that all rows depend on. cells: content hash by name, of plants too;
+    others may be added later, none may change.
     """
 
     def __init__(self, folder: Path, kind: str, budget: Mapping[str, Any], cells: Mapping[str, str]) -> None:
@@ -83,7 +85,7 @@ class Results:
                 )
         for name, digest in cells.items():
             if known.get(name, digest) != digest:
-                raise FolderError(f"{self.path} holds results of another cell {name}: name another folder")
+                raise FolderError(f"{self.path} holds results of another {_title(name)}: name another folder")
 
     def add(self, job: Job, row: Row) -> None:
         """Keep a row: it is on the disk when this returns."""
@@ -110,3 +112,7 @@ class Results:
         except OSError:  # a full disk: what could not be written was refused before
             if error is None:
                 raise
+
+
+def _title(name: str) -> str:
+    return name if name.startswith(PLANT) else f"cell {name}"

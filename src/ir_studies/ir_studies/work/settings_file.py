@@ -15,7 +15,7 @@ MOST_CHARACTERS = 1_000_000  # of a settings file
 Bounds: TypeAlias = "tuple[str, float, float]"
 """A key, its least and its largest value."""
 Placed = Callable[[str], str]
-"""From the name of a cell as the settings have it to what load_cell takes: a bundled name, or a path."""
+"""From the name of a cell or a plant as the settings have it to what reads it: a bundled name, or a path."""
 
 
 def read_text(path: str | Path) -> str:
