@@ -32,6 +32,7 @@ def test_the_data_sheet_has_the_data_as_its_mean(sheet: PowerParameters) -> None
     assert np.array_equal(sheet.axis("viscous"), robot.friction_viscous)
     assert np.array_equal(sheet.axis("copper"), robot.copper_loss)
     assert not np.any([sheet.axis(term) for term in ("iron", "inverter", "gear")])
+    assert sheet.value("idle_watts") == 0.0
     assert sheet.value("drives_watts") == power.drives_and_brake_release
     same = sheet.robot_with(robot)
     assert np.array_equal(same.link_mass, robot.link_mass)

@@ -105,20 +105,23 @@ def test_the_same_question_has_the_same_interval() -> None:
     assert np.array_equal(one, two)
 
 
+AT_ZERO = ("iron", "inverter", "gear", "idle_watts")  # in the data sheet
+
+
 @pytest.mark.parametrize(
     "name",
     [
         *(f"{term}.joint_a{j}" for term in ("viscous", "coulomb", "copper") for j in (1, 3)),
         *(f"{term}.joint_a2" for term in ("iron", "inverter", "gear")),
         *("rotor_inertia", "link_mass", "load_mass", "counterbalance", "rectifier_efficiency"),
-        *("tool_watts", "drives_watts", "watts.STAND_ON_MOTORS"),
+        *("tool_watts", "idle_watts", "drives_watts", "watts.STAND_ON_MOTORS"),
     ],
 )
 def test_slopes_are_those_of_the_energy(name: str) -> None:
     """Central differences of the energy itself, one-sided at a bound."""
     trajectory, at = movement("p1b->cab"), SHEET.value(name)
     step = 0.02 * SHEET.deviation[SHEET.index(name)]
-    below = at if at in (0.0, 1.0) and name.partition(".")[0] in ("iron", "inverter", "gear") else at - step
+    below = at if at in (0.0, 1.0) and name.partition(".")[0] in AT_ZERO else at - step
     above = min(at + step, 1.0) if name == "rectifier_efficiency" else at + step
     energies = [movement_energy(trajectory, scene(with_value(name, v))).total for v in (below, above)]
     slope = energy_and_slope(Sampled.of(trajectory), scene())[1][SHEET.index(name)]
@@ -130,7 +133,7 @@ def test_holding_slopes_are_those_of_holding_watts() -> None:
     q = np.array(planner().cell.machine_home)
     slope = holding_slope(q, scene())
     rest = JointTrajectory(SCENE_NAMES, [0, 10**9], np.stack([q, q]))
-    for name in ("copper.joint_a2", "inverter.joint_a5", "link_mass", "drives_watts"):
+    for name in ("copper.joint_a2", "inverter.joint_a5", "link_mass", "idle_watts", "drives_watts"):
         more = scene(with_value(name, SHEET.value(name) + 0.01 * SHEET.deviation[SHEET.index(name)]))
         watts = movement_energy(rest, more).total - movement_energy(rest, scene()).total
         expected = watts / (0.01 * SHEET.deviation[SHEET.index(name)])

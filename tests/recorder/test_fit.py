@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from ir_cli.main import main
 from ir_description import (
@@ -24,6 +25,7 @@ from ir_description import (
 from ir_recorder.errors import FitError
 from ir_recorder.fit import Fit, fit, sentences
 from ir_recorder.fit.plausible import check_range
+from ir_recorder.fit.residuals import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
 
 CELL, PRIOR, STEP = load_cell("demo"), data_sheet(), 0.01
@@ -127,6 +129,46 @@ def test_what_the_data_do_not_show_is_named_and_kept() -> None:
     for name in found.kept:
         assert found.parameters.value(name) == PRIOR.value(name)
     assert "watts.HIBERNATION" in " ".join(sentences(found))
+
+
+def test_data_without_motion_say_so_and_data_that_determine_nothing_are_refused() -> None:
+    """A robot at rest shows the watts of its modes, but nothing of motion; in one mode not even these."""
+    whole = programme(6, 1, 3)
+    still = replace(whole, q=np.tile(whole.q[-1], (len(whole), 1)), qd=0.0 * whole.qd, qdd=0.0 * whole.qdd)
+    rests = metered(still.part(still.time[-1500], np.inf), PRIOR.drawn(6), 6)
+    found = fit(rests, MODEL, PRIOR)
+    assert not found.movements
+    assert {name.partition(".")[0] for name in found.kept} >= {"viscous", "coulomb", "iron", "gear"}
+    assert any("nothing moves" in sentence for sentence in sentences(found))
+    one = metered(still.part(still.time[-1500], still.time[-1000]), PRIOR.drawn(6), 6)
+    with pytest.raises(FitError, match=r"none of the \d+ power parameters.* moves in 0\.0 of 5\.0 s"):
+        fit(one, MODEL, PRIOR)
+
+
+SMALL = [(1, 6), *(pytest.param(*each, marks=pytest.mark.long) for each in ((3, 8), (4, 6), (7, 5)))]
+
+
+@pytest.mark.parametrize(("seed", "count"), SMALL)
+def test_a_small_programme_ends_in_no_local_minimum(seed: int, count: int) -> None:
+    """Least squares of SciPy's, begun at the robot that gave the data, finds nothing cheaper."""
+    truth = PRIOR.drawn(seed)
+    samples = metered(programme(seed, count, 1), truth, seed)
+    prepared, white = MODEL.prepare(samples), PRIOR.deviation
+
+    def missing(mean: np.ndarray) -> np.ndarray:
+        pull = (mean - PRIOR.mean) / white
+        return np.concatenate([by_window(MODEL.watts(mean, prepared) - samples.watts) / NOISE, pull])
+
+    def slopes(mean: np.ndarray) -> np.ndarray:
+        rows = by_window(MODEL.watts_and_slopes(mean, prepared)[1]) / NOISE
+        return np.concatenate([rows, np.diag(1.0 / white)])
+
+    low, high = physical_bounds(PRIOR.names)
+    begun = np.clip(truth.mean, low + 1e-9, high - 1e-9)
+    judge = least_squares(missing, begun, slopes, (low - 1e-12, high), x_scale=white, max_nfev=30)
+    found = missing(fit(samples, MODEL, PRIOR).parameters.mean)
+    data = slice(0, -len(white))  # the fit weighs prior against data by a noise that it estimates
+    assert np.mean(found[data] ** 2) < 1.5 * np.mean(judge.fun[data] ** 2)
 
 
 def test_too_little_data_are_refused() -> None:

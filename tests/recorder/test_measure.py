@@ -69,14 +69,25 @@ def test_the_bus_balances_and_differs_from_the_kernels_by_the_hysteresis_alone(w
     np.testing.assert_allclose(bus_flow(flat, wanted, step).watts, theirs.mains, atol=1e-6)
 
 
-def test_derivatives_go_through_the_bus() -> None:
+@pytest.mark.parametrize("softness", [0.0, 0.3, 10.0])
+def test_derivatives_go_through_the_bus(softness: float) -> None:
     link, rng = load_power_data().dc_link, np.random.default_rng(4)
     wanted, slopes = rng.normal(0.0, 4e3, 300), rng.normal(0.0, 1.0, (300, 3))
-    flow = bus_flow(link, wanted, 0.01, slopes)
+    flow = bus_flow(link, wanted, 0.01, slopes, softness=softness)
     for p in range(3):
-        more = bus_flow(link, wanted + 1e-4 * slopes[:, p], 0.01).watts
-        less = bus_flow(link, wanted - 1e-4 * slopes[:, p], 0.01).watts
+        more = bus_flow(link, wanted + 1e-4 * slopes[:, p], 0.01, softness=softness).watts
+        less = bus_flow(link, wanted - 1e-4 * slopes[:, p], 0.01, softness=softness).watts
         np.testing.assert_allclose(flow.slopes[:, p], (more - less) / 2e-4, atol=1e-4)
+
+
+@given(st.lists(st.floats(-5e4, 5e4), min_size=1, max_size=60))
+def test_a_hard_switch_is_the_limit_of_soft_ones(watts: list[float]) -> None:
+    """Each switch is off by S ln 2 at most, and what was given differs by what is held."""
+    link, wanted, step, softness = load_power_data().dc_link, np.array(watts), 1e-3, 1e-3
+    hard, soft = (bus_flow(link, wanted, step, softness=s) for s in (0.0, softness))
+    apart = 2.0 * np.log(2.0) * softness * np.arange(1, len(watts) + 1)
+    assert (np.abs(hard.charge - soft.charge) <= apart).all()
+    assert (np.abs(hard.watts - soft.watts) * step <= 2.0 * apart).all()
 
 
 def test_polynomials_are_differentiated_exactly_and_the_bandwidth_is_as_stated() -> None:

@@ -15,7 +15,7 @@ from scipy.optimize import lsq_linear
 from ir_description import PowerParameters, physical_bounds
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import FitError
-from ir_recorder.fit.plausible import check_explained
+from ir_recorder.fit.plausible import check_determined, check_explained
 from ir_recorder.fit.residuals import (
     WINDOW,
     by_window,
@@ -120,6 +120,7 @@ class _Estimate:
         mean, precision = self._solve(mean, weight, self._free)
         left = np.sqrt(np.diag(inverse(precision, self._prior.deviation))) / safe(self._prior.deviation)
         determined = np.asarray(self._free & (left < DETERMINED))
+        check_determined(determined, self._moving, WINDOW * self._samples.step)
         mean, precision = self._solve(mean, weight, determined)
         covariance = inverse(precision, self._prior.deviation)
         sources = np.where(determined, "fit", self._prior.sources)

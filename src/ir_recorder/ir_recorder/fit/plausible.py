@@ -30,6 +30,18 @@ def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray)
             )
 
 
+def check_determined(determined: BoolArray, moving: BoolArray, window: float) -> None:
+    """FitError where the data determine no parameter (P,); moving (W,): in which windows of `window` s."""
+    if determined.any():
+        return
+    seconds, moved = window * len(moving), window * np.count_nonzero(moving)
+    raise FitError(
+        f"the data determine none of the {len(determined)} power parameters, so there is nothing to write: "
+        f"the robot moves in {moved:.1f} of {seconds:.1f} s with watts. Drive several axes at several speeds "
+        "and stay in the power modes; ir energy excite plans such movements"
+    )
+
+
 def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
     """FitError where positions (N, n) [rad] lie beyond what the robot can reach."""
     beyond = np.fmax(robot.position_min - q, q - robot.position_max)

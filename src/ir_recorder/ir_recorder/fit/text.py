@@ -16,7 +16,12 @@ def sentences(found: Fit) -> tuple[str, ...]:
     lines = [f"{own} of {len(found.determined)} parameters are determined by the data"]
     if found.kept:
         lines.append(f"kept at the prior, because the data say little of them: {', '.join(found.kept)}")
-    if found.movements:
+    if not found.movements:
+        lines.append(
+            "nothing moves for 0.3 s or longer in these data: friction, masses and losses in motion were not "
+            "determined, and movements are predicted as before; ir energy excite plans movements that tell"
+        )
+    else:
         lines.append(
             f"energy of {len(found.movements)} movements is off the meter by "
             f"{_share(found.movements, 'before')} before, by {_share(found.movements, 'after')} after "
