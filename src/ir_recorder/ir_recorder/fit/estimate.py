@@ -120,6 +120,7 @@ class _Estimate:
         mean, precision = self._solve(mean, weight, self._free)
         left = np.sqrt(np.diag(inverse(precision, self._prior.deviation))) / safe(self._prior.deviation)
         determined = np.asarray(self._free & (left < DETERMINED))
+        check_explained(self._watts, self._reduced(self._model.watts(mean, self._prepared)), self._moving)
         check_determined(determined, self._moving, WINDOW * self._samples.step)
         mean, precision = self._solve(mean, weight, determined)
         covariance = inverse(precision, self._prior.deviation)
@@ -132,7 +133,6 @@ class _Estimate:
             sources=tuple(str(source) for source in sources),
         )
         before, after = (self._model.watts(each, self._prepared) for each in (self._prior.mean, mean))
-        check_explained(self._watts, self._reduced(after), self._moving)
         return Fit(
             found,
             determined,

@@ -19,7 +19,7 @@ def sentences(found: Fit) -> tuple[str, ...]:
     if not found.movements:
         lines.append(
             "nothing moves for 0.3 s or longer in these data: friction, masses and losses in motion were not "
-            "determined, and movements are predicted as before; ir energy excite plans movements that tell"
+            "determined, and movements are predicted as before; ir energy excite plans some"
         )
     else:
         lines.append(
