@@ -44,9 +44,9 @@ def layout_claims(cell: str, *, quick: bool) -> list[Claim]:
     """All claims about layout studies; quick: without the demonstration's, and fewer programs."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        small = replace(SMALL, cell=cell, steps=4 if quick else 7)
+        small = replace(SMALL, cell=cell, steps=3 if quick else 7)
         claims = bounded_against_exhaustive(small, folder)
-        claims += speed(small, folder, 8 if quick else 24)
+        claims += speed(small, folder, 6 if quick else 24)
         if not quick:
             claims += demonstration(folder)
     return claims

@@ -142,14 +142,15 @@ def follows(statements: Sequence[Statement]) -> str:
     sure, back, alone, printed, newton, normal, hard, rate, complete = statements
     verb = {HOLDS: "keeps starts from being lost", FAILS: "loses more starts than it keeps"}
     drop = verb.get(back.verdict, "does not clearly keep starts from being lost")
+    helps = {HOLDS: "The set-back helps", FAILS: "Nor does it help"}.get(hard.verdict, "It may help")
     return (
         f"The search works: a free configuration is known from {ASKED} starts at {sure.value:.0f} % of "
         f"the stations. The set-back {drop} ({back.value:+.1f} points; {alone.value:+.1f} without "
         f"Newton's finish), at {1.0 / rate.value:.1f} times the time per success: starts are cheap, so "
-        "drawing more of them and sorting out collisions at the end is the rival to beat. The set-back "
-        f"may help where hardly any start ends free: without Newton's finish {ASKED} starts reach "
-        f"{hard.value:+.1f} points more stations ({hard.verdict}). Reading (5) as a "
-        f"secant changes {printed.value:+.1f} points, Newton's finish {newton.value:+.1f} (against "
+        f"drawing more of them and sorting out collisions at the end is the rival to beat. {helps} where "
+        f"hardly any start ends free: without Newton's finish {ASKED} starts reach {hard.value:+.1f} points "
+        f"of the stations more. Reading (5) as a secant changes {printed.value:+.1f} points, "
+        f"Newton's finish {newton.value:+.1f} (against "
         f"{MANY_SWEEPS} sweeps without), the normal distribution {normal.value:+.1f}. "
         f"{complete.value:.0f} % of the complete set are found; the planner's default is the closed form, "
         "which has all of it in microseconds, and CCD is for chains that have none."

@@ -19,7 +19,7 @@ from ir_planner import Goal, Planner
 from ir_planner.scene import PlanningScene
 from ir_planner.search.genetic import Genetic
 
-VARIANTS = 3  # of each cell and seed
+VARIANTS = 6  # of each cell and seed
 ANSWERS, QUICK_ANSWERS = 12, 1  # tasks of each
 SWEEPS = {"open": 3, "table_columns": 3, "cnc_door": 2}  # of the first so many get every setting
 DRAWS, QUICK_DRAWS = 2, 1  # searches of each setting per task
