@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import re
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
 
 from ir_cli.main import main
+from ir_description import load_cell
 from ir_msgs.msg import RecordedCall
 from ir_msgs.srv import PlanProgram
 from ir_msgs_py.search_log import ConfigurationLog
@@ -65,14 +71,42 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     assert "is there already" in capsys.readouterr().err
 
 
+def data_of(page: str) -> dict[str, Any]:
+    """What the page's scripts draw."""
+    (text,) = re.findall(r'<script[^>]*id="data"[^>]*>(.*?)</script>', page, re.DOTALL)
+    data: dict[str, Any] = json.loads(text)
+    return data
+
+
+def assert_motion_is_that_of_the_plan(page: str, answer: dict[str, Any]) -> None:
+    """The picture moves as long as the plan, from home, with the joules of the plan under its power."""
+    drawn = data_of(page)
+    scene = drawn["scene"]
+    assert drawn["end"] == pytest.approx(answer["seconds"])
+    shorts = {name: np.frombuffer(base64.b64decode(scene[name]), "<i2") for name in ("angles", "power")}
+    q = scene["angleStep"] * shorts["angles"].reshape(scene["frames"], 6)
+    assert q[0] == pytest.approx(load_cell("kr6_bench").park, abs=2e-4)
+    joules = float(shorts["power"].sum()) * scene["step"]
+    assert joules == pytest.approx(answer["joules"], rel=0.05)
+    assert [span[2] for span in drawn["lanes"][0]["spans"]][-1] == "pick"
+    assert drawn["blamed"] == []
+
+
 def test_a_plan_is_a_page_and_a_failed_one_says_which_pair_is_in_the_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    asked = ["plan", "kr6_bench", "--stations", "pick", "--html"]
+    asked = ["plan", "kr6_bench", "--stations", "pick", "--json", "--html"]
     assert main([*asked, "found.html"]) == 0
-    assert "planned program" in (tmp_path / "found.html").read_text()
+    found = (tmp_path / "found.html").read_text()
+    assert "planned program" in found
+    assert_motion_is_that_of_the_plan(found, json.loads(capsys.readouterr().out))
     assert main([*asked, "failed.html", "--safety-distance", "0.05"]) == 1
     sentence = capsys.readouterr().err.splitlines()[-1]
     assert "base too near l2" in sentence
-    assert "base too near l2" in (tmp_path / "failed.html").read_text()
+    failed = (tmp_path / "failed.html").read_text()
+    assert "base too near l2" in failed
+    drawn = data_of(failed)
+    assert drawn["blamed"] == ["base", "l2"]
+    assert {body["name"] for body in drawn["scene"]["bodies"]} >= {"tray_in_top", "divider"}
+    assert {"base", "l2"} <= {shape["name"] for shape in drawn["scene"]["shapes"]}

@@ -58,7 +58,7 @@ def test_an_empty_recording_still_gives_a_page(demo_file: Path, data_of: Any) ->
     analysis = analyse(bare)
     page = report_html(analysis, findings(analysis))
     assert data_of(page)["scene"] is None
-    assert "Not everything could be read" in page
+    assert "What is missing, and why" in page
     assert ">nan" not in page
 
 

@@ -25,6 +25,8 @@ def polished(chain: Chain, targets: FloatArray, found: Sequence[Found]) -> list[
 def newton(chain: Chain, poses: FloatArray, q: FloatArray, steps: int) -> tuple[FloatArray, FloatArray]:
     """q (M, 6) after damped steps towards poses (M, 4, 4), the best of each, and its error (M,) [m, rad]."""
     best, least = q.copy(), np.full(len(q), np.inf)
+    if not len(q):
+        return best, least
     for step in range(steps + 1):
         error = pose_error(chain, poses, q)
         size = np.linalg.norm(error, axis=1)

@@ -21,6 +21,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default="typical",
         help="the simulated plant: typical (default), typical:SEED, nominal (the data), or a file",
     )
+    words = "the program's own pauses and the controller's own transitions (default: shortened)"
+    demo.add_argument("--real-pauses", action="store_true", help=words)
     demo.set_defaults(run=run)
 
 
@@ -33,6 +35,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     words = (arguments.cell, arguments.out, arguments.seed, arguments.plant)
     with alone(""):
-        outcome = Demonstration(*words, Progress()).run()
+        outcome = Demonstration(*words, Progress(), real_pauses=arguments.real_pauses).run()
     sys.stdout.write(outcome.text() + "\n")
     return 0 if outcome.ok else 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ir_cli.terminal import table
@@ -104,9 +104,13 @@ def _sentence(check: Finding) -> str:
     )
 
 
-def examine(recording: Path, report: Path, picture: Path, loads: int) -> Outcome:
-    """Analyse the recording, write report and picture; loads: how many the tour carried."""
+def examine(recording: Path, report: Path, picture: Path, loads: int, failed: str = "") -> Outcome:
+    """Analyse the recording, write report and picture; loads: how many the tour carried; failed: why there is
+    no plan.
+    """
     analysis = analyse(read_recording(recording))
+    if failed:
+        analysis = replace(analysis, problems=(failed, *analysis.problems))
     checks = findings(analysis, Tolerances(resting_rows=MODES_AT_REST * loads))
     write_report(analysis, checks, report)
     write_picture(analysis, picture)

@@ -23,14 +23,15 @@ MODE_SECONDS = 30.0
 class PowerWatch:
     """The last message of the mains meter, and waiting for a mode or for time on the meter's own clock."""
 
-    def __init__(self, client: Client) -> None:
+    def __init__(self, client: Client, patience: float = MODE_SECONDS) -> None:
+        self._patience = patience
         self._changed = threading.Condition()
         self._state: PowerState | None = None
         self._clock = client.node.get_clock()
         client.subscribe("/" + names.POWER_STATE, PowerState, self._take)
 
     def wait_for_mode(self, mode: int) -> None:
-        """Wait until the controller rests in a mode; DemonstrationError after MODE_SECONDS."""
+        """Wait until the controller rests in a mode; DemonstrationError after `patience` [s]."""
         self._wait(lambda state: state.mode == mode, f"power mode {mode}")
 
     def stay(self, seconds: float) -> None:
@@ -45,10 +46,12 @@ class PowerWatch:
     def _wait(self, condition: Callable[[PowerState], bool], what: str) -> None:
         with self._changed:
             if not self._changed.wait_for(
-                lambda: self._state is not None and condition(self._state), MODE_SECONDS
+                lambda: self._state is not None and condition(self._state), self._patience
             ):
                 mode = "nothing" if self._state is None else f"mode {self._state.mode}"
-                raise DemonstrationError(f"waited {MODE_SECONDS:g} s for {what}; the mains meter says {mode}")
+                raise DemonstrationError(
+                    f"waited {self._patience:g} s for {what}; the mains meter says {mode}"
+                )
 
     def _now(self) -> float:
         return float(self._clock.now().nanoseconds) * 1e-9

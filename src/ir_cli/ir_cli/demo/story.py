@@ -21,7 +21,7 @@ from ir_cli.terminal import Progress
 from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.errors import MsgsError, RequestRefusedError
 from ir_msgs_py.one_sided import one_sided
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.answers import ProgramPlan
@@ -31,7 +31,7 @@ from ir_program_runner.settings import LinkSettings
 from ir_recorder.format import contents
 
 from .outcome import Outcome, examine
-from .power_tour import PowerWatch, tour
+from .power_tour import MODE_SECONDS, PowerWatch, tour
 
 TRANSITIONS = {
     "bus_power_off_enter": 1.0,
@@ -46,6 +46,8 @@ LONGEST_PAUSE = 12.0
 """Seconds; longer pauses of the program are cut to this."""
 TOUR_STAY = 1.2
 """Seconds in each power mode at machine home: a plateau of the mains meter (100 Hz) needs some tenths."""
+LONGEST_TRANSITION = 600.0
+"""Longest wait for a mode [s] where transitions take as long as the controller's."""
 LOOK_SECONDS = 0.1
 """Between two looks whether the nodes are there."""
 START_SECONDS = 60.0
@@ -55,11 +57,16 @@ START_SECONDS = 60.0
 class Demonstration:
     """One run: `run` returns what came out of it, or raises an error with a sentence."""
 
-    def __init__(self, cell: str, out: Path, seed: int, plant: str, progress: Progress) -> None:
+    def __init__(
+        self, cell: str, out: Path, seed: int, plant: str, progress: Progress, *, real_pauses: bool = False
+    ) -> None:
         self._out, self._plant, self._progress = out, plant, progress
         full = load_cell(cell)
-        self._full_pauses = [step.dwell for step in full.program if step.kind == "PAUSE"]
-        self._cell = with_short_pauses(full, LONGEST_PAUSE)
+        pauses = [step.dwell for step in full.program if step.kind == "PAUSE"]
+        self._full_pauses = [] if real_pauses else pauses
+        self._transitions = {} if real_pauses else TRANSITIONS
+        self._patience = LONGEST_TRANSITION if real_pauses else MODE_SECONDS
+        self._cell = full if real_pauses else with_short_pauses(full, LONGEST_PAUSE)
         self._options = PlanOptions(seed=seed)
         self._link = LinkSettings(wake_port=free_port(UDP))
         loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
@@ -74,7 +81,7 @@ class Demonstration:
         what = f"cell {self._cell.name}, simulated plant {self._plant}"
         progress.say(f"Demonstration of {what}: real nodes over DDS, real time")
         nodes = NodeProcesses(self._out / "log", {})
-        transitions = {f"transitions.{name}": seconds for name, seconds in TRANSITIONS.items()}
+        transitions = {f"transitions.{name}": seconds for name, seconds in self._transitions.items()}
         with nodes, Client(timeout=START_SECONDS, node_name="ir_demo") as client:
             progress.begin("start planner, driver, runner, recorder")
             nodes.start(
@@ -90,24 +97,35 @@ class Demonstration:
             with _naming_the_dead(nodes):
                 self._start_recording(client, recording)
                 progress.end(str(recording))
-                plan = self._plan(client)
-                self._tour(client)
-                self._drive(client, plan)
+                failed = self._story(client)
                 client.ask("/" + names.STOP_RECORDING, StopRecording.Request())
             nodes.end()
         progress.begin("read the recording, write report and picture")
-        outcome = examine(recording, self._out / "report.html", self._out / "demo.png", len(self._loads))
+        loads = 0 if failed else len(self._loads)
+        outcome = examine(recording, self._out / "report.html", self._out / "demo.png", loads, failed)
         progress.end(f"{self._out / 'report.html'}, {self._out / 'demo.png'}")
         return outcome
 
+    def _story(self, client: Client) -> str:
+        """Plan, visit the modes, drive; why there is no plan, "" where there is one."""
+        try:
+            plan = self._plan(client)
+        except RequestRefusedError as error:
+            self._progress.end("no plan")
+            return str(error)
+        self._tour(client)
+        self._drive(client, plan)
+        return ""
+
     def _facts(self) -> list[str]:
         """What the recording keeps of this run: how it was planned, and what is shortened."""
+        what = "pauses and the transitions of the power modes; the clock is not scaled"
         facts = {
-            "shortened": "pauses and the transitions of the power modes; the clock is not scaled",
+            **({"shortened": what} if self._transitions else {}),
             "seed": str(self._options.seed),
             "plant": self._plant,
             contents.SAFETY_DISTANCE: f"{self._options.safety_distance:g} m",
-            **{name: f"{seconds:g} s" for name, seconds in TRANSITIONS.items()},
+            **{name: f"{seconds:g} s" for name, seconds in self._transitions.items()},
         }
         if self._full_pauses:
             facts[contents.UNSHORTENED_PAUSES] = ", ".join(f"{seconds:g} s" for seconds in self._full_pauses)
@@ -141,7 +159,14 @@ class Demonstration:
         if not self._loads:
             return
         self._progress.begin("visit the power modes at machine home")
-        tour(client, PowerWatch(client), self._loads, TOUR_STAY, self._wake, self._progress.update)
+        tour(
+            client,
+            PowerWatch(client, self._patience),
+            self._loads,
+            TOUR_STAY,
+            self._wake,
+            self._progress.update,
+        )
         self._progress.end("motors, brakes, Bus Power Off, hibernation, with and without the tool")
 
     def _drive(self, client: Client, plan: ProgramPlan) -> None:

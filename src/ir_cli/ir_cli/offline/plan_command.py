@@ -119,8 +119,9 @@ def _page(arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, op
         file = str(Path(folder) / "plan.mcap")
         recording = _record(file, arguments, plan, planner, options, ANYWHERE)
         analysis = analyse(read_recording(recording))
-    reason = () if plan.status.ok else (plan.status.message,)
-    analysis = replace(analysis, problems=(*reason, *analysis.problems))
+    moved = replace(analysis.recording, planned=tuple(plan.movements))  # the file has no trajectories by step
+    problems = analysis.problems if plan.status.ok else (plan.status.message,)
+    analysis = replace(analysis, recording=moved, problems=problems)
     sys.stderr.write(f"ir: {write_report(analysis, findings(analysis), arguments.html)}\n")
 
 

@@ -61,7 +61,7 @@ def write_plan(
     """
     writer = RecordingWriter(path, overwrite=overwrite, roots=roots or FileRoots.of())
     now = time.time_ns()
-    session = RecordingSession(writer, {"plan": "never driven"}, now)
+    session = RecordingSession(writer, {contents.PLAN: "never driven"}, now)
     cell = planner.cell
     urdf = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
     session.attach_cell(CellFiles(cell_to_yaml(cell), urdf), now)

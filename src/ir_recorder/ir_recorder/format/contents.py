@@ -29,4 +29,5 @@ OWN_FACTS: Final = (
 
 # facts with a meaning for the analysis; all others are only shown
 SAFETY_DISTANCE: Final = "safety_distance"  # S_m [m] that movements are planned with: "0.02 m"
+PLAN: Final = "plan"  # "never driven": a plan, found or not, without a robot
 UNSHORTENED_PAUSES: Final = "unshortened_pauses"  # full lengths of the pauses in power modes: "180 s, 1800 s"

@@ -11,6 +11,7 @@ from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.search_log import SearchLog
+from ir_recorder.format import contents
 
 
 class _ReadOnlyArrays:
@@ -179,6 +180,11 @@ class Recording:
     def only_planned(self) -> bool:
         """Whether it holds a plan that was not driven, and no robot."""
         return bool(self.planned)
+
+    @property
+    def never_driven(self) -> bool:
+        """Whether it was written for a plan, found or not, without a robot."""
+        return bool(self.fact(contents.PLAN))
 
     @property
     def origin(self) -> str:

@@ -39,12 +39,13 @@ def part_meshes(cell: Cell, name: str) -> list[dict[str, Json]]:
 def _robot_shapes(cell: Cell) -> list[dict[str, Json]]:
     """The robot twice: as its collision capsules, and as a robot looks."""
     capsules = [
-        (c.link, "base" if c.link == 0 else "link", "capsules", capsule_mesh(c)) for c in cell.robot.capsules
+        (c.link, "base" if c.link == 0 else "link", "capsules", c.name, capsule_mesh(c))
+        for c in cell.robot.capsules
     ]
-    looks = [(part.link, part.kind, "robot", part.mesh) for part in robot_parts(cell.robot)]
+    looks = [(part.link, part.kind, "robot", "", part.mesh) for part in robot_parts(cell.robot)]
     return [
-        {"link": link, "kind": kind, "look": look, "owner": "", **_mesh(mesh)}
-        for link, kind, look, mesh in (*looks, *capsules)
+        {"link": link, "kind": kind, "look": look, "owner": "", "name": name, **_mesh(mesh)}
+        for link, kind, look, name, mesh in (*looks, *capsules)
     ]
 
 
@@ -57,7 +58,16 @@ def _load_shapes(cell: Cell) -> list[dict[str, Json]]:
         for capsule in load.capsules:
             kind = "tool" if load.kind == "tool" else "part"
             mesh = _mesh(capsule_mesh(capsule))
-            shapes.append({"link": capsule.link, "kind": kind, "look": "", "owner": load.name, **mesh})
+            shapes.append(
+                {
+                    "link": capsule.link,
+                    "kind": kind,
+                    "look": "",
+                    "owner": load.name,
+                    "name": capsule.name,
+                    **mesh,
+                }
+            )
     return shapes
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.shares import mode_name
@@ -14,6 +15,7 @@ from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import BitSeries
 from ir_recorder.report.axes import axis_curves
 from ir_recorder.report.machine_lanes import machine_lanes
+from ir_recorder.report.planned_motion import blamed, failed_scene, lanes, planned_scene, planned_side
 from ir_recorder.report.scene import scene
 from ir_recorder.report.series import Json, envelope, floats
 from ir_recorder.report.words import mode_words
@@ -37,15 +39,33 @@ def page_data(analysis: Analysis, safety_distance: float) -> str:
         "safetyDistance": safety_distance,
         "axes": axis_curves(analysis),
         "scene": scene(analysis),
+        "blamed": [] if analysis.cell is None else blamed(analysis.cell, analysis.problems),
+        **_planned(analysis),
     }
     return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _power(analysis: Analysis) -> dict[str, str] | None:
+def _planned(analysis: Analysis) -> dict[str, Json]:
+    """What stands in place of a run where there is a plan alone, or none was found."""
+    if not analysis.recording.never_driven or analysis.cell is None:
+        return {}
+    side = planned_side(analysis)
+    if side is not None:
+        power = _curve(side.time, side.watts)
+        drawn = planned_scene(side, analysis.cell)
+        return {"end": side.report.duration, "power": power, "lanes": lanes(side), "scene": drawn}
+    if analysis.recording.planned:
+        return {}  # the steps of a file, without their trajectories
+    return {"end": 1.0, "scene": failed_scene(analysis.cell)}
+
+
+def _power(analysis: Analysis) -> dict[str, Json] | None:
     power = analysis.recording.power
-    if power is None or len(power.time) < 2:
-        return None
-    shape = envelope(power.time, power.power, MOST_POINTS)
+    return None if power is None or len(power.time) < 2 else _curve(power.time, power.power)
+
+
+def _curve(time: FloatArray, watts: FloatArray) -> dict[str, Json]:
+    shape = envelope(time, watts, MOST_POINTS)
     return {"time": floats(shape.time), "low": floats(shape.low), "high": floats(shape.high)}
 
 

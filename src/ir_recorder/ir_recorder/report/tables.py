@@ -181,11 +181,11 @@ def warning_table(analysis: Analysis) -> str:
 
 
 def problem_list(problems: Sequence[str]) -> str:
-    """What couldn't be read or computed."""
+    """What couldn't be planned, read or computed."""
     if not problems:
         return ""
     items = "".join(f"<li>{text(problem)}</li>" for problem in problems)
-    return f'<div class="problems"><b>Not everything could be read</b><ul>{items}</ul></div>'
+    return f'<div class="problems"><b>What is missing, and why</b><ul>{items}</ul></div>'
 
 
 def _cells(heads: Sequence[str], row: Sequence[str]) -> str:

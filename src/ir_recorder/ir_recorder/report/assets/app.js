@@ -11,6 +11,7 @@
   let motion = null;
   if (data.scene) {
     motion = new Motion(find("view"), timeline, data.scene, data.safetyDistance);
+    motion.blamed = data.blamed; /* bodies that a problem names: in red */
     find("trail-max").textContent = `${motion.mostPower} W`;
   } else {
     find("no-motion").hidden = false;

@@ -192,14 +192,16 @@ class Motion {
   }
   items(time, frame) {
     const poses = this.linkPoses(frame), load = this.load(time).split("+"), items = [];
-    for (const { mesh, pose, shown, sweep } of this.bodies) {
-      if (this.there(shown, time)) items.push({ mesh, model: pose, tint: sweep ? this.tints.zone : this.tints.machine });
+    const bad = (name) => name && (this.blamed || []).includes(name);
+    for (const { mesh, pose, shown, sweep, name } of this.bodies) {
+      const tint = bad(name) ? this.tints.bad : sweep ? this.tints.zone : this.tints.machine;
+      if (this.there(shown, time)) items.push({ mesh, model: pose, tint });
     }
     const look = this.show.capsules ? "robot" : "capsules";
-    for (const { mesh, link, kind, owner, look: own } of this.shapes) {
-      if (own === look) continue;
+    for (const { mesh, link, kind, owner, look: own, name } of this.shapes) {
+      if (own === look && !bad(name)) continue;
       if (owner && !load.includes(owner)) continue;
-      const tint = this.tints[{ link: "robot", base: "robot-base", joint: "robot-base", tool: "tool", part: "part" }[kind]];
+      const tint = bad(name) ? this.tints.bad : this.tints[{ link: "robot", base: "robot-base", joint: "robot-base", tool: "tool", part: "part" }[kind]];
       items.push({ mesh, model: poses[link], tint });
     }
     for (const part of this.parts) {

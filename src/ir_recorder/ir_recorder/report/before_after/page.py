@@ -16,12 +16,12 @@ from ir_recorder.report.before_after.figures import (
     hop_table,
     tiles,
 )
-from ir_recorder.report.before_after.motion import motion_of, power_curves
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.files import write_output
 from ir_recorder.report.front import Point, front_chart
 from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.side_motion import motion_of, power_curves
 from ir_recorder.report.words import text
 
 SCRIPTS = ("charts.js", "axes.js", "renderer.js", "motion.js", "export.js", "before_after.js")
