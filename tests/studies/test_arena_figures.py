@@ -7,7 +7,15 @@ import math
 import numpy as np
 
 from ir_studies.arena.entries import Entry
-from ir_studies.arena.figures import cost_over_time, energy_and_time, figures, success_over_time
+from ir_studies.arena.figures import (
+    compared,
+    cost_over_time,
+    energy_and_time,
+    figures,
+    success_over_time,
+)
+from ir_studies.arena.page import verdict
+from ir_studies.arena.settings import ArenaSettings
 from ir_studies.arena.table import Run
 
 
@@ -45,6 +53,27 @@ def test_figures_of_a_planner_count_what_it_did_not_solve() -> None:
     assert (found.solved, found.count, found.success) == (1, 2, 0.5)
     assert found.cost_ratio == 1.5
     assert figures("a", RUNS).cost_ratio == 1.0
+
+
+def test_planners_are_compared_where_both_solved() -> None:
+    assert compared("a", "b", RUNS) == (1, 1.5)
+    assert compared("b", "a", RUNS) == (1, 100.0 / 150.0)
+    assert compared("a", "a", RUNS) == (2, 1.0)
+    count, ratio = compared("a", "nobody", RUNS)
+    assert count == 0
+    assert math.isnan(ratio)
+
+
+def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
+    settings = ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))
+    dear = [run("portfolio", "1", 100.0, 0.1, 0.5), run("portfolio", "2", 200.0, 0.1, 0.5)]
+    said = verdict([*dear, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings)
+    assert "open: J of sbl is 10.00 % below the portfolio&#x27;s in the median of the 1 runs" in said
+    assert "solved" not in said.partition("runs that both solved")[2]
+    same = [run("sbl", task, cost, 0.1, 0.5) for task, cost in (("1", 100.0), ("2", 250.0))]
+    assert "In every cell the portfolio solved most" in verdict([*dear, *same], settings)
+    more = [run("portfolio", "1", math.nan, 0.0, 0.0), run("sbl", "1", 90.0, 0.1, 0.5)]
+    assert "open: sbl solved 1 of 1, the portfolio 0." in verdict(more, settings)
 
 
 def test_means_are_of_questions_that_all_solved() -> None:

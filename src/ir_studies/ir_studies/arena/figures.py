@@ -69,6 +69,17 @@ def figures(planner: str, runs: Sequence[Run]) -> Figures:
     )
 
 
+def compared(planner: str, other: str, runs: Sequence[Run]) -> tuple[int, float]:
+    """Runs (a question and a seed each) that both solved, and the median of the other's J over its own."""
+    a, b = (
+        {(run.entry.question, run.entry.seed): run.number("cost_j") for run in runs
+         if run.solved and run.entry.planner == name}
+        for name in (planner, other)
+    )  # fmt: skip
+    both = a.keys() & b.keys()
+    return len(both), _median(b[key] / a[key] for key in both)
+
+
 def success_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
     """Percent of the runs (N, planners) that were solved until each time (N,)."""
     return np.stack([_solved_until([r for r in runs if r.entry.planner == p], time) for p in planners], 1)

@@ -23,6 +23,7 @@ from ir_studies.arena.cell_picture import cell_picture
 from ir_studies.arena.figures import (
     GRID,
     Figures,
+    compared,
     cost_over_time,
     energy_and_time,
     figures,
@@ -39,6 +40,7 @@ _HEADS = (
     "planner", ">solved", ">first answer", ">best answer", ">J above the best known", ">W above the least",
     ">duration", ">energy", ">least clearance", ">cut or dead",
 )  # fmt: skip
+_TIE = 5e-5  # of J: less is not shown
 _ABOVE = 300.0  # percent: what a curve of costs shows where nothing, or something dearer, is known
 
 
@@ -73,7 +75,7 @@ def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
     if PORTFOLIO not in settings.planners or len(settings.planners) == 1:
         return ""
     said = [words for cell in settings.cells for words in _against(of_cell(runs, cell), cell, settings)]
-    held = "The portfolio has the highest success and the lowest median J in every cell."
+    held = "In every cell the portfolio solved most, and nobody has a lower median J where both solved."
     items = "".join(f"<li>{text(words)}</li>" for words in said or [held])
     return f'<section id="verdict"><h2>The portfolio against the others</h2><ul>{items}</ul></section>'
 
@@ -84,9 +86,10 @@ def _against(own: Sequence[Run], cell: str, settings: ArenaSettings) -> Iterator
     for planner, other in found.items():
         if other.success > mine.success:
             yield f"{cell}: {planner} solved {other.solved} of {other.count}, the portfolio {mine.solved}."
-        if other.cost_ratio < mine.cost_ratio:
-            low, high = percent(other.cost_ratio - 1.0), percent(mine.cost_ratio - 1.0)
-            yield f"{cell}: the median J of {planner} is {low} above the best known, the portfolio's {high}."
+        count, ratio = compared(PORTFOLIO, planner, own)
+        if ratio < 1.0 - _TIE:
+            less = f"{100.0 * (1.0 - ratio):.2f} % below the portfolio's"
+            yield f"{cell}: J of {planner} is {less} in the median of the {count} runs that both solved."
 
 
 def _cell_section(runs: Sequence[Run], name: str, planners: Sequence[str]) -> str:
