@@ -93,6 +93,22 @@ def test_outcomes_reach_the_sender_of_their_goal(driver, plan, cell, wait_for):
     ]
 
 
+def test_a_goal_that_is_cancelled_while_it_is_checked_ends_as_cancelled(driver, plan, cell, wait_for):
+    home = np.array(cell.machine_home)
+    release, outcomes = threading.Event(), []
+
+    def slow():
+        release.wait(60.0)
+        return TrajectoryGoal(plan(60.0, home, home + 0.1))
+
+    ticket = driver.submit(2, slow, outcomes.append)
+    driver.cancel(ticket)
+    release.set()
+    wait_for(lambda: driver.following(ticket) is not None, what="the goal starts")
+    frames(driver, 500)
+    assert [(outcome.canceled, outcome.code) for outcome in outcomes] == [(True, ErrorCode.SUCCESSFUL)]
+
+
 def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
     heard = []
     done = threading.Event()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Callable
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 import rclpy
@@ -18,6 +20,7 @@ from ir_msgs.srv import QueryModes, SetPlcInput
 from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.quality import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_sim_driver.node import SimDriver
+from ir_sim_driver.node.executions import Executions
 from ir_sim_driver.node.plc_topic import PlcTopic
 
 PRESSED = PlcInputs(emergency_stop=True, move_enable=True)
@@ -143,6 +146,23 @@ def test_more_requests_than_may_wait_are_all_answered(
     wait_for(lambda: all(future.done() for future in futures), timeout=120.0, what="all are answered")
     refusals = {future.result().status.message for future in futures} - {""}
     assert all("are waiting: send fewer at once" in sentence for sentence in refusals)
+
+
+def test_a_goal_that_is_cancelled_before_it_begins_is_cancelled() -> None:
+    """A thread may take the cancel before the goal's own coroutine runs."""
+    cancelled: list[int] = []
+    driver = SimpleNamespace(max_points=10, submit=lambda points, read, ended: 7, cancel=cancelled.append)
+    node = SimpleNamespace(future=lambda: asyncio.Future(loop=loop), every=lambda seconds, call: lambda: None)
+    loop = asyncio.new_event_loop()
+    goals = Executions(cast(Any, driver), cast(Any, node), ExecuteTrajectory, "execute", 0.0)
+    handle = SimpleNamespace(goal_id=SimpleNamespace(uuid=range(16)), request=ExecuteTrajectory.Goal())
+    goals.cancel(handle)
+    assert cancelled == []
+    running = goals.execute(handle)
+    running.send(None)
+    assert cancelled == [7]
+    running.close()
+    loop.close()
 
 
 def test_forty_goals_are_all_answered_with_a_result(

@@ -8,11 +8,13 @@ from typing import Any
 
 import pytest
 from mcap.writer import Writer
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, String
 
+from ir_msgs_py import names
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.play.node import PlayNode
 from ir_recorder.play.schedule import PlaySettings
@@ -111,6 +113,20 @@ def test_no_command_is_played_beside_a_driver(
     assert "is not played to a live robot" in player.failure
     assert ros_node.get_name() in player.failure
     assert moved == []
+
+
+def test_no_command_is_played_beside_a_driver_that_does_not_listen_yet(
+    ros_context: Any, ros_executor: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    ros_executor.add_node(Node(names.SIM_DRIVER, context=ros_context))
+    settings = PlaySettings(topics=("/ir_sim_driver/speed_scaling",))
+    player = PlayNode(with_commands(tmp_path / "a.mcap"), settings, delay=0.0, context=ros_context)
+    ros_executor.add_node(player)
+    wait_for(lambda: names.SIM_DRIVER in player.get_node_names())
+    player.start()
+    wait_for(lambda: not player.playing)
+    assert "is not played to a live robot" in player.failure
+    assert player.published == 0
 
 
 def test_a_driver_that_comes_later_ends_playback(

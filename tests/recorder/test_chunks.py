@@ -53,6 +53,31 @@ def test_many_chunks_end_at_the_bound_of_the_whole(tmp_path: Path) -> None:
     assert len(channel.messages) == 3
 
 
+def test_messages_of_no_bytes_take_memory_too(tmp_path: Path) -> None:
+    """Ten thousand of them are 0.3 MB, and as objects four times as much."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE)
+        writer.start("ros2", "stranger")
+        channel = writer.register_channel("/text", "cdr", 0)
+        for k in range(10_000):
+            writer.add_message(channel, k, b"", k)
+        writer.finish()
+    with pytest.raises(ReadError, match="more than 1 MiB uncompressed: the rest is left out"):
+        read_raw(path, limits=ReadLimits(total=MIB))
+
+
+def test_attachments_count_too(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "stranger")
+        writer.add_attachment(0, 0, "cell.yaml", "text/plain", bytes(2 * MIB))
+        writer.finish()
+    with pytest.raises(ReadError, match="more than 1 MiB uncompressed: the rest is left out"):
+        read_raw(path, limits=ReadLimits(total=MIB))
+
+
 def test_what_a_small_file_claims_is_bounded_before_it_is_decompressed(tmp_path: Path) -> None:
     """Chunks within their own bound: at most `free` and `ratio` times the file are opened."""
     path = bomb(tmp_path / "a.mcap", 10, MIB)
