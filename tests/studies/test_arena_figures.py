@@ -66,12 +66,12 @@ def test_planners_are_compared_where_both_solved() -> None:
 
 def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
     settings = ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))
-    dear = [run("portfolio", "1", 100.0, 0.1, 0.5), run("portfolio", "2", 200.0, 0.1, 0.5)]
-    said = verdict([*dear, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings)
+    mine = [run("portfolio", "1", 100.0, 0.1, 0.5), run("portfolio", "2", 200.0, 0.1, 0.5)]
+    said = verdict([*mine, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings)
     assert "open: J of sbl is 10.00 % below the portfolio&#x27;s in the median of the 1 runs" in said
     assert "solved" not in said.partition("runs that both solved")[2]
     same = [run("sbl", task, cost, 0.1, 0.5) for task, cost in (("1", 100.0), ("2", 250.0))]
-    assert "In every cell the portfolio solved most" in verdict([*dear, *same], settings)
+    assert "In every cell the portfolio solved most" in verdict([*mine, *same], settings)
     more = [run("portfolio", "1", math.nan, 0.0, 0.0), run("sbl", "1", 90.0, 0.1, 0.5)]
     assert "open: sbl solved 1 of 1, the portfolio 0." in verdict(more, settings)
 
