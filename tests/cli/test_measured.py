@@ -96,6 +96,13 @@ def test_a_gap_at_a_standstill_is_one(tmp_path: Path) -> None:
     assert times[-1] == pytest.approx(1.19)
 
 
+def test_rows_in_a_wrong_unit_of_time_are_a_sentence() -> None:
+    """Milliseconds taken for seconds: an hour of rows 12 s apart was smoothed for minutes."""
+    time = 12.0 * np.arange(300)
+    with pytest.raises(InputError, match=r"the rows are 12 s apart: .* at most 0.1 s; is the unit of time"):
+        measured(("a",), time, np.zeros((300, 1)), lambda _: 0.0)
+
+
 def test_few_rows_are_a_sentence() -> None:
     with pytest.raises(InputError, match="3 rows of positions alone: 8 to"):
         measured(JOINT_NAMES, np.arange(3.0), np.zeros((3, 6)), lambda _: 1.0)

@@ -32,6 +32,7 @@ _STILL = 0.005  # rad/s
 _AT_REST = 0.02  # rad/s: a trace that ends with less ends at rest
 _DIFFERENCES = np.sqrt(20.0)  # the third difference of noise is so many times larger
 _ROWS_MAX = 200_000
+_PERIOD_MAX = 0.1  # s between rows: the least bandwidth needs as many
 Joules = Callable[[JointTrajectory], float]
 
 
@@ -96,6 +97,12 @@ def measured(
     """
     if not 8 <= len(time) <= _ROWS_MAX:
         raise InputError(f"{len(time)} rows of positions alone: 8 to {_ROWS_MAX} can be smoothed")
+    period = float(np.median(np.diff(time)))
+    if period > _PERIOD_MAX:
+        raise InputError(
+            f"the rows are {period:.3g} s apart: positions alone say how the robot moved where that is at "
+            f"most {_PERIOD_MAX:g} s; is the unit of time right?"
+        )
     tried = [bandwidth] if bandwidth > 0.0 else BANDWIDTHS
     found = [_worth(names, time, positions, joules, one) for one in tried]
     return min(found, key=lambda one: one.bound)

@@ -162,7 +162,10 @@ class _Reader:
         if len(back):
             k = int(back[0]) + 1
             line = np.concatenate(lines)[k]
-            raise TraceError(f"{self._path}:{line}: time is {time[k]:g} s, it must increase")
+            raise TraceError(
+                f"{self._path}:{line}: time is {time[k]:.12g} s, it must increase: the row before has "
+                f"{time[k - 1]:.12g} s"
+            )
 
 
 def _named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
