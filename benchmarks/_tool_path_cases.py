@@ -145,7 +145,7 @@ def _half(
     even = np.linspace(at[-1], max(0.5 * length, at[-1]), _ASKED)
     at, v = np.concatenate([at, even]), np.concatenate([v, np.full(_ASKED, speed)])
     a, j = (np.concatenate([one, np.zeros(_ASKED)])[:, None] for one in (a, j))
-    if at[-1] > length:  # no room for the ramp
+    if at[-1] > length:  # the ramp is longer than the path
         return tuple(np.full((1, spline.c.shape[1]), np.inf) for _ in range(4))  # type: ignore[return-value]
     sign = -1.0 if back else 1.0  # a motion back in time keeps the same limits
     q, first, second, third = (spline(length - at if back else at, nu=k) * sign**k for k in range(4))
