@@ -23,6 +23,10 @@ _SAME_CHAIN = 1  # rungs from the request's own value, over which its chain is t
 
 
 _CUT = "no program of {:g} s found"
+_LITTLE = (
+    "no program of {:g} s found, the shortest is {:.3f} s; max_iterations ended before all was tried: "
+    "more of it may help"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +51,8 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
     """The cheapest movements for a cycle [s] of which `standing` s are pauses. Candidates are the given
     chain, and the one that is cheapest at the value that a second has in the cycle.
 
-    Raises RequestError where the cycle is shorter than the fastest movements.
+    Raises RequestError where the cycle is shorter than the fastest movements, StageError where more work
+    could find faster ones.
     """
     seconds = cycle_time - standing + _ROUNDING
     first = _tried(choice, seconds, standing, None)
@@ -70,9 +75,12 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
     if best.timed is None:
         best = _fastest(best, seconds, standing, progress)
     if best.timed is None:
-        if choice.movements.context.work.exhausted:
+        work, shortest = choice.movements.context.work, best.values.shortest
+        if work.exhausted:
             raise StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
-        shortest = best.values.shortest
+        if work.left < work.improvement:  # the last movements had less than they can use
+            little = _LITTLE.format(cycle_time, shortest + standing)
+            raise StageError(Status(StatusCode.PLANNING_FAILED, little))
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"cycle_time is {cycle_time:g} s: the shortest is {shortest + standing:.3f} s, "
