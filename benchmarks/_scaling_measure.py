@@ -14,7 +14,7 @@ import numpy as np
 
 PAGE = resource.getpagesize()
 QUIET_S = 0.02  # a faster step is repeated for this long, and the least time counts
-WARM_S = 1.0  # a step that took longer the first time is not repeated
+WARM_S = 3.0  # a step that took longer the first time, with cold caches, is not repeated
 ALLOWED_S = 600.0  # wall time of one measurement
 
 
