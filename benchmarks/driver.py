@@ -5,6 +5,9 @@
 Each cell's robot carries its tool through random rest-to-rest movements within the limits, stepped without
 ROS: as they are, then scaled, disturbed and canceled. The power modes are entered and left (Table II, times
 of transitions). Then the node runs as a process of its own, and a subscriber here counts its joint states.
+
+Periods are those of a machine that nobody else uses. Where others do, `chrt -f 10` before the command keeps
+their turns out of the figures: beside 30 busy processes p99 was 2.4 ms then, at 2.07 ms of a bare sleep.
 """
 
 from __future__ import annotations
