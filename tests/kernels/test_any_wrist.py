@@ -131,3 +131,24 @@ def test_seven_axes_and_crossed_axes_are_refused_with_the_reason() -> None:
     crossed = SimpleNamespace(joint_origin=robot.joint_origin, joint_axis=axis)
     with pytest.raises(InputError, match="axes 2 and 3 are not parallel"):
         inverse_kinematics(Chain(crossed), -HALF, HALF)
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        [2.7023283765, -1.2019172549, -1.0793580619, 0.0837217278, -1.3339889381, -1.9278133048],
+        [-1.1452136411, -2.8819943682, 1.8774129399, 3.1411707729, -0.7528838924, 1.7360801494],
+        [-1.1451136411, -2.8819943682, 1.8774129399, 3.1411707729, -0.7528838924, 1.7360801494],
+    ],
+)
+def test_branches_narrower_than_the_grid_are_found(q: list[float]) -> None:
+    """All solutions of some branches lie within 0.03 degrees of q4."""
+    chain = Chain(other_wrist(meet=False))
+    assert_complete(chain, SearchedIk(chain, -HALF, HALF), np.array([q]))
+
+
+def test_a_single_pose_out_of_reach_has_no_answer() -> None:
+    chain = Chain(other_wrist(meet=False))
+    pose = np.eye(4)
+    pose[:3, 3] = [20.0, 0.0, 0.0]
+    assert len(SearchedIk(chain, -HALF, HALF).solve(pose[None]).q) == 0

@@ -24,6 +24,8 @@ GRID = 720  # values of q4: half a degree; a pair of solutions nearer than that 
 FINER = (4, 16)  # times the grid, in turn, where a solution is missing
 CHUNK = 64  # poses at once: 64 x 720 x 4 candidates fit into the cache
 SLACK = 0.05  # how far beyond a tangent a guess may lie: solutions between two values of q4 are near it
+_LEVELS = 3  # the grid, and finer ones
+_PARTS = 12  # of a step of the grid, where a branch ends or a solution is near
 _STEPS, _MORE_STEPS = 8, 40
 _HOPEFUL = 0.02  # m and rad
 _EXACT = 1e-9  # m and rad: what counts as a solution
@@ -69,22 +71,43 @@ class SearchedIk:
         return found
 
     def _of(self, targets: FloatArray, grid: int) -> list[Found]:
-        count, q4 = len(targets), np.linspace(-np.pi, np.pi, grid, endpoint=False)
-        X = np.repeat(displacements(self.chain, self.lines, targets), grid, axis=0)
-        E4 = np.tile(self.lines.turned(3, q4), (count, 1, 1))
-        q, lack = self._candidates(X, E4, np.tile(q4, count))
-        pose, k, branch = np.nonzero(_starts(lack.reshape(count, grid, -1)))
-        starts = q.reshape(count, grid, -1, 6)[pose, k, branch]
+        pose, starts = self._guesses(targets, grid)
         best, error = newton(self.chain, targets[pose], starts, _STEPS)
         slow = (error >= _EXACT) & (error < _HOPEFUL)  # beside a tangent, where each step gains one bit
         best[slow], error[slow] = newton(self.chain, targets[pose[slow]], best[slow], _MORE_STEPS)
         exact = error < _EXACT
         return _distinct(pose[exact], best[exact])
 
-    def _candidates(self, X: FloatArray, E4: FloatArray, q4: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """q (N, 4, 6) and by how much axis 3 misses its place [m] (N, 4), inf where there is nothing."""
+    def _guesses(self, targets: FloatArray, grid: int) -> tuple[IntArray, FloatArray]:
+        """Where Newton's steps start: poses (M,) and q (M, 6), on the grid, and on finer ones beside values
+        of q4 where a solution is near, a branch ends, or one may lie between two values.
+        """
+        step, found = 2.0 * np.pi / grid, []
+        q4 = np.tile(np.linspace(-np.pi, np.pi, grid, endpoint=False), (len(targets), 1))
+        for level in range(_LEVELS):
+            count = q4.shape[1]
+            X = np.repeat(displacements(self.chain, self.lines, targets), count, axis=0)
+            q, lack, beyond = self._candidates(X, self.lines.turned(3, q4.ravel()), q4.ravel())
+            marked = _starts(lack.reshape(len(targets), count, -1))
+            pose, k, branch = np.nonzero(marked)
+            found.append((pose, q.reshape(len(targets), count, -1, 6)[pose, k, branch]))
+            narrow = _narrow(beyond.reshape(len(targets), count, -1).min(axis=2))
+            rows = narrow | marked.any(axis=2) if level == 0 else narrow
+            if not rows.any():
+                break
+            q4 = _finer(q4, rows, step)
+            step /= _PARTS
+        poses, starts = zip(*found, strict=True)
+        return np.concatenate(poses), np.concatenate(starts)
+
+    def _candidates(
+        self, X: FloatArray, E4: FloatArray, q4: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """q (N, 4, 6), by how much axis 3 misses its place [m] (N, 4), inf where there is nothing, how far
+        beyond a tangent q1 or q5 is (N, 4).
+        """
         lines = self.lines
-        q1, q5, exists = shoulder_and_wrist(lines, X, E4, SLACK)
+        q1, q5, exists, beyond = shoulder_and_wrist(lines, X, E4, SLACK)
         rows, lacks = [], []
         upper = lines.o[2] - lines.o[1]
         z, turned = lines.z, lines.turned
@@ -99,7 +122,7 @@ class SearchedIk:
             rows.append(np.stack([q1[:, pair], q2, q3, q4, q5[:, pair], q6], axis=1))
             apart = np.linalg.norm(elbow - (elbow @ z[1])[:, None] * z[1], axis=1)
             lacks.append(np.where(exists[:, pair], apart - length, np.inf))
-        return np.stack(rows, axis=1), np.stack(lacks, axis=1)
+        return np.stack(rows, axis=1), np.stack(lacks, axis=1), beyond
 
 
 def _starts(lack: FloatArray) -> BoolArray:
@@ -114,6 +137,24 @@ def _starts(lack: FloatArray) -> BoolArray:
         beside = np.roll(lack, step, axis=1)
         ends |= ~np.isfinite(beside) | (np.sign(beside) != np.sign(lack))
     return np.asarray(there & (least | ends))
+
+
+def _narrow(beyond: FloatArray) -> BoolArray:
+    """Where (n, count) a branch may lie between two values: nothing exists, and it is nearest to existing."""
+    least = (beyond <= np.roll(beyond, 1, axis=1)) & (beyond <= np.roll(beyond, -1, axis=1))
+    return np.asarray((beyond > 0.0) & least)
+
+
+def _finer(q4: FloatArray, rows: BoolArray, step: float) -> FloatArray:
+    """Values (n, more) in order, within a step of those in `rows` (n, count); the last one repeated."""
+    steps = step * np.arange(-_PARTS, _PARTS + 1) / _PARTS
+    near = (own[row][:, None] + steps for own, row in zip(q4, rows, strict=True))
+    fine = [np.unique(np.round(values.ravel(), 12)) for values in near]
+    most = max(len(each) for each in fine)
+    last = [each[-1:] if len(each) else np.zeros(1) for each in fine]
+    return np.stack(
+        [np.append(each, np.repeat(end, most - len(each))) for each, end in zip(fine, last, strict=True)]
+    )
 
 
 def _distinct(pose: IntArray, q: FloatArray) -> list[Found]:

@@ -22,11 +22,12 @@ _NOTHING = 1e-12  # m, and of a direction: nothing that an angle could change
 
 
 class Pairs(NamedTuple):
-    """q1, q5 (N, 4) and which exist (N, 4)."""
+    """q1, q5 (N, 4), which exist (N, 4), and how far beyond a tangent each is (N, 4): 0 where it exists."""
 
     q1: FloatArray
     q5: FloatArray
     exists: BoolArray
+    beyond: FloatArray
 
 
 class _Sum(NamedTuple):
@@ -36,9 +37,10 @@ class _Sum(NamedTuple):
     sine: FloatArray
     constant: FloatArray
 
-    def angles(self, value: FloatArray, slack: float) -> tuple[FloatArray, BoolArray]:
-        """Both angles (N, 2) at which the sum has a value (N,), and whether they exist (N,); 0 where any
-        does. A cosine up to 1 + slack counts as if it were as much below 1.
+    def angles(self, value: FloatArray, slack: float) -> tuple[FloatArray, BoolArray, FloatArray]:
+        """Both angles (N, 2) at which the sum has a value (N,), whether they exist (N,), and how far the
+        cosine is beyond 1 (N,); 0 where any angle does. A cosine up to 1 + slack counts as if it were as much
+        below 1.
         """
         length = np.hypot(self.cosine, self.sine)
         any_angle = length < _NOTHING
@@ -47,7 +49,9 @@ class _Sum(NamedTuple):
         turn = np.arccos(np.clip(folded, -1.0, 1.0))
         middle = np.arctan2(self.sine, self.cosine)
         angle = np.where(any_angle[:, None], 0.0, middle[:, None] + turn[:, None] * np.array([1.0, -1.0]))
-        return angle, np.where(any_angle, np.abs(ratio) < _NOTHING, np.abs(ratio) <= 1.0 + slack)
+        exists = np.where(any_angle, np.abs(ratio) < _NOTHING, np.abs(ratio) <= 1.0 + slack)
+        beyond = np.where(any_angle & ~exists, np.inf, np.maximum(np.abs(ratio) - 1.0, 0.0))
+        return angle, exists, beyond
 
 
 def _along(to: FloatArray, axis: FloatArray, vector: FloatArray) -> _Sum:
@@ -70,21 +74,23 @@ def shoulder_and_wrist(lines: ArmLines, X: FloatArray, E4: FloatArray, slack: fl
     reach1 = _along(z[1], -z[0], (X[:, :3, :3] @ o[5] + X[:, :3, 3]) - o[0])
     fixed = seen @ o[4] + E4[:, :3, 3] @ z[1] - z[1] @ o[0]
     if lines.meet:
-        q1, reached = reach1.angles(fixed, slack)
-        return _one_by_one(q1, reached, aim1, aim5, slack)
+        q1, reached, far = reach1.angles(fixed, slack)
+        return _one_by_one(q1, reached, far, aim1, aim5, slack)
     reach5 = _along(seen, z[4], np.broadcast_to(o[5] - o[4], seen.shape))
     reach5 = reach5._replace(constant=reach5.constant + fixed)
     return _together(aim1, aim5, reach1, reach5, max(slack, NEAR_UNIT))
 
 
-def _one_by_one(q1: FloatArray, reached: BoolArray, aim1: _Sum, aim5: _Sum, slack: float) -> Pairs:
+def _one_by_one(
+    q1: FloatArray, reached: BoolArray, far: FloatArray, aim1: _Sum, aim5: _Sum, slack: float
+) -> Pairs:
     pairs = []
     for k in (0, 1):
         value = aim1.cosine * np.cos(q1[:, k]) + aim1.sine * np.sin(q1[:, k]) + aim1.constant
-        q5, aimed = aim5.angles(value, slack)
-        pairs.append(
-            (np.repeat(q1[:, k : k + 1], 2, axis=1), q5, np.repeat((reached & aimed)[:, None], 2, axis=1))
-        )
+        q5, aimed, off = aim5.angles(value, slack)
+        each = (q1[:, k], reached & aimed, np.maximum(far, off))
+        first, exists, beyond = (np.repeat(column[:, None], 2, axis=1) for column in each)
+        pairs.append((first, q5, exists, beyond))
     return Pairs(*(np.concatenate(parts, axis=1) for parts in zip(*pairs, strict=True)))
 
 
@@ -103,7 +109,8 @@ def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) 
     q1 = np.angle(w) + np.where(np.abs(beyond) > NEAR_UNIT, beyond, 0.0)  # a pair that just left the circle
     x = np.stack([np.cos(q1), np.sin(q1)], axis=1)  # (n, 2, 4)
     y = (A @ x + a[:, :, None]) * np.sign(det)[:, None, None]
-    return Pairs(q1, np.arctan2(y[:, 1], y[:, 0]), np.abs(beyond) <= slack)
+    far = np.where(np.abs(beyond) > NEAR_UNIT, np.abs(beyond), 0.0)
+    return Pairs(q1, np.arctan2(y[:, 1], y[:, 0]), np.abs(beyond) <= slack, far)
 
 
 def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:

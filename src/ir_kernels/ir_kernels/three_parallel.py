@@ -47,7 +47,7 @@ class ThreeParallelIk:
         X = displacements(self.chain, self.lines, targets)
         found: list[Found] = []
         still = np.broadcast_to(np.eye(4), X.shape)
-        q1, q5, exists = shoulder_and_wrist(self.lines, X, still)
+        q1, q5, exists, _ = shoulder_and_wrist(self.lines, X, still)
         for pair in range(4):
             rows = np.flatnonzero(exists[:, pair])
             found += self._of_pair(X[rows], rows, q1[rows, pair], q5[rows, pair], 4 * (pair // 2) + pair % 2)
