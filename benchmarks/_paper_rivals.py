@@ -17,8 +17,7 @@ from ir_msgs_py.arrays import FloatArray
 EDGES = 6000  # checks of a search, in certified edges: one that spends them counts with them
 SIZES = (0, 1, 3, 10, 30, MOST)
 FEW = 10  # zones up to which there are few
-KPIECE_PLACES, RRT_PLACES = 16, 8  # cells per type and seed
-TASKS = 3  # movements in each
+PLACES, TASKS = 8, 3  # cells per type and seed, movements in each
 ONE_CELL = 100.0  # rad: larger than every joint's range
 SUPERFLUOUS = 0.9  # of the checks without cells: less would be worth having them
 SLOWER = 1.2  # times the checks among one zone from which on a planner has slowed down
@@ -26,10 +25,10 @@ COMPARED = ("rrt", "rrt_connect", "tree", "genetic")
 
 
 def _among_zones(
-    seed: int, sizes: tuple[int, ...], places: int, *, quick: bool
+    seed: int, sizes: tuple[int, ...], *, quick: bool
 ) -> Iterator[tuple[str, int, int, Question]]:
     """Type of the zones, their number, number of the movement, and the question."""
-    places, tasks = (1, 1) if quick else (places, TASKS)
+    places, tasks = (1, 1) if quick else (PLACES, TASKS)
     for kind in KINDS:
         for place in range(places):
             for k, asked in enumerate(questions(kind, sizes, tasks, places * seed + place)):
@@ -63,7 +62,7 @@ def _ratios(rows: Sequence[Row], one: Row, other: Row, key: str = "edges") -> tu
 def measure_kpiece(seed: int, quick: bool) -> list[Row]:
     """A row per search with cells of 0.3 rad, and with a grid of one cell per quadrant of the joints."""
     rows = []
-    for kind, size, number, question in _among_zones(seed, SIZES[1:], KPIECE_PLACES, quick=quick):
+    for kind, size, number, question in _among_zones(seed, SIZES[1:], quick=quick):
         for draw in range(1 if quick else 2):
             for name, cell in (("cells", None), ("no cells", ONE_CELL)):
                 row = _row("kpiece", question, draw, cell)
@@ -112,7 +111,7 @@ def follows_kpiece(statements: Sequence[Statement]) -> str:
 def measure_rrt(seed: int, quick: bool) -> list[Row]:
     """A row per search of each planner in every size of the cell."""
     rows: list[Row] = []
-    for kind, size, number, question in _among_zones(seed, SIZES, RRT_PLACES, quick=quick):
+    for kind, size, number, question in _among_zones(seed, SIZES, quick=quick):
         asked = {"kind": kind, "zones": size, "task": number}
         rows.extend(asked | _row(planner, question, number) for planner in COMPARED)
     return rows
