@@ -24,9 +24,10 @@ from ir_description import (
 )
 from ir_recorder.errors import FitError
 from ir_recorder.fit import Fit, fit, sentences
-from ir_recorder.fit.plausible import check_range
+from ir_recorder.fit.plausible import check_range, check_readings
 from ir_recorder.fit.residuals import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
+from ir_recorder.traces import Trace
 
 CELL, PRIOR, STEP = load_cell("demo"), data_sheet(), 0.01
 MODEL = PowerModel(CELL.robot, load_power_data().dc_link, CELL.base_pose, PRIOR)
@@ -129,6 +130,15 @@ def test_what_the_data_do_not_show_is_named_and_kept() -> None:
     for name in found.kept:
         assert found.parameters.value(name) == PRIOR.value(name)
     assert "watts.HIBERNATION" in " ".join(sentences(found))
+
+
+def test_a_meter_that_reads_too_seldom_is_refused_with_its_interval() -> None:
+    time = np.arange(0.0, 60.0, 1.0)
+    check_readings(Trace("meter.csv", 0.1 * time, {"power": 500.0 + time}))
+    with pytest.raises(
+        FitError, match=r"meter\.csv: a reading of power every 1 s, a fit needs one every 0\.25 s"
+    ):
+        check_readings(Trace("meter.csv", time, {"power": 500.0 + time}))
 
 
 def test_data_without_motion_say_so_and_data_that_determine_nothing_are_refused() -> None:

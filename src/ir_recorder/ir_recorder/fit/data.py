@@ -14,7 +14,7 @@ from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import FitError
 from ir_recorder.fit.cells import attached_cell
-from ir_recorder.fit.plausible import check_range
+from ir_recorder.fit.plausible import check_range, check_readings
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.on_one_grid import LoadRuns
 from ir_recorder.read.reader import read_recording
@@ -76,6 +76,7 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
         meter = outer
     if meter is None:
         raise FitError(f"{source.motion}: there is neither a column power nor energy; name the meter's file")
+    check_readings(meter)
     names, modes = cell.robot.joint_names, prior.modes
     return FitData(samples_of(joints, meter, names, modes, runs), model, tuple(notes))
 

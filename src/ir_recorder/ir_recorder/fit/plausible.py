@@ -7,10 +7,12 @@ import numpy as np
 from ir_description import RobotModel
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import FitError
+from ir_recorder.traces import Trace
 
 MOST_UNEXPLAINED = 0.5  # of the mean power: plants that are fitted leave a tenth at most
 _BEYOND = 0.2  # rad outside a joint's range: referencing and a worn stop are less
 _FEWEST = 20  # windows
+_SELDOM = 0.25  # s: within it an axis is accelerated and braked again
 
 
 def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray) -> None:
@@ -40,6 +42,15 @@ def check_determined(determined: BoolArray, moving: BoolArray, window: float) ->
         f"the robot moves in {moved:.1f} of {seconds:.1f} s with watts. Drive several axes at several speeds "
         "and stay in the power modes; ir energy excite plans such movements"
     )
+
+
+def check_readings(meter: Trace) -> None:
+    """FitError where a meter reads so seldom that movements vanish between its readings."""
+    if meter.period > _SELDOM:
+        raise FitError(
+            f"{meter.source}: a reading of power every {meter.period:.3g} s, a fit needs one every {_SELDOM:g} s "
+            "at least, better every 0.1 s or less"
+        )
 
 
 def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
