@@ -48,8 +48,8 @@ def check_readings(meter: Trace) -> None:
     """FitError where a meter reads so seldom that movements vanish between its readings."""
     if meter.period > _SELDOM:
         raise FitError(
-            f"{meter.source}: a reading of power every {meter.period:.3g} s, a fit needs one every {_SELDOM:g} s "
-            "at least, better every 0.1 s or less"
+            f"{meter.source}: a reading of power every {meter.period:.3g} s, a fit needs one every "
+            f"{_SELDOM:g} s at least, better every 0.1 s or less"
         )
 
 
