@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -18,20 +19,25 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 LINE = re.compile(r"^(?: {4}|\$ )?(?:\.venv/bin/)?ir ([a-z].*)$")
 FENCE = re.compile(r"^```(bash|sh|)$")
+OPERATORS = frozenset({"|", ">", ">>", "&", "&&"})
 ABSENT = ("[", "…", "...", "COMMAND")  # of lines that show a pattern, not a command
 
 
-def command_lines(page: Path) -> Iterator[str]:
-    """Lines in code that call `ir`, without comments, pipes and redirections."""
+def command_lines(page: Path) -> Iterator[list[str]]:
+    """Words of the lines in code that call `ir`, without comments, pipes and redirections."""
     fenced = shell = False
-    for line in page.read_text("utf-8").splitlines():
+    lines = iter(page.read_text("utf-8").splitlines())
+    for line in lines:
         if line.startswith("```"):
             fenced, shell = not fenced, FENCE.match(line) is not None
         found = LINE.match(line)
         if found is None or (fenced and not shell) or not (fenced or line.startswith("    ")):
             continue
-        words = re.split(r"\s(?:#|>|\||&&?)(?:\s|$)", found.group(1))[0].strip()
-        if not any(mark in words for mark in ABSENT):
+        command = found.group(1)
+        while command.count('"') % 2:  # a quoted text of several lines
+            command += "\n" + next(lines)
+        words = list(takewhile(lambda word: word not in OPERATORS, shlex.split(command, comments=True)))
+        if not any(mark in word for mark in ABSENT for word in words):
             yield words
 
 
@@ -46,8 +52,8 @@ def parser_of(command: str) -> argparse.ArgumentParser:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_is_understood(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wrong = []
-    for line in command_lines(page):
-        words = shlex.split(line)
+    for words in command_lines(page):
+        line = " ".join(words)
         if words[0] not in COMMAND_MODULES:
             wrong.append(line)
             continue
