@@ -23,7 +23,7 @@ from ir_description import (
     physical_bounds,
 )
 from ir_recorder.errors import FitError
-from ir_recorder.fit import Fit, fit, sentences
+from ir_recorder.fit import Fit, Source, fit, fit_data, sentences
 from ir_recorder.fit.plausible import check_range, check_readings
 from ir_recorder.fit.residuals import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
@@ -224,3 +224,11 @@ def test_a_meter_with_a_clock_of_its_own_is_fitted_from_csv(
     found = load_power_parameters(str(tmp_path / "power.yaml"))
     assert found.value("coulomb.joint_a1") == pytest.approx(truth.value("coulomb.joint_a1"), rel=0.05)
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("load", "name"), [("anvil", "anvil"), ("gripper+anvil", "anvil"), ("GRIPPER", "GRIPPER")]
+)
+def test_what_is_held_all_the_time_is_refused_where_the_cell_does_not_have_it(load: str, name: str) -> None:
+    with pytest.raises(FitError, match=f"^load '{name}' is unknown, known are gear, gripper, none"):
+        fit_data(Source(Path("joints.csv"), cell=CELL, load=load), PRIOR)

@@ -50,6 +50,7 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
     """Read all of a source and lay it on one grid; ReadError, TraceError or FitError as a sentence."""
     recording = read_recording(source.motion) if source.motion.suffix.lower() == ".mcap" else None
     cell = source.cell or attached_cell(recording)
+    _check_load(cell, source.load)
     if recording is not None:
         traces = recorded_traces(recording)
         runs = _recorded_loads(cell, load_timeline(recording).certain(recording.duration))
@@ -86,14 +87,17 @@ def _written_loads(cell: Cell, trace: Trace) -> list[tuple[float, float, tuple[L
     does not have.
     """
     words = trace.texts.get(LOAD, ())
-    known = {NO_LOAD, *(load.name for load in cell.loads("")), *(part.name for part in cell.parts)}
     for word in dict.fromkeys(words):
-        if strange := set(normal(word).split(LOAD_SEPARATOR)) - known:
-            raise FitError(
-                f"{trace.source}: load {min(strange)[:40]!r} is unknown, known are {', '.join(sorted(known))}"
-            )
+        _check_load(cell, word, f"{trace.source}: ")
     times = zip(trace.time.tolist(), map(normal, words), strict=False)
     return _recorded_loads(cell, LoadTimeline(tuple(times)).certain(float(trace.time[-1])))
+
+
+def _check_load(cell: Cell, text: str, where: str = "") -> None:
+    """Refuse a load text that names what is neither the cell's tool nor one of its parts."""
+    known = {NO_LOAD, *(load.name for load in cell.loads("")), *(part.name for part in cell.parts)}
+    if strange := set(normal(text).split(LOAD_SEPARATOR)) - known:
+        raise FitError(f"{where}load {min(strange)[:40]!r} is unknown, known are {', '.join(sorted(known))}")
 
 
 def _recorded_loads(
