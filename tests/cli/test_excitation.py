@@ -65,3 +65,19 @@ def test_the_choice_prefers_what_the_prior_does_not_know() -> None:
     for axis in range(6):
         assert left[prior.index(f"coulomb.joint_a{axis + 1}")] < 1.0
     assert left[prior.index("watts.HIBERNATION")] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--seconds", "0", "--seconds is 0 s, must be above 0 and at most 3600 s"),
+        ("--seconds", "nan", "--seconds is nan s, must be above 0 and at most 3600 s"),
+        ("--seconds", "3600.0001", "--seconds is 3600.0001 s, must be above 0 and at most 3600 s"),
+        ("--postures", "21", "--postures is 21, must be 1 to 20"),
+    ],
+)
+def test_a_programme_out_of_bounds_is_refused_with_its_value(
+    option: str, value: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["energy", "excite", "demo", option, value]) == 2
+    assert said in capsys.readouterr().err

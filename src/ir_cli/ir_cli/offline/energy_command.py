@@ -165,11 +165,14 @@ def run_fit(arguments: argparse.Namespace) -> int:
 
 def run_excite(arguments: argparse.Namespace) -> int:
     """Plan the programme, write its folder, print what it identifies and what it does not."""
+    if not 1 <= arguments.postures <= 20:
+        raise InputError(f"--postures is {arguments.postures}, must be 1 to 20")
+    if not 0.0 < arguments.seconds <= 3600.0:
+        raise InputError(f"--seconds is {arguments.seconds:.12g} s, must be above 0 and at most 3600 s")
+
     from ..excitation.programme import Asked, advice, plan_programme
     from ..excitation.programme_file import write_programme
 
-    if not 1 <= arguments.postures <= 20 or not 0.0 < arguments.seconds <= 3600.0:
-        raise InputError("--postures must be 1 to 20 and --seconds above 0, at most 3600")
     with sentences():
         planner, prior = planner_of(arguments.cell), load_power_parameters(arguments.prior)
         asked = Asked(
