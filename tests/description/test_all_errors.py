@@ -18,7 +18,7 @@ MISTAKES = (
     ("name: infeed_stand, kind: box", "name: infeed_stand, kind: cube", "must be one of box"),
     ("zone: SEMI_CLOSED", "zoone: SEMI_CLOSED", "unknown key 'zoone'"),
     ("{name: lathe_wall_left,", "{name: lathe_bed,", "lathe_bed is there twice"),
-    ("station: gauge_measure, wait_for", "station: gauge_mesure, wait_for", "'gauge_mesure' is unknown"),
+    ("station: gauge_measure, planner", "station: gauge_mesure, planner", "'gauge_mesure' is unknown"),
     ("{pause: 1800, power_mode: HIBERNATION}", "{pause: 1800, power_mode: SLEEP}", "'SLEEP'"),
     ("{between: [t_f1, gear_lying]", "{between: [t_f9, gear_lying]", "'t_f9' is unknown"),
     ("{pause: 180,", "{pause: -180,", "604800"),
