@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from pathlib import Path
@@ -10,7 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import CellFileError, Signal, UnknownNameError, cell_from_yaml, cell_to_yaml, load_cell
+from ir_description import (
+    CellFileError,
+    RobotFileError,
+    Signal,
+    UnknownNameError,
+    cell_file_errors,
+    cell_from_yaml,
+    cell_to_yaml,
+    load_cell,
+    robot_named,
+)
+from ir_description.files import robot_file_errors
 
 GOOD = """\
 format: ir_cell/1
@@ -327,6 +339,27 @@ def test_a_file_that_is_not_text_is_refused_with_its_line(tmp_path: Path) -> Non
     path.write_bytes(b"format: ir_cell/1\nname: \xff\n")
     with pytest.raises(CellFileError, match=r"cell.yaml:2: byte 0xff is not UTF-8 text"):
         load_cell(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_text_of_two_bytes_a_letter_is_named(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_bytes(GOOD.encode(encoding))
+    sentence = r"cell.yaml:1: the file is UTF-16 text, must be UTF-8"
+    with pytest.raises(CellFileError, match=sentence):
+        load_cell(path)
+    with pytest.raises(RobotFileError, match=sentence):
+        robot_named(str(path))
+    assert [error.line for error in (*cell_file_errors(path), *robot_file_errors(path))] == [1, 1]
+
+
+def test_the_largest_numbers_are_refused_in_their_line_wherever_they_stand() -> None:
+    numbers = re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])", GOOD)
+    for number, huge in zip(numbers, itertools.cycle(("1e308", "-1.7e+308")), strict=False):
+        text = f"{GOOD[: number.start()]}{huge}{GOOD[number.end() :]}"
+        line = GOOD.count("\n", 0, number.start()) + 1
+        with pytest.raises(CellFileError, match=rf"^<text>:{line}: .*{re.escape(huge)}"):
+            cell_from_yaml(text)
 
 
 def test_a_large_file_is_refused_unread(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from ir_description.files import (
     read_robot,
     robot_from_yaml,
     subject_line,
+    text_of,
 )
 from ir_description.robot import DATA_SHEET, PowerData, PowerParameters, RobotModel, prior
 from ir_msgs_py.cartesian import CartesianPath
@@ -88,9 +89,10 @@ def load_power_parameters(name_or_path: str = DATA_SHEET) -> PowerParameters:
     if not is_path(name_or_path):
         raise UnknownNameError("power parameters", name_or_path, (DATA_SHEET, "the path of a .yaml file"))
     try:
-        text = read_regular_file(Path(name_or_path), PARAMETER_BYTES_MAX).decode("utf-8")
-    except (InvalidValueError, UnicodeDecodeError) as error:
+        content = read_regular_file(Path(name_or_path), PARAMETER_BYTES_MAX)
+    except InvalidValueError as error:
         raise RobotFileError(shown(name_or_path)[1:-1], 0, str(error)) from error
+    text = text_of(content, name_or_path, RobotFileError)
     return power_parameters_from_yaml(text, name_or_path, data_sheet)
 
 
@@ -128,7 +130,7 @@ def load_cell(name_or_path: str | Path) -> Cell:
         content = read_regular_file(path, CELL_BYTES_MAX)
     except InvalidValueError as error:
         raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
-    return read_cell(_decoded(content, str(path)), str(path), load_robot, path.parent)
+    return read_cell(text_of(content, str(path), CellFileError), str(path), load_robot, path.parent)
 
 
 def load_path(name: str) -> CartesianPath:
@@ -137,14 +139,14 @@ def load_path(name: str) -> CartesianPath:
         content = read_regular_file(Path(name), CELL_BYTES_MAX)
     except InvalidValueError as error:
         raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
-    return path_from_yaml(_decoded(content, name), name)
+    return path_from_yaml(text_of(content, name, CellFileError), name)
 
 
 def cell_file_errors(path: str | Path) -> tuple[CellFileError, ...]:
     """Return everything that is wrong with a cell file, by line; where load_cell reads it, nothing is."""
     try:
         content = read_regular_file(Path(path), CELL_BYTES_MAX)
-        text = _decoded(content, str(path))
+        text = text_of(content, str(path), CellFileError)
     except InvalidValueError as error:
         return (CellFileError(shown(str(path))[1:-1], 0, str(error)),)
     except CellFileError as error:
@@ -157,7 +159,7 @@ def cell_file_line(path: str | Path, subject: str) -> int:
     it is not there.
     """
     try:
-        text = _decoded(read_regular_file(Path(path), CELL_BYTES_MAX), str(path))
+        text = text_of(read_regular_file(Path(path), CELL_BYTES_MAX), str(path), CellFileError)
     except (InvalidValueError, CellFileError):
         return 0
     return subject_line(text, subject)
@@ -172,11 +174,3 @@ def cell_from_yaml(text: str, source: str = "<text>") -> Cell:
 def _bundled_cell(name: str) -> Cell:
     path = _DATA / "cells" / f"{name}.yaml"
     return read_cell(path.read_text(encoding="utf-8"), path.name, load_robot, Path(str(path)).parent)
-
-
-def _decoded(content: bytes, source: str) -> str:
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise CellFileError(source, line, f"byte 0x{content[error.start]:02x} is not UTF-8 text") from error

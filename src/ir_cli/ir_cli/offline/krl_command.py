@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ir_description import Cell
+from ir_description.files import is_utf16
 from ir_krl import Followed, follow, parse
 from ir_planner import EvaluatedProgram, Planner, PlanOptions, evaluate_krl, export_krl, tool_in_flange
 
@@ -230,9 +231,12 @@ def _text(path: Path) -> str:
     try:
         if path.stat().st_size > BYTES_MAX:
             raise InputError(f"{path} has {path.stat().st_size} bytes: at most {BYTES_MAX} are read")
-        return path.read_bytes().decode("utf-8", errors="replace")
+        content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from error
+    if is_utf16(content):
+        raise InputError(f"{path}:1: the file is UTF-16 text, must be UTF-8: save it with that encoding")
+    return content.decode("utf-8", errors="replace")
 
 
 def _inputs(texts: list[str]) -> dict[int, bool]:

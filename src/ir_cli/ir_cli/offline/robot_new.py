@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description import DescriptionError, InvalidValueError
-from ir_description.files import read_regular_file
+from ir_description import DescriptionError, InvalidValueError, RobotFileError
+from ir_description.files import read_regular_file, text_of
 from ir_description.files.making import DriveSheet, UrdfArm, drive_sheet, robot_text, urdf_arm
 from ir_description.files.making.robot_text import link_names
 
@@ -55,4 +55,4 @@ def _say(out: Path, arm: UrdfArm, sheet: DriveSheet, shapes: Shapes, pairs: int)
 
 
 def _text(path: Path) -> str:
-    return read_regular_file(path, BYTES_MAX).decode("utf-8", errors="replace")
+    return text_of(read_regular_file(path, BYTES_MAX), str(path), RobotFileError)

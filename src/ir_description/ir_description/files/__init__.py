@@ -12,6 +12,7 @@ from ir_description.files.power_file import power_from_yaml
 from ir_description.files.power_parameters_file import power_parameters_from_yaml, power_parameters_to_yaml
 from ir_description.files.robot_file import read_robot, robot_errors, robot_file_errors, robot_from_yaml
 from ir_description.files.subject_lines import subject_line
+from ir_description.files.text_file import is_utf16, text_of
 from ir_description.files.urdf import robot_urdf
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "cell_to_yaml",
     "confidence_marks",
     "is_path",
+    "is_utf16",
     "path_from_yaml",
     "power_from_yaml",
     "power_parameters_from_yaml",
@@ -34,4 +36,5 @@ __all__ = [
     "robot_from_yaml",
     "robot_urdf",
     "subject_line",
+    "text_of",
 ]

@@ -16,6 +16,7 @@ from ir_description.files.items import Item
 from ir_description.files.mesh import read_regular_file
 from ir_description.files.places import inside, is_path
 from ir_description.files.power_file import dc_link, power_from_yaml, power_of
+from ir_description.files.text_file import text_of
 from ir_description.files.yaml_tree import Node, parse_yaml
 from ir_description.robot import USUAL_LINK, PowerData, without_table
 from ir_msgs_py.errors import InvalidValueError
@@ -64,7 +65,7 @@ def controller_document(item: Item, power: PowerData, folder: Path | None) -> No
 
 
 def _text(name: str, folder: Path | None) -> str:
-    return read_regular_file(inside(folder, name), BYTES_MAX).decode("utf-8", errors="replace")
+    return text_of(read_regular_file(inside(folder, name), BYTES_MAX), name, RobotFileError)
 
 
 def _without_table(item: Item) -> PowerData:

@@ -16,6 +16,7 @@ from ir_description.files.controller_reader import controller_document, read_con
 from ir_description.files.figures import figure
 from ir_description.files.items import Item, Table, read_items
 from ir_description.files.mesh import read_regular_file
+from ir_description.files.text_file import text_of
 from ir_description.files.yaml_text import yaml_text
 from ir_description.files.yaml_tree import Entry, Node
 from ir_description.poses import rotation_from_abc
@@ -79,13 +80,12 @@ def robot_file_errors(path: Path) -> tuple[RobotFileError, ...]:
         return robot_errors(_decoded(path), str(path), path.parent)
     except InvalidValueError as error:
         return (RobotFileError(str(path), 0, str(error)),)
+    except RobotFileError as error:
+        return (error,)
 
 
 def _decoded(path: Path) -> str:
-    try:
-        return read_regular_file(path, BYTES_MAX).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InvalidValueError(f"byte 0x{error.object[error.start]:02x} is not UTF-8 text") from error
+    return text_of(read_regular_file(path, BYTES_MAX), str(path), RobotFileError)
 
 
 def robot_errors(text: str, source: str, folder: Path | None) -> tuple[RobotFileError, ...]:
