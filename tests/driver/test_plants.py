@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from ir_description import load_power_data
+from ir_description import load_power_data, load_robot
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.diagnostics import report
 from ir_sim_driver.controller.driver import Driver
@@ -93,6 +93,25 @@ def test_what_a_file_leaves_out_is_nominal(cell, data, tmp_path):
         ("links: [{name: link_2, mass_kg: -1}]", "links[0].mass_kg is -1 kg, must be in (0, 100000] kg"),
         ("dc_link: {mains_v: 700}", "above the mains, 700 V"),
         ("drives: {switching_w: [1, 2]}", "has 2 entries, must have 6"),
+        (
+            "gears: {friction_viscous_nms_per_rad: -1}",
+            "gears.friction_viscous_nms_per_rad is '-1', must be a list of 6 entries",
+        ),
+        ("gears: {start_deg_c: }", "gears.start_deg_c is empty, must be a list of 6 entries"),
+        ("gears: {start_deg_c: {a: 1}}", "gears.start_deg_c must be a list of 6 entries"),
+        (
+            "dc_link: {brake_resistor_ohm: 1e-9}",
+            "dc_link.brake_resistor_ohm is 1e-9 ohm, must be in [0.1, 10000] ohm",
+        ),
+        ("dc_link: {capacitance_f: 1e-300}", "capacitance_f is 1e-300 F, must be in [1e-05, 10] F"),
+        (
+            "gears: {heat_capacity_j_per_k: [9, 9, 9, 9, 9, 1e-300]}",
+            "gears.heat_capacity_j_per_k[5] is 1e-300 J/K, must be in [0.1, 1e+09] J/K",
+        ),
+        (
+            "gears: {conductance_w_per_k: [0, 0, 1e5, 0, 0, 0], heat_capacity_j_per_k: [9, 9, 9, 9, 9, 9]}",
+            "gear 3 of 9 J/K and 100000 W/K cools with a time constant of 9e-05 s, must be at least 10 s",
+        ),
     ],
 )
 def test_a_file_without_sense_is_refused_with_its_place(cell, data, tmp_path, text, said):
@@ -185,3 +204,11 @@ def test_gears_warm_up_by_their_friction_and_turn_more_easily(cell, data):
     assert np.less(warm, cold).all()
     figures = typical_plant(cell.robot, data, 0).gears
     assert (gears.temperature - before < heat / figures.capacity).all()  # some of it has gone
+
+
+@pytest.mark.parametrize("name", ["kr6_r900_2", "kr210_r2700_extra", "kr300_r2700_2", "ur10e"])
+def test_the_plants_of_bundled_robots_lie_within_the_bounds_of_a_file(name, data):
+    robot = load_robot(name)
+    for plant in (nominal_plant(robot, data), typical_plant(robot, data, 1)):
+        text = plant_to_yaml(plant)
+        assert plant_to_yaml(plant_from_yaml(text, robot, data)) == text

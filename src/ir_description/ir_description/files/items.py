@@ -92,7 +92,8 @@ class Item:
     def list(self, low: int = 0, high: int = 100_000) -> list[Item]:
         """Return the list here, of low to high entries."""
         if not isinstance(self._content, list):
-            self.fail("must be a list")
+            wanted = f"a list of {low} entries" if low == high else "a list"
+            self.fail(f"is {shown(self._scalar(wanted).text)}, must be {wanted}")
         if not low <= len(self._content) <= high:
             self.fail(
                 f"has {len(self._content)} entries, must have {low if low == high else f'{low} to {high}'}"

@@ -29,39 +29,40 @@ _FORMAT = re.compile(rf"""["']?\bformat["']?\s*:\s*["']?{re.escape(FORMAT)}\b"""
 BYTES_MAX = 1_000_000
 """Largest plant file [bytes]."""
 Figures = TypeVar("Figures", DriveFigures, GearFigures, LinkFigures)
+_Keys = dict[str, tuple[str, float, float, str]]
 
-# key in the file: field, largest value, unit; the smallest is 0
-_DRIVES = {
-    "torque_constant_nm_per_a": ("torque_constant", 1e3, "Nm/A"),
-    "copper_loss_w_per_nm2": ("copper", 1e4, "W/Nm^2"),
-    "inverter_w_per_a": ("inverter", 1e4, "W/A"),
-    "switching_w": ("switching", 1e4, "W"),
-    "iron_w_s_per_rad": ("iron_linear", 1e3, "W s/rad"),
-    "iron_w_s2_per_rad2": ("iron_square", 1e3, "W s^2/rad^2"),
+# key in the file: field, smallest and largest value, unit. What the simulation divides by has a smallest
+# value, below that of any servo drive.
+_DRIVES: _Keys = {
+    "torque_constant_nm_per_a": ("torque_constant", 1e-3, 1e3, "Nm/A"),
+    "copper_loss_w_per_nm2": ("copper", 0.0, 1e4, "W/Nm^2"),
+    "inverter_w_per_a": ("inverter", 0.0, 1e4, "W/A"),
+    "switching_w": ("switching", 0.0, 1e4, "W"),
+    "iron_w_s_per_rad": ("iron_linear", 0.0, 1e3, "W s/rad"),
+    "iron_w_s2_per_rad2": ("iron_square", 0.0, 1e3, "W s^2/rad^2"),
 }
-_GEARS = {
-    "friction_viscous_nms_per_rad": ("viscous", 1e5, "Nm s/rad"),
-    "friction_coulomb_nm": ("coulomb", 1e5, "Nm"),
-    "load_share_driven": ("load_driven", 0.5, ""),
-    "load_share_back": ("load_back", 0.5, ""),
-    "stribeck_nm": ("stribeck", 1e5, "Nm"),
-    "stribeck_speed_rad_per_s": ("stribeck_speed", 10.0, "rad/s"),
-    "viscous_per_kelvin": ("viscous_per_kelvin", 0.2, "1/K"),
-    "heat_capacity_j_per_k": ("capacity", 1e9, "J/K"),
-    "conductance_w_per_k": ("conductance", 1e6, "W/K"),
-    "ambient_deg_c": ("ambient", 100.0, "deg C"),
-    "start_deg_c": ("start", 150.0, "deg C"),
+_GEARS: _Keys = {
+    "friction_viscous_nms_per_rad": ("viscous", 0.0, 1e5, "Nm s/rad"),
+    "friction_coulomb_nm": ("coulomb", 0.0, 1e5, "Nm"),
+    "load_share_driven": ("load_driven", 0.0, 0.5, ""),
+    "load_share_back": ("load_back", 0.0, 0.5, ""),
+    "stribeck_nm": ("stribeck", 0.0, 1e5, "Nm"),
+    "stribeck_speed_rad_per_s": ("stribeck_speed", 1e-4, 10.0, "rad/s"),
+    "viscous_per_kelvin": ("viscous_per_kelvin", 0.0, 0.2, "1/K"),
+    "heat_capacity_j_per_k": ("capacity", 0.1, 1e9, "J/K"),
+    "conductance_w_per_k": ("conductance", 0.0, 1e6, "W/K"),
+    "ambient_deg_c": ("ambient", 0.0, 100.0, "deg C"),
+    "start_deg_c": ("start", 0.0, 150.0, "deg C"),
 }
-_LINK = {
-    "capacitance_f": ("capacitance", 10.0, "F"),
-    "mains_v": ("mains", 1e4, "V"),
-    "chopper_on_v": ("chopper_on", 1e4, "V"),
-    "chopper_off_v": ("chopper_off", 1e4, "V"),
-    "brake_resistor_ohm": ("resistor", 1e4, "ohm"),
-    "rectifier_drop_v": ("rectifier_drop", 100.0, "V"),
-    "rectifier_resistance_ohm": ("rectifier_resistance", 100.0, "ohm"),
+_LINK: _Keys = {
+    "capacitance_f": ("capacitance", 1e-5, 10.0, "F"),
+    "mains_v": ("mains", 10.0, 1e4, "V"),
+    "chopper_on_v": ("chopper_on", 0.0, 1e4, "V"),
+    "chopper_off_v": ("chopper_off", 0.0, 1e4, "V"),
+    "brake_resistor_ohm": ("resistor", 0.1, 1e4, "ohm"),
+    "rectifier_drop_v": ("rectifier_drop", 0.0, 100.0, "V"),
+    "rectifier_resistance_ohm": ("rectifier_resistance", 0.0, 100.0, "ohm"),
 }
-_POSITIVE = {"torque_constant", "stribeck_speed", "capacity", "capacitance", "mains", "resistor"}
 _LINK_KEYS = ("name", "mass_kg", "com_m", "inertia_kgm2")
 _WATTS = ("controller_w", "drives_w", "tool_factor")
 _ROBOT = ("links", "reflected_inertia_kgm2", "charge_pressure_pa")
@@ -158,18 +159,16 @@ def _robot(links: Item | None, robot: RobotModel) -> RobotModel:
     return replace(robot, link_mass=mass, link_com=com, link_inertia=inertia)
 
 
-def _figures(item: Item | None, nominal: Figures, keys: dict[str, tuple[str, float, str]], n: int) -> Figures:
+def _figures(item: Item | None, nominal: Figures, keys: _Keys, n: int) -> Figures:
     """The figures of a section; n: entries of each, 0: numbers."""
     if item is None:
         return nominal
     table = item.table((), tuple(keys))
     given: dict[str, Any] = {}
-    for key, (field, high, unit) in keys.items():
-        found, above = table.get(key), field in _POSITIVE
-        if found is not None and n:
-            given[field] = found.numbers(n, 0.0, high, unit, above=above)
-        elif found is not None:
-            given[field] = found.number(0.0, high, unit, above=above)
+    for key, (field, low, high, unit) in keys.items():
+        found = table.get(key)
+        if found is not None:
+            given[field] = found.numbers(n, low, high, unit) if n else found.number(low, high, unit)
     with item.blamed():
         return replace(nominal, **given)
 
@@ -191,8 +190,8 @@ def _watts(item: Item | None, nominal: StandingWatts) -> StandingWatts:
     )
 
 
-def _written(figures: Figures, keys: dict[str, tuple[str, float, str]]) -> dict[str, object]:
-    return {key: np.array(getattr(figures, field)).tolist() for key, (field, _, _) in keys.items()}
+def _written(figures: Figures, keys: _Keys) -> dict[str, object]:
+    return {key: np.array(getattr(figures, field)).tolist() for key, (field, *_) in keys.items()}
 
 
 def _entries(inertia: FloatArray) -> list[float]:

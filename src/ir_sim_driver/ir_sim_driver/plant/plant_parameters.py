@@ -24,6 +24,8 @@ HEAT_CAPACITY = 4.0
 """J/K of gear, oil and housing per Nm of peak torque (an estimate): 26 kJ/K at A1, about 55 kg of steel."""
 TIME_CONSTANT = 3600.0
 """s in which a gear warms up (an estimate; robots are warm after one to two hours)."""
+TIME_CONSTANT_MIN = 10.0
+"""s: no gear cools faster, and the steps in which its temperature is followed, 0.1 s, are short beside it."""
 REFERENCE_TEMPERATURE = 40.0
 """deg C of the gears to which the friction of the data belongs (an estimate: half warm)."""
 AMBIENT = 20.0
@@ -86,6 +88,14 @@ class GearFigures:
 
     def __post_init__(self) -> None:
         _checked(self, len(self.viscous))
+        fast = np.flatnonzero(self.conductance * TIME_CONSTANT_MIN > self.capacity)
+        if fast.size:
+            k = int(fast[0])
+            C, G = self.capacity[k], self.conductance[k]
+            raise InvalidValueError(
+                f"gear {k + 1} of {C:g} J/K and {G:g} W/K cools with a time constant of {C / G:.3g} s, must "
+                f"be at least {TIME_CONSTANT_MIN:g} s"
+            )
 
 
 @dataclass(frozen=True)
