@@ -17,6 +17,7 @@ from ir_cli.main import COMMAND_MODULES, HELP, WITHOUT_ROS, _parser, main
 from ir_description import load_cell
 from ir_planner import Planner
 
+DOORS = "doors at the start are assumed, as the cell has them: lathe door_open"
 STATIONS = ("plan", "demo", "--stations", "gauge_measure", "home", "--planning-time", "60")
 
 
@@ -98,6 +99,7 @@ def test_what_is_written_is_evaluated_to_the_same(
     planned = answered(capsys, "move", "open" if goal != "gauge_measure" else "demo", "home", goal,
                        "--trajectory", str(trace))  # fmt: skip
     cell = "open" if goal != "gauge_measure" else "demo"
+    assert planned["notes"] == ([] if cell == "open" else [DOORS])
     evaluated = answered(capsys, "evaluate", cell, str(trace))
     assert evaluated["violations"] == []
     for key in ("seconds", "joules", "clearance", "torque_share"):
@@ -194,8 +196,10 @@ def test_a_broken_trace_is_refused_with_its_line(
 
 
 def test_what_can_not_be_planned_ends_with_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["move", "open", "home", "X 9 Y 0 Z 1 A 0 B 90 C 0"]) == 1
-    assert "can't be reached" in capsys.readouterr().err
+    assert main(["move", "demo", "home", "X 9 Y 0 Z 1 A 0 B 90 C 0"]) == 1
+    said = capsys.readouterr().err
+    assert "can't be reached" in said
+    assert said.endswith(f"\nnote: {DOORS}\n")
 
 
 def test_an_interrupt_ends_with_130_and_a_clean_line(

@@ -9,7 +9,14 @@ Everything a user needs is exported here; the rooms below are the planner's own.
 """
 
 from ir_msgs_py.options import PlanOptions
-from ir_planner.before_after import Stretch, Today, before_after, before_after_common, today_of_krl
+from ir_planner.before_after import (
+    Stretch,
+    Today,
+    assumed_doors,
+    before_after,
+    before_after_common,
+    today_of_krl,
+)
 from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
@@ -50,6 +57,7 @@ __all__ = [
     "TimingError",
     "Today",
     "UnknownNameError",
+    "assumed_doors",
     "before_after",
     "before_after_common",
     "evaluate_krl",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ir_msgs_py.one_sided import one_sided
 from ir_msgs_py.report import TrajectoryReport
+from ir_planner import assumed_doors
 
 from .asking import (
     add_cell,
@@ -46,14 +47,17 @@ def run_move(arguments: argparse.Namespace) -> int:
         start = configuration_of(arguments.start, planner, arguments.safety_distance, arguments.load)
         goal = goal_of(arguments.goal, planner)
         plan = planner.plan_regional(start, goal, options_of(arguments, arguments.duration))
+    notes = assumed_doors(planner.cell)
+    said = "".join(f"\nnote: {note}" for note in notes)
     if plan.trajectory is None:
-        return failed(plan.status.message)
+        return failed(plan.status.message + said)
     if arguments.trajectory:
         write_trace(arguments.trajectory, plan.trajectory)
     if arguments.json:
-        print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures_of(plan.report)})
+        figures = figures_of(plan.report)
+        print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures, "notes": notes})
     else:
-        sys.stdout.write(sentence_of(plan.report) + "\n")
+        sys.stdout.write(f"{sentence_of(plan.report)}{said}\n")
     return 0
 
 

@@ -1,11 +1,13 @@
 """Today's program against the planner's: the same stations and pauses, at its cycle time and at others."""
 
 from ir_planner.before_after.compared import before_after, before_after_common
+from ir_planner.before_after.stood import assumed_doors
 from ir_planner.before_after.today import Stretch, Today, today_of_krl
 
 __all__ = [
     "Stretch",
     "Today",
+    "assumed_doors",
     "before_after",
     "before_after_common",
     "today_of_krl",
