@@ -72,18 +72,25 @@ def through_axes(points: FloatArray) -> AxisCurve:
     return AxisCurve(make_interp_spline(u, points, k=min(_DEGREE, len(points) - 1)), 0.0, 0.0)
 
 
-def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
-    """A LIN or CIRC from the configuration `start` (n,). Raises KrlMotionError."""
+def tool_ends(motion: Motion, start: FloatArray, arm: Arm) -> tuple[FloatArray, FloatArray, Arc | Line]:
+    """Where a LIN or CIRC from the configuration `start` (n,) begins and ends, poses (4, 4) of its tool in
+    its base, and the places between. Raises KrlMotionError.
+    """
     first = arm.tool_pose(motion.target, start)
     last = arm.pose(motion.target, first)
     if motion.keeps_orientation:
         last[:3, :3] = first[:3, :3]
-    path: Arc | Line = Line(first[:3, 3], last[:3, 3])
-    if motion.via is not None:
-        arc = arc_through(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion.angle)
-        if arc is None:
-            raise KrlMotionError("CIRC: start, auxiliary point and end lie on a line", motion.place)
-        path = arc
+    if motion.via is None:
+        return first, last, Line(first[:3, 3], last[:3, 3])
+    arc = arc_through(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion.angle)
+    if arc is None:
+        raise KrlMotionError("CIRC: start, auxiliary point and end lie on a line", motion.place)
+    return first, last, arc
+
+
+def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
+    """A LIN or CIRC from the configuration `start` (n,). Raises KrlMotionError."""
+    first, last, path = tool_ends(motion, start, arm)
     ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
     turning = float((ends[0].inv() * ends[1]).magnitude())
     fine = np.ceil(max(path.length / _STEP_M, turning / _STEP_RAD)) + 1

@@ -24,7 +24,9 @@ from ir_planner.krl.blending import overlap, trajectory
 from ir_planner.krl.curves import AxisLine, Curve, tool_curve
 from ir_planner.krl.geometry import Arm
 from ir_planner.krl.moves import Move, move
+from ir_planner.krl.process import process_motions
 from ir_planner.krl.splines import block_curve, timed_block
+from ir_planner.krl.tool_motions import ToolMotion, tool_motion, tool_spline
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.timing import standing
 
@@ -36,7 +38,8 @@ class DrivenStep:
     """One step from standstill to standstill: a movement, or a wait.
 
     places: of its motions in the program; outputs: set at its end, number and value; waits_for: a condition
-    that ends a wait.
+    that ends a wait; tool: for each motion what the tool draws, None for a PTP and where no segment describes
+    it; process: places of the motions that belong to a process.
     """
 
     trajectory: JointTrajectory
@@ -44,6 +47,8 @@ class DrivenStep:
     places: tuple[Place, ...]
     outputs: tuple[tuple[int, bool], ...] = ()
     waits_for: str = ""
+    tool: tuple[ToolMotion | None, ...] = ()
+    process: tuple[Place, ...] = ()
 
 
 def drive(
@@ -55,7 +60,9 @@ def drive(
     is no part of the cycle. Raises KrlMotionError.
     """
     run = _Drive(scene, np.array(start), list(program.notes))
-    for command in program.commands:
+    process = process_motions(program.commands)
+    for k, command in enumerate(program.commands):
+        run.working = k in process
         run.take(command)
     run.finish()
     return tuple(run.steps), tuple(run.notes)
@@ -73,6 +80,9 @@ class _Drive:
     _overlaps: list[int] = field(default_factory=list)
     _places: list[Place] = field(default_factory=list)
     _outputs: list[tuple[int, bool]] = field(default_factory=list)  # set while the robot moves
+    _tool: list[ToolMotion | None] = field(default_factory=list)
+    _process: list[Place] = field(default_factory=list)
+    working: bool = False  # the command belongs to a process
     _on_path: bool = False  # the first motion has led to the programmed path
     _blend: Blend | None = None  # of the last motion; None: it ends at rest
 
@@ -106,8 +116,14 @@ class _Drive:
             return
         names = self.scene.cell.robot.joint_names
         self._step(trajectory(self._moves, self._overlaps, names), tuple(self._places), moves=True)
-        self.steps[-1] = replace(self.steps[-1], outputs=tuple(self._outputs))
+        self.steps[-1] = replace(
+            self.steps[-1],
+            outputs=tuple(self._outputs),
+            tool=tuple(self._tool),
+            process=tuple(self._process),
+        )
         self._moves, self._overlaps, self._places, self._blend, self._outputs = [], [], [], None, []
+        self._tool, self._process = [], []
 
     def _motion(self, motion: Motion) -> None:
         if not self._on_path:
@@ -123,12 +139,12 @@ class _Drive:
             if np.abs(end - self.here).max() < STILL:
                 return
             curve = AxisLine(self.here, end)
-            self._drive(curve, motion, motion.speeds)
+            self._drive(curve, motion, motion.speeds, None)
         else:
             line = tool_curve(motion, self.here, self.arm)
             if max(line.length, line.turning) < STILL:
                 return
-            self._drive(line, motion, motion.speeds)
+            self._drive(line, motion, motion.speeds, tool_motion(motion, self.here, self.arm))
 
     def _block(self, block: SplineBlock) -> None:
         if not self._on_path:
@@ -143,9 +159,17 @@ class _Drive:
             return
         curve = block_curve(block, self.here, self.arm)
         least = sum(one.seconds for one in block.times)
-        self._drive(curve, block, block.parts[0].speeds, least)
+        drawn = None if block.axis else tool_spline(block, self.here, self.arm)
+        self._drive(curve, block, block.parts[0].speeds, drawn, least)
 
-    def _drive(self, curve: Curve, command: Motion | SplineBlock, speeds: Speeds, least: float = 0.0) -> None:
+    def _drive(
+        self,
+        curve: Curve,
+        command: Motion | SplineBlock,
+        speeds: Speeds,
+        drawn: ToolMotion | None,
+        least: float = 0.0,
+    ) -> None:
         share = 1.0 if self._blend is None and command.blend is None else _BLENDED_JERK
         made = move(curve, speeds, self.scene, command.place, least=least, jerk_share=share)
         if self._moves and self._blend is not None:
@@ -156,6 +180,8 @@ class _Drive:
                 self.finish()
         self._moves.append(made)
         self._places.append(command.place)
+        self._tool.append(drawn)
+        self._process += [command.place] if self.working else []
         self._blend = command.blend
         self.here = made.at(np.array([made.law.total]))[0][0]
         if self._blend is None:

@@ -77,8 +77,10 @@ def _axis_points(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
     return np.array(points)
 
 
-def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
-    """The spline of the tool through the ends of the parts, followed by the axes."""
+def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
+    """Poses (N, 4, 4) of the tool in its base that a SPLINE passes, from the configuration `start` (n,).
+    Raises KrlMotionError.
+    """
     first = block.parts[0]
     poses = [arm.tool_pose(first.target, start)]
     for part in block.parts:
@@ -89,7 +91,13 @@ def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
         ):
             raise KrlMotionError("a SPLINE keeps its tool and its base", part.place)
         poses += _line(poses[-1], arm.pose(part.target, poses[-1]), _LINE_POINTS if part.kind == "lin" else 1)
-    stacked = np.array(poses)
+    return np.array(poses)
+
+
+def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
+    """The spline of the tool through the ends of the parts, followed by the axes."""
+    first = block.parts[0]
+    stacked = spline_poses(block, start, arm)
     steps = np.linalg.norm(np.diff(stacked[:, :3, 3], axis=0), axis=1)
     if steps.min() <= 0.0:
         raise KrlMotionError("a SPLINE goes to the same place twice in a row", block.place)
