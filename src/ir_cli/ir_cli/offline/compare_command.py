@@ -63,6 +63,11 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     compare.add_argument("-o", "--output", default="out/compare.html", metavar="FILE.html", help=page)
     compare.add_argument("--table", default="", metavar="FILE", help="figures as .csv or .parquet as well")
     add_followed(compare)
+    words = (
+        "of KRL: lines (5-9) whose motions are a process, that every program drives, repeatable; none: no "
+        "motion is (those between an output's on and off)"
+    )
+    compare.add_argument("--process", action="append", default=[], metavar="LINES", help=words)
     add_measured(compare)
     add_options(compare)
     add_parameters(compare)
@@ -101,6 +106,8 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
         check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         return before_after_common(planner, stations, start, arguments.cycle_time, options, line.show)
+    if arguments.process and not endings <= set(KRL):
+        raise InputError("--process names lines of a KRL program: a trace has none")
     if arguments.stations:
         raise InputError("--stations are of PTP at 100 %: a program of yours has its own")
     if len(arguments.today) == 1 and endings <= set(TRACES):
@@ -111,8 +118,24 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
         known = f"{', '.join(KRL)}, or one trace: {', '.join(TRACES)}"
         raise InputError(f"{named}: today's program is read from {known}")
     program = followed(arguments.today, planner.cell, arguments)
-    today = today_of_krl(evaluate_krl(planner, program, arguments.safety_distance, arguments.load))
+    evaluated = evaluate_krl(planner, program, arguments.safety_distance, arguments.load)
+    today = today_of_krl(evaluated, _process(arguments.process))
     return before_after(planner, today, arguments.cycle_time, options, line.show)
+
+
+def _process(words: Sequence[str]) -> tuple[tuple[int, int], ...] | None:
+    """Lines (first, last) that are a process; None: nobody said."""
+    if not words:
+        return None
+    if list(words) == ["none"]:
+        return ()
+    found = []
+    for word in words:
+        first, _, last = word.partition("-")
+        if not first.isdecimal() or not (last or first).isdecimal():
+            raise InputError(f"--process {word}: it must be lines as 5-9 or 5, or none")
+        found.append((int(first), int(last or first)))
+    return tuple(found)
 
 
 def row_of(side: Side) -> Row:

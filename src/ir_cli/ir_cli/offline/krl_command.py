@@ -205,6 +205,11 @@ def _compared(planner: Planner, found: EvaluatedProgram) -> Row:
     """The stations of the program as the planner visits them: free, and in the program's time."""
     if not found.stations:
         raise InputError("no station is recognised: there is nothing to compare with")
+    if any(step.step.process for step in found.steps):
+        raise InputError(
+            "the program works along paths of the tool, between an output's on and off, that a visit of its "
+            "stations would leave out: compare with `ir compare`"
+        )
     start = found.steps[0].step.trajectory.positions[0]
     answer: dict[str, object] = {}
     for name, cycle_time in (("planned", 0.0), ("planned_in_time", found.report.duration)):

@@ -2,16 +2,17 @@
 
 A standstill at a station, at a posture, before a pause, and where outputs are set, is a stop. Other
 standstills are only passed through: no program needs them. A stop that is nowhere in the cell becomes a
-station of its own there.
+station of its own there. A process is a stop that is a path: it begins where the path does.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import Cell, Equipment, ProgramStep, Station, Zone
+from ir_description import Cell, CellPath, Equipment, ProgramStep, Station, Zone
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
+from ir_planner.before_after.process_paths import driven_as, same_poses
 from ir_planner.before_after.today import Stretch, Today
 from ir_planner.errors import RequestError
 from ir_planner.krl import posture_at, station_at
@@ -48,7 +49,15 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
     for k, one in enumerate(today.stretches):
         if one.trajectory is not None:
             moves.append(one)
-            waits = k < last and today.stretches[k + 1].trajectory is None
+            after = today.stretches[k + 1] if k < last else None
+            if one.process is not None:
+                if after is None or after.process is not one.process:
+                    steps.append(Asked(ProgramStep("PATH", stops.path(one.process)), tuple(moves)))
+                    moves = []
+                continue
+            if after is not None and after.process is not None:
+                continue  # the beginning of a path is no stop of its own
+            waits = after is not None and after.trajectory is None
             name = stops.name(one.q, needed=one.works or waits or k == last)
             if name:
                 steps.append(Asked(stops.step(name), tuple(moves)))
@@ -89,6 +98,7 @@ class _Stops:
     def __init__(self, scene: PlanningScene) -> None:
         self._scene = scene
         self._added: list[tuple[str, FloatArray]] = []
+        self._paths: list[CellPath] = []
 
     def name(self, q: FloatArray, needed: bool) -> str:
         """Of the stop at q (n,); "" where there is none and none is needed."""
@@ -104,6 +114,16 @@ class _Stops:
         self._added.append((name, pose))
         return name
 
+    def path(self, driven: CellPath) -> str:
+        """Of the path that today's program drives: the cell's own where it has the same poses."""
+        own = next((one for one in self._scene.cell.paths if same_poses(one.path, driven.path)), None)
+        named = driven if own is None else driven_as(own, driven)
+        taken = {one.name for one in self._paths}
+        if named.name in taken:  # the cell's own once more: perhaps at another speed
+            named = replace(named, name=driven.name)
+        self._paths.append(named)
+        return named.name
+
     def step(self, name: str) -> ProgramStep:
         """The step that goes there."""
         postures = name in ("home", "park") and name not in [s.name for s in self._scene.cell.stations]
@@ -112,6 +132,10 @@ class _Stops:
     def cell(self) -> Cell:
         """The cell with the added stations."""
         cell = self._scene.cell
+        driven = {one.name for one in self._paths}
+        paths = (*(one for one in cell.paths if one.name not in driven), *self._paths)
+        if self._paths:
+            cell = replace(cell, paths=paths, program=())
         if not self._added:
             return cell
         zone = Zone("OPEN", np.eye(4), np.full(3, _ZONE))

@@ -45,14 +45,15 @@ class _Costing:
     def movement(self, stretch: Stretch, here: str, there: str, scene: PlanningScene) -> None:
         """A movement of the hop from `here` to `there`."""
         assert stretch.trajectory is not None  # asked before
-        stations = [station.name for station in scene.cell.stations]
-        contacts = next((name for name in (there, here) if name in stations), "")
+        along = stretch.process is not None
+        names = [there] if along else [station.name for station in scene.cell.stations]
+        contacts = next((name for name in (there, here) if name in names), "")
         found = evaluate_trajectory(
             stretch.trajectory, scene, self._request.options.safety_distance, contacts
         )
         step = PlannedMovement(
-            kind=MovementKind.REGIONAL,
-            from_station=here,
+            kind=MovementKind.CARTESIAN if along else MovementKind.REGIONAL,
+            from_station=there if along else here,
             to_station=there,
             trajectory_id=stretch.trajectory.trajectory_id,
             trajectory=stretch.trajectory,

@@ -92,7 +92,7 @@ def side_of(name: str, cycle_time: float, program: Costed, request: ProgramReque
 
 def hops_of(program: Costed) -> list[CostedHop]:
     """A hop ends at a pause, before a line out of a station, where the stops of a movement change, and at
-    both ends of a path.
+    both ends of a path, which today's program may drive in several movements.
     """
     hops: list[CostedHop] = []
     for step, added in zip(program.steps, program.added, strict=True):
@@ -111,6 +111,8 @@ def _begins(step: PlannedMovement, last: CostedHop) -> bool:
     """Whether a step is the first of a hop."""
     before = last.steps[-1]
     alone = (MovementKind.PAUSE, MovementKind.CARTESIAN)
+    if step.kind == before.kind == MovementKind.CARTESIAN:
+        return last.ends != (step.from_station, step.to_station)
     if step.kind in alone or before.kind in alone or step.kind == MovementKind.SERVICE_EXIT:
         return True
     if step.kind == MovementKind.SERVICE_ENTRY:

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_krl import Place
+from ir_description import CellPath
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.krl import EvaluatedProgram, EvaluatedStep
+from ir_planner.before_after.process_paths import Lines, lines_of, process_notes, process_paths
+from ir_planner.krl import DrivenStep, EvaluatedProgram
 from ir_planner.program import Doors
 
 
@@ -17,7 +18,8 @@ class Stretch:
 
     works: something is done where it ends (an output, a wait for a machine), so that the stop is not only
     passed through. label: where it stands in its source. doors: machines that were not as the cell has them
-    meanwhile; None: nobody recorded it, they are as the program's own signals move them.
+    meanwhile; None: nobody recorded it, they are as the program's own signals move them. process: the path of
+    the tool that it drives, alone or with neighbours that have the same one.
     """
 
     trajectory: JointTrajectory | None
@@ -26,6 +28,7 @@ class Stretch:
     works: bool = False
     label: str = ""
     doors: Doors | None = None
+    process: CellPath | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,25 +52,26 @@ class Today:
         return sum(one.seconds for one in self.stretches)
 
 
-def today_of_krl(found: EvaluatedProgram) -> Today:
-    """A KRL program as a KR C4 drives it."""
-    stretches = tuple(_stretch(step) for step in found.steps)
+def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today:
+    """A KRL program as a KR C4 drives it.
+
+    process: lines (first, last) whose motions are a process; None: those between an output's on and off, ():
+    none. Raises RequestError for a process that can't be asked for as paths of the tool.
+    """
+    paths = process_paths([one.step for one in found.steps], process)
+    stretches = tuple(_stretch(one.step, path) for one, path in zip(found.steps, paths, strict=True))
     start = np.asarray(found.steps[0].step.trajectory.positions[0])
     notes = [str(note) for note in found.notes]
     waits = [step.step for step in found.steps if step.step.waits_for]
     if waits:
         notes.append(f"{len(waits)} waits for machines count no time: how long they take is not in a program")
+    notes += process_notes([one.step for one in found.steps], paths)
     return Today(found.name, "KRL program", start, stretches, tuple(notes))
 
 
-def _stretch(one: EvaluatedStep) -> Stretch:
-    step = one.step
+def _stretch(step: DrivenStep, process: CellPath | None) -> Stretch:
     end = np.asarray(step.trajectory.positions[-1])
     works = bool(step.outputs or step.waits_for)
     trajectory = step.trajectory if step.moves else None
-    return Stretch(trajectory, end, step.trajectory.duration, works, _lines(step.places))
-
-
-def _lines(places: tuple[Place, ...]) -> str:
-    first, last = places[0], places[-1]
-    return f"{first}" if first.line == last.line else f"{first} to line {last.line}"
+    label = lines_of(step.places)
+    return Stretch(trajectory, end, step.trajectory.duration, works, label, process=process)

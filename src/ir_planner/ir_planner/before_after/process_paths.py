@@ -1,0 +1,137 @@
+"""What today's program works along: processes of a KRL program as paths of the tool.
+
+A saving may not come from cutting a process short: its motions become paths that every planned program
+drives, or the program is refused.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ir_description import CellPath
+from ir_krl import Place
+from ir_msgs_py.cartesian import CartesianPath
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.status import StatusCode
+from ir_planner.errors import RequestError
+from ir_planner.krl import DrivenStep, ToolMotion
+
+Lines = Sequence[tuple[int, int]]
+_AS_SLOW_AS_NEEDED = 1.0  # speed tolerance: where an axis can't follow the controller slows the tool as well
+_SAME_PLACE = 2e-3  # m, and of the rotation's entries: as for stations
+_NAMED = 6  # places in a note
+
+
+def process_paths(steps: Sequence[DrivenStep], lines: Lines | None) -> tuple[CellPath | None, ...]:
+    """For each step the path that it drives, alone or with its neighbours. Raises RequestError.
+
+    lines (first, last): whose motions are a process; None: those between an output's on and off.
+    """
+    paths: list[CellPath | None] = []
+    run: list[DrivenStep] = []
+    names: set[str] = set()
+    for step in (*steps, None):
+        worked = () if step is None else _worked(step, lines)
+        if run and not worked:
+            paths += [_path(run, names)] * len(run)
+            run = []
+        if step is not None and worked:
+            _check_alone(step, worked)
+            run.append(step)
+        elif step is not None:
+            paths.append(None)
+    return tuple(paths)
+
+
+def process_notes(steps: Sequence[DrivenStep], paths: Sequence[CellPath | None]) -> list[str]:
+    """Which motions of the tool are kept as paths, and which the planner may replace."""
+    driven = dict.fromkeys(path.name for path in paths if path is not None)
+    pairs = zip(steps, paths, strict=True)
+    free = [
+        lines_of(step.places)
+        for step, path in pairs
+        if path is None and sum(one is not None for one in step.tool) > 1
+    ]
+    notes = [f"driven as paths of the tool by every program: {_listed(driven)}"] if driven else []
+    if free:
+        notes.append(
+            f"motions of the tool taken for positioning, which the planner replaces: {_listed(free)}; "
+            "where they are a process, name their lines (--process)"
+        )
+    return notes
+
+
+def same_poses(first: CartesianPath, second: CartesianPath) -> bool:
+    """Whether two paths have the same segments through the same poses."""
+    kinds = [[one.kind for one in path.segments] for path in (first, second)]
+    poses = [[path.start, *(pose for one in path.segments for pose in one.poses)] for path in (first, second)]
+    if kinds[0] != kinds[1] or len(poses[0]) != len(poses[1]):
+        return False
+    return float(np.abs(np.array(poses[0]) - np.array(poses[1])).max()) < _SAME_PLACE
+
+
+def driven_as(own: CellPath, driven: CellPath) -> CellPath:
+    """The cell's own path, with what may be touched and how it may turn, as today's program drives it."""
+    kept = own.path
+    path = replace(
+        driven.path,
+        orientation=kept.orientation,
+        free_angle=kept.free_angle,
+        approach=kept.approach,
+        retract=kept.retract,
+    )
+    return replace(own, path=path)
+
+
+def lines_of(places: Sequence[Place]) -> str:
+    """Where motions stand in their source."""
+    first, last = places[0], places[-1]
+    return f"{first}" if first.line == last.line else f"{first} to line {last.line}"
+
+
+def _worked(step: DrivenStep, lines: Lines | None) -> tuple[Place, ...]:
+    """Places of its motions that belong to a process."""
+    if lines is None or not step.moves:
+        return step.process
+    return tuple(one for one in step.places if any(first <= one.line <= last for first, last in lines))
+
+
+def _check_alone(step: DrivenStep, worked: tuple[Place, ...]) -> None:
+    """Raise RequestError where a step has motions that no path of the tool describes."""
+    if all(one is not None for one in step.tool) and step.tool:
+        return
+    raise RequestError(
+        StatusCode.INVALID_MOTION_PLAN,
+        f"{lines_of(worked)} is a process, but the movement {lines_of(step.places)} that it is driven in has "
+        "parts that no path of the tool describes (a PTP that is blended into it, a turn on the spot, a "
+        "tool that isn't the cell's): end these in exact stops, or name the lines of processes or none "
+        "(--process)",
+    )
+
+
+def _path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
+    """The path through all motions of steps that follow each other."""
+    motions: list[ToolMotion] = [one for step in run for one in step.tool if one is not None]
+    segments = tuple(segment for motion in motions for segment in motion.segments)
+    first, last = run[0].places[0].line, run[-1].places[-1].line
+    base = f"lines_{first}_to_{last}" if first != last else f"line_{first}"
+    name = next(n for k in range(1, 10_000) if (n := base if k == 1 else f"{base}_{k}") not in names)
+    names.add(name)
+    try:
+        path = CartesianPath(
+            motions[0].start,
+            segments,
+            tool_speed=segments[0].tool_speed,
+            speed_tolerance=_AS_SLOW_AS_NEEDED,
+            blending_radius=min((one.corner for one in motions[:-1]), default=0.0),
+        )
+    except InvalidValueError as error:
+        raise RequestError(StatusCode.INVALID_MOTION_PLAN, f"{lines_of(run[0].places)}: {error}") from error
+    return CellPath(name, path)
+
+
+def _listed(names: Sequence[str] | dict[str, None]) -> str:
+    known = list(names)
+    more = f" and {len(known) - _NAMED} more" if len(known) > _NAMED else ""
+    return ", ".join(known[:_NAMED]) + more

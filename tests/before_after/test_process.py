@@ -1,0 +1,133 @@
+"""No saving comes from cutting a process short: what the tool works along is driven by every program."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from ir_description import CellPath
+from ir_krl import follow, parse
+from ir_msgs_py.before_after import BeforeAfter, Side
+from ir_msgs_py.report import MovementKind
+from ir_planner import (
+    EvaluatedProgram,
+    Planner,
+    RequestError,
+    before_after,
+    evaluate_krl,
+    today_of_krl,
+    tool_in_flange,
+)
+from ir_planner.before_after.asked import asked_program
+
+SEAM = """PTP XHOME
+PTP {A1 30,A5 30}
+LIN_REL {Z -100}
+$OUT[1]=TRUE
+$VEL.CP=0.1
+$APO.CDIS=10
+LIN_REL {X 60} C_DIS
+LIN_REL {Y 90} C_DIS
+LIN_REL {X -50}
+$OUT[1]=FALSE
+$VEL.CP=1
+LIN_REL {Z 100}
+PTP XHOME"""
+SPEED, CORNER = 0.1, 0.01  # m/s, m
+POINTS = np.array([[0.0, 0.0], [0.06, 0.0], [0.06, 0.09], [0.01, 0.09]])  # m, of the seam from its beginning
+
+
+def evaluated(planner: Planner, lines: str) -> EvaluatedProgram:
+    cell = planner.cell
+    sources = [parse(f"DEF TEST( )\n{lines}\nEND\n", "test.src")]
+    return evaluate_krl(planner, follow(sources, cell.machine_home, tool_in_flange(cell.tcp)))
+
+
+@pytest.fixture(scope="module")
+def found(planner: Planner) -> EvaluatedProgram:
+    return evaluated(planner, SEAM)
+
+
+@pytest.fixture(scope="module")
+def welded(planner: Planner, found: EvaluatedProgram) -> BeforeAfter:
+    return before_after(planner, today_of_krl(found))
+
+
+def tool_along(side: Side, planner: Planner) -> tuple[np.ndarray, float]:
+    """Places (N, 3) m of the tool while it works, 2 ms apart, and the seconds."""
+    along = [step for step in side.movements if step.kind == MovementKind.CARTESIAN]
+    assert along, f"{side.name} has lost the process"
+    driven = [step.trajectory for step in along if step.trajectory is not None]
+    q = [one.sample(np.arange(one.times[0], one.times[-1], 2e-3)).q for one in driven]
+    seconds = sum(step.duration for step in along)
+    return planner.scene("").chain.tcp_poses(np.concatenate(q))[:, :3, 3], seconds
+
+
+def distance_to_the_seam(places: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """Of places (N, 3) from the programmed lines (N,) m."""
+    corners = origin + np.column_stack([POINTS, np.zeros(len(POINTS))])
+    away = []
+    for first, last in pairwise(corners):
+        share = np.clip((places - first) @ (last - first) / ((last - first) @ (last - first)), 0.0, 1.0)
+        away.append(np.linalg.norm(places - first - share[:, None] * (last - first), axis=1))
+    return np.min(away, axis=0)
+
+
+def test_every_program_works_along_the_seam_at_its_speed(welded: BeforeAfter, planner: Planner) -> None:
+    origin = tool_along(welded.today, planner)[0][0]
+    ends = origin + np.array([[0.0, 0.0, 0.0], [*POINTS[-1], 0.0]])
+    length = np.linalg.norm(np.diff(POINTS, axis=0), axis=1).sum() - 4 * CORNER  # of the cut corners at most
+    for side in (welded.today, *welded.sides):
+        places, seconds = tool_along(side, planner)
+        assert places[[0, -1]] == pytest.approx(ends, abs=2e-4)
+        assert distance_to_the_seam(places, origin).max() < CORNER
+        speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / 2e-3
+        assert speeds.max() < 1.01 * SPEED or side is welded.today  # the controller's corners overlap
+        assert np.linalg.norm(np.diff(places, axis=0), axis=1).sum() > length
+        assert seconds > length / SPEED
+
+
+def test_nothing_is_saved_by_cutting_a_process(welded: BeforeAfter) -> None:
+    """Law: the process costs in every program what such work costs; only what is around it may be dropped."""
+    names = [hop.name for hop in welded.today.hops]
+    assert names == ["start to lines_8_to_10", "along lines_8_to_10", "lines_8_to_10 to home"]
+    for side in welded.sides:
+        assert [hop.name for hop in side.hops][:3] == names
+        assert side.certified
+        assert side.saving.common == pytest.approx(welded.today.report.energy)
+        assert side.hops[1].energy > 0.9 * welded.today.hops[1].energy
+        around = sum(welded.today.hops[k].energy - side.hops[k].energy for k in (0, 2))
+        assert side.saving.saved < around + 0.1 * welded.today.hops[1].energy
+    assert any("lines_8_to_10" in note for note in welded.notes)
+
+
+def test_what_is_taken_for_positioning_is_said_and_can_be_named(found: EvaluatedProgram) -> None:
+    free = today_of_krl(found, ())
+    assert not any(one.process for one in free.stretches)
+    assert any("taken for positioning" in note and "test.src:8:1" in note for note in free.notes)
+    named = [one.process.name for one in today_of_krl(found, [(4, 4)]).stretches if one.process is not None]
+    assert named == ["line_4"]
+
+
+def test_a_process_that_begins_in_motion_is_refused(planner: Planner) -> None:
+    """The planner's paths begin at rest; without the process a saving would be claimed."""
+    lines = SEAM.replace("LIN_REL {Z -100}\n$OUT", "PTP_REL {A1 3} C_PTP C_DIS\nCONTINUE\n$OUT")
+    with pytest.raises(RequestError, match="exact stops"):
+        today_of_krl(evaluated(planner, lines))
+
+
+def test_the_cells_own_path_gives_what_it_allows(planner: Planner, found: EvaluatedProgram) -> None:
+    today = today_of_krl(found)
+    driven = next(one.process for one in today.stretches if one.process is not None)
+    assert (driven.path.tool_speed, driven.path.blending_radius) == pytest.approx((SPEED, CORNER))
+    own = CellPath("bead", replace(driven.path, tool_speed=0.3, free_angle=0.5))
+    cell = replace(planner.cell, paths=(own,))
+    theirs = Planner(time.monotonic, planner.settings, read_cell=lambda _text, _name: cell)
+    theirs.set_cell("cell", "")
+    asked = asked_program(today, theirs.scene("")).cell
+    assert [step.target for step in asked.program] == ["bead", "home"]
+    assert (asked.path("bead").tool_speed, asked.path("bead").free_angle) == pytest.approx((SPEED, 0.5))
