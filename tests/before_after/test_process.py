@@ -64,7 +64,7 @@ def tool_along(side: Side, planner: Planner) -> tuple[np.ndarray, float]:
     driven = [step.trajectory for step in along if step.trajectory is not None]
     q = [one.sample(np.arange(one.times[0], one.times[-1], 2e-3)).q for one in driven]
     seconds = sum(step.duration for step in along)
-    return planner.scene("").chain.tcp_poses(np.concatenate(q))[:, :3, 3], seconds
+    return np.asarray(planner.scene("").chain.tcp_poses(np.concatenate(q))[:, :3, 3]), seconds
 
 
 def distance_to_the_seam(places: np.ndarray, origin: np.ndarray) -> np.ndarray:
@@ -74,7 +74,7 @@ def distance_to_the_seam(places: np.ndarray, origin: np.ndarray) -> np.ndarray:
     for first, last in pairwise(corners):
         share = np.clip((places - first) @ (last - first) / ((last - first) @ (last - first)), 0.0, 1.0)
         away.append(np.linalg.norm(places - first - share[:, None] * (last - first), axis=1))
-    return np.min(away, axis=0)
+    return np.asarray(np.min(away, axis=0))
 
 
 def test_every_program_works_along_the_seam_at_its_speed(welded: BeforeAfter, planner: Planner) -> None:
