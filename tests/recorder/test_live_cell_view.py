@@ -5,17 +5,19 @@ from __future__ import annotations
 import base64
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ir_description import Cell, cell_to_yaml, load_cell
+from ir_description import Cell, cell_in, cell_to_yaml, load_cell
 from ir_kernels import Chain
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.analysis.clearance import collision_model
 from ir_recorder.live.cell_view import PATH_POINTS, CellView, Heard
+from ir_recorder.live.numbers import states_of
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 
@@ -60,8 +62,35 @@ def test_a_door_that_moves_is_another_scene_and_an_unknown_state_is_none(heard: 
     assert json.loads(view.scene)["frames"] == 0
     assert view.look(replace(heard, states=(("lathe", "door_closed"),)))["scene"] != number
     assert view.look(replace(heard, states=(("lathe", "door_open"), ("infeed", ""))))["scene"] == number
-    strange = (("lathe", "molten"), ("nobody", "door_open"))
+    strange = (("lathe", "molten>door_open"), ("gauge", "a>b>c"), ("nobody", "door_open"))
     assert view.look(replace(heard, states=strange))["scene"] == number
+
+
+def test_a_machine_that_changes_is_heard_as_recordings_have_it() -> None:
+    message = SimpleNamespace(
+        equipment=["lathe", "gauge", "x"], states=["shut", "up", "a"], next=["open", ""]
+    )
+    assert states_of(message) == (("lathe", "shut>open"), ("gauge", "up"))
+
+
+def test_a_door_that_opens_is_drawn_and_measured_as_what_it_sweeps(cell: Cell, heard: Heard) -> None:
+    def drawn(text: str) -> tuple[set[str], set[str], list[Any]]:
+        near: Any = view.look(replace(heard, states=(("lathe", text),)))["near"]
+        bodies = json.loads(view.scene)["bodies"]
+        assert all(body["shown"][-1][1] for body in bodies)
+        return {b["name"] for b in bodies}, {b["name"] for b in bodies if b["sweep"]}, near
+
+    view = CellView()
+    before, none, _ = drawn("door_open")
+    moving, swept, near = drawn("door_open>door_closed")
+    after, no_more, _ = drawn("door_closed")
+    assert none == no_more == set()
+    assert swept
+    assert moving == before | after | swept
+    now = cell_in(cell, {"lathe": ("door_open", "door_closed")})
+    exact = collision_model(now, "gripper", cell.parts_at_start()).min_distance(HOME[None])
+    assert near[0] == pytest.approx(exact.distance[0], abs=1e-5)
+    assert drawn("door_open")[0] == before  # and the states of the cell stay those of its file
 
 
 def test_parts_lie_where_the_steps_of_the_program_put_them(heard: Heard) -> None:

@@ -13,14 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, PartPlaces, cell_from_yaml
+from ir_description import Cell, DescriptionError, PartPlaces, cell_from_yaml, cell_in
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.analysis.clearance import allowed_pairs, collision_model, pair_name, places_after
+from ir_recorder.read.recording import TextEvent
 from ir_recorder.report.cell_scene import cell_scene, matrix, part_meshes
+from ir_recorder.report.door_bodies import door_bodies
 from ir_recorder.report.series import Json, floats
 
 PATH_POINTS = 200  # of a planned path: a corner every 2 cm of a long movement
@@ -32,7 +34,8 @@ MOST_STEPS = 2_000
 class Heard:
     """What was heard last.
 
-    cell: the text of its file; states: machine and state; joints, q: names and values (n,) [rad], None while
+    cell: the text of its file; states: machine and state, "shut>open" while it
+    changes; joints, q: names and values (n,) [rad], None while
     none are heard; load: what is carried; movement: the step that runs; ended: steps since the last look,
     None among them where a program begins; path: what is or will be driven.
     """
@@ -54,7 +57,9 @@ class CellView:
         self.scene = b""
         self._text = self._scene_id = ""
         self._states: tuple[tuple[str, str], ...] = ()
-        self._cell: Cell | None = None
+        self._read_cell: Cell | None = None  # as its file has it
+        self._standing: dict[str, tuple[str, ...]] = {}  # machines that stand otherwise, or change
+        self._cell: Cell | None = None  # as it stands
         self._problem = ""
         self._places = PartPlaces("", {})
         self._version = 0
@@ -85,8 +90,9 @@ class CellView:
 
     def _read(self, text: str) -> None:
         self._text, self._states, self._cell, self.scene, self._model = text, (), None, b"", None
+        self._read_cell, self._standing = None, {}
         try:
-            self._cell = cell_from_yaml(text) if text else None
+            self._cell = self._read_cell = cell_from_yaml(text) if text else None
             self._problem = ""
         except DescriptionError as error:
             self._problem = one_line(f"the planner's cell can't be read: {error}", 300)
@@ -96,29 +102,33 @@ class CellView:
             self._show()
 
     def _stand(self, states: tuple[tuple[str, str], ...]) -> None:
-        """Puts the machines into the states that the driver says they are in."""
+        """Puts the machines into the states that the driver says they are in; what they sweep while they
+        change is there, too. States that the planner's cell doesn't have are not followed.
+        """
         self._states = states
-        cell = self._cell
-        known = {machine.name for machine in cell.equipment} if cell is not None else set()
-        for name, state in states:
-            if cell is None or name not in known or not state or cell.machine(name).state == state:
-                continue
-            try:
-                cell = cell.with_equipment(name, state=state)
-            except DescriptionError:
-                continue  # a state that the planner's cell doesn't have
-        if cell is not self._cell:
-            self._cell, self._model = cell, None
+        if self._read_cell is None:
+            return
+        heard, standing = {name: tuple(text.split(">")) for name, text in states}, {}
+        for machine in self._read_cell.equipment:
+            now = heard.get(machine.name, ())
+            known = {state.name for state in machine.states}
+            if 1 <= len(now) <= 2 and known.issuperset(now) and now != (machine.state,):
+                standing[machine.name] = now
+        if standing != self._standing:
+            self._standing, self._model = standing, None
+            self._cell = cell_in(self._read_cell, standing)
             self._show()
 
     def _show(self) -> None:
-        cell = self._cell
-        if cell is None:
+        cell, read = self._cell, self._read_cell
+        if cell is None or read is None:
             return
         self._version += 1
+        doors = [TextEvent(0.0, name, ">".join(now)) for name, now in self._standing.items()]
         self._path = (None, "")
         content = {
             **cell_scene(cell),
+            "bodies": door_bodies(read, doors),
             **{"start": 0.0, "step": 1.0, "frames": 0, "angleStep": 1.0, "angles": "", "power": ""},
             "parts": [
                 {"name": part.name, "lies": [], "meshes": part_meshes(cell, part.name)} for part in cell.parts

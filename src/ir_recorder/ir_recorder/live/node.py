@@ -41,7 +41,7 @@ from ir_recorder.analysis.steps import STARTED, step_label
 from ir_recorder.analysis.tolerances import Tolerances
 from ir_recorder.live.cell_view import CellView, Heard
 from ir_recorder.live.commands import Command, Commands
-from ir_recorder.live.numbers import levels, machines, number, power_values, text
+from ir_recorder.live.numbers import levels, machines, number, power_values, states_of, text
 from ir_recorder.live.server import LiveServer
 from ir_recorder.live.stream import Stream
 from ir_recorder.read.decoded import contact_sentence, movement_from
@@ -176,8 +176,7 @@ class LiveNode(Node):
         return {"load": text(messages[-1].load)}
 
     def _machines(self, messages: Sequence[Any]) -> dict[str, Json]:
-        states = tuple(zip(messages[-1].equipment, messages[-1].states, strict=False))
-        self._heard = replace(self._heard, states=states)
+        self._heard = replace(self._heard, states=states_of(messages[-1]))
         return {"machines": machines(messages[-1])}
 
     def _cell(self, messages: Sequence[Any]) -> dict[str, Json]:

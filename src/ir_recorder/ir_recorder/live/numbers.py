@@ -47,6 +47,12 @@ def levels(message: Any, kind: type[PlcInputs] | type[PlcOutputs]) -> dict[str, 
     return {**{name: bool(getattr(message, name)) for name in names}, _MODE: mode}
 
 
+def states_of(message: Any) -> tuple[tuple[str, str], ...]:
+    """Machines with their states as recordings have them, "shut>open" while they change."""
+    rows = zip(message.equipment, message.states, message.next, strict=False)
+    return tuple((name, f"{state}>{next_}" if next_ else state) for name, state, next_ in rows)
+
+
 def machines(message: Any) -> list[dict[str, Json]]:
     """States of the machines, and what they change to."""
     rows = zip(message.equipment, message.states, message.next, strict=False)

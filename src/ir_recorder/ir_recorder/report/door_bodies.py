@@ -45,12 +45,13 @@ def _over_time(
     machine: Equipment, standing: Sequence[tuple[float, Equipment]]
 ) -> Iterator[tuple[Body, list[Json]]]:
     """Every body that is ever there, with the times at which it comes or goes."""
-    bodies = {body.name: body for _, now in standing for body in now.world_bodies()}
+    present = [(time, {body.name: body for body in now.world_bodies()}) for time, now in standing]
+    bodies = {name: body for _, there in present for name, body in there.items()}
     for name, body in bodies.items():
         changes: list[Json] = []
         before: bool | None = None
-        for time, now in standing:
-            there = any(each.name == name for each in now.world_bodies())
+        for time, now in present:
+            there = name in now
             if there != before:
                 changes.append([round(time, 3), there])
             before = there
