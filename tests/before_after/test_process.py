@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ir_cli.main import main
 from ir_description import CellPath
 from ir_krl import follow, parse
 from ir_msgs_py.before_after import BeforeAfter, Side
@@ -111,6 +113,18 @@ def test_what_is_taken_for_positioning_is_said_and_can_be_named(found: Evaluated
     assert any("taken for positioning" in note and "test.src:8:1" in note for note in free.notes)
     named = [one.process.name for one in today_of_krl(found, [(4, 4)]).stretches if one.process is not None]
     assert named == ["line_4"]
+    with pytest.raises(RequestError, match="no motion stands in lines 10 to 8"):
+        today_of_krl(found, [(10, 8)])
+
+
+def test_commands_refuse_what_would_leave_it_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "seam.src"
+    source.write_text(f"DEF SEAM( )\n{SEAM}\nEND\n", encoding="utf-8")
+    assert main(["krl", "import", str(source), "--cell", "open"]) == 0
+    assert main(["krl", "import", str(source), "--cell", "open", "--compare"]) == 2
+    assert "works along paths of the tool" in capsys.readouterr().err
+    assert main(["compare", "open", str(source), "--process", "line 3"]) == 2
+    assert "it must be lines as 5-9" in capsys.readouterr().err
 
 
 def test_a_process_that_begins_in_motion_is_refused(planner: Planner) -> None:

@@ -131,8 +131,8 @@ def _process(words: Sequence[str]) -> tuple[tuple[int, int], ...] | None:
         return ()
     found = []
     for word in words:
-        first, _, last = word.partition("-")
-        if not first.isdecimal() or not (last or first).isdecimal():
+        first, to, last = word.partition("-")
+        if not first.isdecimal() or not (last if to else first).isdecimal():
             raise InputError(f"--process {word}: it must be lines as 5-9 or 5, or none")
         found.append((int(first), int(last or first)))
     return tuple(found)

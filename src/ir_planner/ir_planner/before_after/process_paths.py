@@ -11,7 +11,7 @@ import numpy as np
 
 from ir_description import CellPath
 from ir_krl import Place
-from ir_msgs_py.cartesian import CartesianPath
+from ir_msgs_py.cartesian import LINE, CartesianPath
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
@@ -28,6 +28,7 @@ def process_paths(steps: Sequence[DrivenStep], lines: Lines | None) -> tuple[Cel
 
     lines (first, last): whose motions are a process; None: those between an output's on and off.
     """
+    _check_lines(steps, lines or ())
     paths: list[CellPath | None] = []
     run: list[DrivenStep] = []
     names: set[str] = set()
@@ -48,11 +49,7 @@ def process_notes(steps: Sequence[DrivenStep], paths: Sequence[CellPath | None])
     """Which motions of the tool are kept as paths, and which the planner may replace."""
     driven = dict.fromkeys(path.name for path in paths if path is not None)
     pairs = zip(steps, paths, strict=True)
-    free = [
-        lines_of(step.places)
-        for step, path in pairs
-        if path is None and sum(one is not None for one in step.tool) > 1
-    ]
+    free = [lines_of(step.places) for step, path in pairs if path is None and _may_work(step)]
     notes = [f"driven as paths of the tool by every program: {_listed(driven)}"] if driven else []
     if free:
         notes.append(
@@ -90,11 +87,28 @@ def lines_of(places: Sequence[Place]) -> str:
     return f"{first}" if first.line == last.line else f"{first} to line {last.line}"
 
 
+def _check_lines(steps: Sequence[DrivenStep], lines: Lines) -> None:
+    """Raise RequestError for lines without a motion: a process would be left out without a word."""
+    driven = [place.line for step in steps if step.moves for place in step.places]
+    for first, last in lines:
+        if not any(first <= line <= last for line in driven):
+            raise RequestError(
+                StatusCode.INVALID_MOTION_PLAN,
+                f"no motion stands in lines {first} to {last}, which are called a process",
+            )
+
+
 def _worked(step: DrivenStep, lines: Lines | None) -> tuple[Place, ...]:
     """Places of its motions that belong to a process."""
     if lines is None or not step.moves:
         return step.process
     return tuple(one for one in step.places if any(first <= one.line <= last for first, last in lines))
+
+
+def _may_work(step: DrivenStep) -> bool:
+    """Whether more than a straight line of the tool is driven through: perhaps a process."""
+    drawn = [one for one in step.tool if one is not None]
+    return len(drawn) > 1 or any(segment.kind != LINE for one in drawn for segment in one.segments)
 
 
 def _check_alone(step: DrivenStep, worked: tuple[Place, ...]) -> None:
