@@ -30,7 +30,7 @@ KNOWS = {
     "measure": {"errors", "traces"},
     "fit": {"analysis", "errors", "measure", "read", "report", "traces"},
     "analysis": READING | {"measure", "traces"},
-    "report": READING | {"analysis"},
+    "report": READING | {"analysis", "measure"},
     "live": {"analysis", "errors", "read", "report"},
     "report_main": READING | {"analysis", "arguments", "report", "traces"},
     "node": {
