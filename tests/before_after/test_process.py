@@ -25,6 +25,8 @@ from ir_planner import (
     tool_in_flange,
 )
 from ir_planner.before_after.asked import asked_program
+from ir_planner.before_after.changes import changes
+from ir_planner.before_after.costs_of import Costed
 
 SEAM = """PTP XHOME
 PTP {A1 30,A5 30}
@@ -105,6 +107,15 @@ def test_nothing_is_saved_by_cutting_a_process(welded: BeforeAfter) -> None:
         around = sum(welded.today.hops[k].energy - side.hops[k].energy for k in (0, 2))
         assert side.saving.saved < around + 0.1 * welded.today.hops[1].energy
     assert any("lines_8_to_10" in note for note in welded.notes)
+
+
+def test_corners_of_a_process_are_not_counted_as_stops_less(welded: BeforeAfter) -> None:
+    """Today's program drives it in a movement from corner to corner, the planner in one that rests there."""
+    along = next(step for step in welded.today.movements if step.kind == MovementKind.CARTESIAN)
+    none = np.zeros(3)
+    (change,) = changes(Costed((along, along), (none, none)), Costed((along,), (none,)))
+    assert change.name == "along lines_8_to_10"
+    assert "stop" not in change.words
 
 
 def test_what_is_taken_for_positioning_is_said_and_can_be_named(found: EvaluatedProgram) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.before_after import Change
+from ir_msgs_py.report import MovementKind
 from ir_planner.before_after.costs_of import Costed, CostedHop, hops_of, saving
 
 MOST = 5
@@ -48,7 +49,8 @@ def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
 
 def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     times = f"{after.seconds:.2f} s instead of {before.seconds:.2f} s"
-    passed = len(before.steps) - len(after.steps)
+    along = before.steps[0].kind == MovementKind.CARTESIAN  # one movement, at rest at its corners as well
+    passed = 0 if along else len(before.steps) - len(after.steps)
     if passed > 0:
         times += f", {passed} stop{'s' if passed > 1 else ''} less on it"
     first, second = _path(before), _path(after)
