@@ -80,6 +80,7 @@ def test_the_command_writes_the_page_and_prints_the_figures(
     [
         (["open", "there.pdf"], 2, "today's program is read from .src"),
         (["open", "missing.src"], 2, "missing.src: No such file"),
+        (["open", "missing.src", "--process", "line 3"], 2, "it must be lines as 5-9"),
         (["open", "trace.csv", "--process", "5"], 2, "--process names lines of a KRL program"),
         (["open", "missing.src", "--stations", "p1"], 2, "--stations are of PTP at 100 %"),
         (["open", "--stations", "nowhere"], 2, "nowhere"),

@@ -128,14 +128,11 @@ def test_what_is_taken_for_positioning_is_said_and_can_be_named(found: Evaluated
         today_of_krl(found, [(10, 8)])
 
 
-def test_commands_refuse_what_would_leave_it_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_visit_of_stations_alone_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "seam.src"
     source.write_text(f"DEF SEAM( )\n{SEAM}\nEND\n", encoding="utf-8")
-    assert main(["krl", "import", str(source), "--cell", "open"]) == 0
     assert main(["krl", "import", str(source), "--cell", "open", "--compare"]) == 2
     assert "works along paths of the tool" in capsys.readouterr().err
-    assert main(["compare", "open", str(source), "--process", "line 3"]) == 2
-    assert "it must be lines as 5-9" in capsys.readouterr().err
 
 
 def test_a_process_that_begins_in_motion_is_refused(planner: Planner) -> None:

@@ -39,7 +39,7 @@ def defined(letters: str) -> set[int]:
     return found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.text("pllwAaBbP", max_size=14))
 def test_a_process_is_what_lies_between_on_and_off(letters: str) -> None:
     assert process_motions([COMMANDS[letter] for letter in letters]) == defined(letters)
@@ -50,11 +50,11 @@ def test_a_gripper_that_is_carried_by_a_ptp_is_no_process() -> None:
     assert defined("pAllap") == {2, 3}
 
 
-ARC = "CIRC_REL {X 40,Y 40},{X 0,Y 80}"
-SPLINE = "SPLINE\nSLIN_REL {X -40,Y 10}\nSLIN_REL {X -40,Z 20}\nENDSPLINE"
+ARC = "CIRC_REL {X 20,Y 20},{X 0,Y 40}"
+SPLINE = "SPLINE\nSLIN_REL {X -20,Y 5}\nSLIN_REL {X -20,Z 10}\nENDSPLINE"
 
 
-@pytest.mark.parametrize("motions", [f"LIN_REL {{X 60,A 5}}\n{ARC}\n{SPLINE}", f"{ARC},CA 400"])
+@pytest.mark.parametrize("motions", [f"LIN_REL {{X 30,A 3}}\n{ARC}\n{SPLINE}", f"{ARC},CA 400"])
 def test_segments_draw_what_the_tool_draws(
     planner: Planner, followed: Callable[..., Followed], motions: str
 ) -> None:

@@ -99,7 +99,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
 
 
 def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) -> BeforeAfter:
-    options = options_of(arguments)
+    options, process = options_of(arguments), _process(arguments.process)
     endings = {path.suffix.lower() for path in arguments.today}
     if not endings:
         stations: Sequence[str] = arguments.stations
@@ -119,7 +119,7 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
         raise InputError(f"{named}: today's program is read from {known}")
     program = followed(arguments.today, planner.cell, arguments)
     evaluated = evaluate_krl(planner, program, arguments.safety_distance, arguments.load)
-    today = today_of_krl(evaluated, _process(arguments.process))
+    today = today_of_krl(evaluated, process)
     return before_after(planner, today, arguments.cycle_time, options, line.show)
 
 
