@@ -6,12 +6,15 @@ Inverse kinematics: the robot of each cell in N random configurations; a pose is
 configuration it was made from is not among the answers. Beside the four robots an arm with offsets at its
 wrist, which is solved by the search. Plans: the tasks of the cell, or from park along its stations and back,
 each seed; every movement is judged again by Coal at configurations at most 0.0005 rad apart and by limits and
-torques with Pinocchio. Set-up: the commands of docs/robot_guide.md on the URDF of each robot, in processor
-time. Closes with one line per figure: measured value, bound, holds or falls short.
+torques with Pinocchio. Set-up: the commands of docs/robot_guide.md on the URDF of each robot: a new robot,
+checked and planned in processor time, then driven in real time and reported by `ir demo`, a process of its
+own. Closes with one line per figure: measured value, bound, holds or falls short.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -35,6 +38,13 @@ CELLS = ("open", "kr300_pallets", "kr6_bench", "ur10e_bench")
 POSES, QUICK_POSES, SEARCHED = 10_000, 300, 1_000
 NEAR = 1e-5  # rad: a configuration beside a singularity is known to half the digits
 COAL = 2e-6  # m: what Coal's iterations leave between it and the true distance
+CELL_OF_GUIDE = """\
+format: ir_cell/1
+name: first
+robot: own.yaml
+park_deg: {park}
+program: [{{posture: home}}, {{posture: park}}, {{posture: home}}]
+"""
 Row = dict[str, Any]
 
 
@@ -134,14 +144,14 @@ def asked_of(cell: Cell) -> Iterator[tuple[str, FloatArray | None, Goal]]:
 
 
 def guide_row(robot: RobotModel, folder: Path) -> Row:
-    """The guide's commands on a robot's URDF: exit codes, processor seconds, and how well it came out."""
-    home = np.round(np.degrees(robot.machine_home), 6).tolist()
-    sheet = TEMPLATE.replace("[0, -90, 90, 0, 0, 0]", str(home)).replace("my_robot", "own")
+    """The guide's commands on a robot's URDF: exit codes, seconds, and how well it came out."""
+    home = np.degrees(robot.machine_home)
+    moved = home + np.array([30.0, 10.0, -10.0, 20.0, -20.0, 30.0])
+    sheet = TEMPLATE.replace("[0, -90, 90, 0, 0, 0]", str(np.round(home, 6).tolist()))
     (folder / "robot.urdf").write_text(robot_urdf(robot))
-    (folder / "drives.yaml").write_text(sheet)
-    (folder / "cell.yaml").write_text("format: ir_cell/1\nname: first\nrobot: own.yaml\n")
+    (folder / "drives.yaml").write_text(sheet.replace("my_robot", "own"))
+    (folder / "cell.yaml").write_text(CELL_OF_GUIDE.format(park=np.round(moved, 6).tolist()))
     own, cell = str(folder / "own.yaml"), str(folder / "cell.yaml")
-    moved = np.degrees(robot.machine_home) + np.array([30.0, 10.0, -10.0, 20.0, -20.0, 30.0])
     goal = " ".join(f"A{k} {angle:.6f}" for k, angle in enumerate(moved, start=1))
     urdf, drives = str(folder / "robot.urdf"), str(folder / "drives.yaml")
     begin = time.process_time()
@@ -150,12 +160,28 @@ def guide_row(robot: RobotModel, folder: Path) -> Row:
         ir(["robot", "check", own]),
         ir(["cell", "check", cell]),
         ir(["move", cell, "home", goal]),
+        ir(["plan", cell]),
     ]
     seconds = time.process_time() - begin
     q = np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (100, 6))
     copy = Chain(robot_named(own)).link_poses(q)[:, -1]
     off = float(np.abs(copy - Chain(robot).link_poses(q)[:, -1]).max())
-    return {"robot": robot.name, "codes": str(codes), "failed": sum(codes), "seconds": seconds, "off": off}
+    row = {"robot": robot.name, "codes": str(codes), "failed": sum(codes), "seconds": seconds, "off": off}
+    return row | driven(folder)
+
+
+def driven(folder: Path) -> Row:
+    """`ir demo` in the new robot's cell: its last line, elapsed seconds, whether it failed, pages written."""
+    words = [sys.executable, "-m", "ir_cli.main", "demo", "--cell", "cell.yaml"]
+    begin = time.monotonic()
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    said = (done.stdout + done.stderr).strip().splitlines()
+    return {
+        "demo": done.returncode,
+        "demo_seconds": time.monotonic() - begin,
+        "reports": int((folder / "out" / "report.html").is_file()),
+        "said": said[-1] if said else "",
+    }
 
 
 def claims_of(ik: list[Row], plans: list[Row], guide: list[Row]) -> list[Claim]:
@@ -177,6 +203,9 @@ def claims_of(ik: list[Row], plans: list[Row], guide: list[Row]) -> list[Claim]:
     for row in guide:
         claims.append(at_most(f"commands of the guide that fail, {row['robot']}", row["failed"], "", 0))
         claims.append(at_most(f"processor time of the guide, {row['robot']}", row["seconds"], "s", 600))
+        claims.append(at_most(f"checks of the drive that fail, {row['robot']}", row["demo"], "", 0))
+        claims.append(at_least(f"report of the drive, {row['robot']}", row["reports"], "", 1))
+        claims.append(at_most(f"planned, driven, reported, {row['robot']}", row["demo_seconds"], "s", 600))
     return claims
 
 
