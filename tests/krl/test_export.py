@@ -166,3 +166,10 @@ def test_a_complaint_names_file_line_and_column(tmp_path: Path, capsys: pytest.C
     broken.write_text("DEF OLD( )\nPTP XHOME\nLIN NOBODY\nEND\n")
     assert main(["krl", "import", str(broken), "--cell", "open"]) == 2
     assert "old.src:3:5: NOBODY has no value" in capsys.readouterr().err
+
+
+def test_one_station_is_nothing_to_plan_between(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "old.src"
+    source.write_text("DEF OLD( )\nPTP XHOME\nPTP {A1 3}\nPTP XHOME\nEND\n")
+    assert main(["krl", "import", str(source), "--cell", "open", "--compare"]) == 2
+    assert "stations recognised: home; --compare plans between at least two" in capsys.readouterr().err

@@ -1,44 +1,17 @@
-"""Every command line of `ir` in README and docs is one that `ir` understands."""
+"""Every command line of `ir` in README and docs is one that `ir` understands, and is run somewhere."""
 
 from __future__ import annotations
 
 import argparse
 import re
-import shlex
-from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
-from itertools import takewhile
 from pathlib import Path
 
 import pytest
+from _documented import FOLLOWED, NOT_RUN, PAGES, ROOT, SNIPPETS, lines
 
 from ir_cli.main import COMMAND_MODULES
-
-ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-LINE = re.compile(r"^(?: {4}|\$ )?(?:\.venv/bin/)?ir ([a-z].*)$")
-FENCE = re.compile(r"^```(bash|sh|)$")
-OPERATORS = frozenset({"|", ">", ">>", "&", "&&"})
-ABSENT = ("[", "…", "...", "COMMAND")  # of lines that show a pattern, not a command
-
-
-def command_lines(page: Path) -> Iterator[list[str]]:
-    """Words of the lines in code that call `ir`, without comments, pipes and redirections."""
-    fenced = shell = False
-    lines = iter(page.read_text("utf-8").splitlines())
-    for line in lines:
-        if line.startswith("```"):
-            fenced, shell = not fenced, FENCE.match(line) is not None
-        found = LINE.match(line)
-        if found is None or (fenced and not shell) or not (fenced or line.startswith("    ")):
-            continue
-        command = found.group(1)
-        while command.count('"') % 2:  # a quoted text of several lines
-            command += "\n" + next(lines)
-        words = list(takewhile(lambda word: word not in OPERATORS, shlex.split(command, comments=True)))
-        if not any(mark in word for mark in ABSENT for word in words):
-            yield words
 
 
 @cache
@@ -52,7 +25,7 @@ def parser_of(command: str) -> argparse.ArgumentParser:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_is_understood(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wrong = []
-    for words in command_lines(page):
+    for words in (words for line in lines(page) for words in line.commands):
         line = " ".join(words)
         if words[0] not in COMMAND_MODULES:
             wrong.append(line)
@@ -65,4 +38,19 @@ def test_every_command_is_understood(page: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_there_are_commands_to_look_at() -> None:
-    assert sum(len(list(command_lines(page))) for page in PAGES) > 60
+    assert sum(len(line.commands) for page in PAGES for line in lines(page)) > 60
+
+
+def test_what_is_not_run_has_a_reason_that_names_a_test() -> None:
+    """Whatever no pattern of NOT_RUN names is run by test_documented_commands_run.py."""
+    texts = [" ".join(words) for page in PAGES for line in lines(page) for words in line.commands]
+    unused = [each for each in NOT_RUN if not any(re.fullmatch(each, text, re.S) for text in texts)]
+    assert unused == []
+    for reason in (*NOT_RUN.values(), *FOLLOWED.values(), *SNIPPETS.values()):
+        named = re.findall(r"tests/[\w/.]+", reason)
+        assert named, reason
+        assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_every_page_with_snippets_says_what_runs_them() -> None:
+    assert {page.name for page in PAGES if "```python" in page.read_text("utf-8")} == set(SNIPPETS)

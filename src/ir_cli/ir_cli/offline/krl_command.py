@@ -203,12 +203,16 @@ def _sentences(found: EvaluatedProgram) -> list[str]:
 
 def _compared(planner: Planner, found: EvaluatedProgram) -> Row:
     """The stations of the program as the planner visits them: free, and in the program's time."""
-    if not found.stations:
-        raise InputError("no station is recognised: there is nothing to compare with")
     if any(step.step.process for step in found.steps):
         raise InputError(
             "the program works along paths of the tool, between an output's on and off, that a visit of its "
             "stations would leave out: compare with `ir compare`"
+        )
+    if len(set(found.stations)) < 2:
+        known = found.stations[0] if found.stations else "none"
+        raise InputError(
+            f"stations recognised: {known}; --compare plans between at least two: `ir compare` makes "
+            "stations of the other stops"
         )
     start = found.steps[0].step.trajectory.positions[0]
     answer: dict[str, object] = {}
