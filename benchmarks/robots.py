@@ -43,7 +43,7 @@ format: ir_cell/1
 name: first
 robot: own.yaml
 park_deg: {park}
-program: [{{posture: home}}, {{posture: park}}, {{posture: home}}]
+program: [{{posture: park}}, {{posture: home}}]
 """
 Row = dict[str, Any]
 
