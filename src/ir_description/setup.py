@@ -21,7 +21,7 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     install_requires=["setuptools", "numpy", "scipy", "PyYAML"],
-    extras_require={"cad": ["trimesh", "coacd"]},
+    extras_require={"cad": ["trimesh", "networkx", "coacd"]},
     zip_safe=False,
     maintainer="The ir maintainers",
     maintainer_email="maintainers@example.org",

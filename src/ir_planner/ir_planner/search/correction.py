@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_kernels.collision import FREE, Certificates
-from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import path_cost
 from ir_planner.search.genetic_settings import SAMPLES_MAX, GeneticSettings
@@ -71,12 +71,14 @@ def corrected(
         following: list[FloatArray] = []
         wanted = max((settings.paths - len(clean)) // len(open_paths), 1)
         for path in open_paths:
+            if len(path) - 1 > space.work.left:
+                break
             proof = space.certificates(path[:-1], path[1:])
             if (proof.verdict == FREE).all():
                 clean.append(path)
-            elif not space.work.exhausted:
+            elif _price(path) <= space.work.left:
                 found, stretch = _round_stretch(path, proof, space, settings, rng, wanted)
-                stretches.append(stretch)
+                stretches.extend([stretch] if stretch.fitness else [])
                 generations += found.generations
                 following.extend(found.paths)
                 if not found.paths and found.shortfall < missed.shortfall:
@@ -104,6 +106,8 @@ def _round_stretch(
     fitness: list[float] = []
     best = Evolution([], np.inf, -1, path[0], 0)
     for attempt in range(settings.attempts):
+        if attempt and _price(path) > space.work.left:
+            break
         before, after = colliding_stretch(path, proof, space, settings.margin * _WIDER**attempt)
         finer = replace(settings, samples=min(settings.samples * (attempt + 1), SAMPLES_MAX))
         found = evolve(before[-1], after[0], space, finer, rng)
@@ -116,9 +120,19 @@ def _round_stretch(
             return replace(found, paths=different, generations=generations), stretch
         if found.shortfall < best.shortfall:
             best = found
-        if space.work.exhausted:
-            break
     return replace(best, generations=generations), stretch
+
+
+def _parts(path: FloatArray) -> IntArray:
+    """Into how many parts each step (M-1,) of a path (M, n) is sampled."""
+    lengths = np.abs(np.diff(path, axis=0)).max(axis=1)
+    parts: IntArray = np.maximum(np.ceil(lengths / _SPACING).astype(np.int64), 1)
+    return parts
+
+
+def _price(path: FloatArray) -> int:
+    """Work that looking for the colliding stretch of a path (M, n) takes."""
+    return batch_work(int(_parts(path).sum()) + 1)
 
 
 def colliding_stretch(
@@ -129,8 +143,7 @@ def colliding_stretch(
     The last point before and the first after are the stretch's free ends. `proof`: certificates of the M-1
     steps, not all of them free. The stretch is widened at both ends by `margin` times its own length.
     """
-    lengths = np.abs(np.diff(path, axis=0)).max(axis=1)
-    counts = np.maximum(np.ceil(lengths / _SPACING).astype(int), 1)
+    counts = _parts(path)
     first = np.concatenate([[0], np.cumsum(counts)])  # index of each waypoint among the samples
     step = np.repeat(np.arange(len(counts)), counts)
     share = (np.arange(len(step)) - first[step]) / counts[step]

@@ -118,8 +118,11 @@ class _Breeder:
         self.tried: set[bytes] = set()
 
     def run(self) -> Evolution:
-        """Breed until the free paths have settled."""
-        s = self.settings
+        """Breed until the free paths have settled; no generation begins that the work left can't pay."""
+        s, work = self.settings, self.space.work
+        children = s.islands * (self.per_island - self.elite)
+        if self._price(s.islands * self.per_island * s.first) > work.left:
+            return Evolution([], np.inf, -1, self.a, 0)
         people = self._first()
         generations, since = 1, 0
         fitness: list[float] = []
@@ -127,7 +130,8 @@ class _Breeder:
             fitness.append(float(people.fitness.min()))
             self._collect(people)
             since += bool(self.found)
-            if since > s.settle or generations >= s.generations or self.space.work.exhausted:
+            settled = since > s.settle or generations >= s.generations
+            if settled or work.exhausted or self._price(children) > work.left:
                 break
             people = self._next(people)
             generations += 1
@@ -136,6 +140,10 @@ class _Breeder:
         paths = sorted(self.found, key=lambda path: path_cost(self.weights, path))
         q = self.samples(people.vias[best : best + 1])[people.sample[best], 0]
         return Evolution(paths, float(lack[best]), int(people.pair[best]), q, generations, tuple(fitness))
+
+    def _price(self, individuals: int) -> int:
+        """Work that so many new ones take."""
+        return batch_work(individuals * (self.settings.samples - 2))
 
     def samples(self, vias: FloatArray) -> FloatArray:
         """(S, N, n): the paths of individuals."""
@@ -241,6 +249,8 @@ class _Breeder:
                 continue
             self.tried.add(key)
             path = self._path(vias)
+            if len(path) - 1 > self.space.work.left:
+                return
             proof = self.space.certificates(path[:-1], path[1:])
             if (proof.verdict == FREE).all():
                 self.found.append(path)
