@@ -81,7 +81,7 @@ def cost(plan: ProgramPlan, options: PlanOptions, longer: float) -> float:
 
 
 def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() -> None:
-    """Service lines, which are known without any work, leave it to the movements across and the searches of stations."""
+    """Service lines, known without any work, leave it to the movements and the searches of stations."""
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
     options = PlanOptions(max_iterations=1_500, planning_time=100.0)

@@ -50,8 +50,11 @@ def test_the_commands_of_the_page_lead_from_a_programme_to_a_plan(
             assert main(words(command)) == 0, command
         found = load_power_parameters("out/press_line_2.yaml")
     assert found.name == "press_line_2"
-    sheet, k = data_sheet(), found.index("coulomb.joint_a2")
-    assert found.deviation[k] < 0.8 * sheet.deviation[k]
+    sheet = data_sheet()
+    known = sheet.deviation > 0.0
+    left = found.deviation[known] / sheet.deviation[known]
+    assert left.max() < 1.0 + 1e-6
+    assert left.min() < 0.7  # of four movements
     assert "press_line_2" in capsys.readouterr().out
 
 

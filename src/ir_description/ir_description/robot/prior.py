@@ -42,7 +42,7 @@ GEAR_SHARE = 0.04
 
 IDLE_WATTS = 10.0
 """Per axis: switching losses of an inverter without a current; half normal. The data count them with the
-drives; but they come from the DC link, where braking axes pay for them."""
+drives, which they can't exceed; but they come from the DC link, where braking axes pay for them."""
 
 RECTIFIER_LOSS = 0.02
 """Diode rectifier and mains filter; half normal below 1."""
@@ -81,7 +81,7 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
     known = [_mark(name, robot, marks) for name in names]
     share = np.array([RELATIVE_DEVIATION.get(mark, 0.0) for mark in known])
     deviation = np.abs(mean) * share * np.array([_FACTORS.get(name.partition(".")[0], 1.0) for name in names])
-    for name, value in _assumed(robot).items():
+    for name, value in _assumed(robot, power).items():
         deviation[names.index(name)] = value
     return PowerParameters(
         name=DATA_SHEET,
@@ -95,7 +95,7 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
     )
 
 
-def _assumed(robot: RobotModel) -> dict[str, float]:
+def _assumed(robot: RobotModel, power: PowerData) -> dict[str, float]:
     """Standard deviations of what the data have no mark for."""
     iron = IRON_SHARE * robot.envelope_torque[:, 0] / robot.velocity_max
     return {
@@ -106,7 +106,7 @@ def _assumed(robot: RobotModel) -> dict[str, float]:
         "counterbalance": COUNTERBALANCE,
         "tool_watts": TOOL_WATTS,
         "rectifier_efficiency": RECTIFIER_LOSS,
-        IDLE: IDLE_WATTS * robot.n,
+        IDLE: min(IDLE_WATTS * robot.n, power.drives_and_brake_release),
     }
 
 
