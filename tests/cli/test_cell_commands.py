@@ -37,3 +37,16 @@ def test_an_unknown_cell_lists_the_known_ones(capsys: pytest.CaptureFixture[str]
 def test_list_prints_every_bundled_cell(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["cell", "list"]) == 0
     assert set(capsys.readouterr().out.split()) == set(bundled_cells())
+
+
+def test_searches_that_nobody_has_are_errors_with_their_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.yaml"
+    text = cell_to_yaml(load_cell("demo")).replace("planner: genetic", "planner: gentic")
+    path.write_text(text)
+    assert main(["cell", "check", str(path)]) == 1
+    out = capsys.readouterr().out
+    line = next(k for k, row in enumerate(text.splitlines(), 1) if "planner: gentic" in row)
+    assert f"cell.yaml:{line}: error: step 4: planner 'gentic' is unknown: known are " in out
+    assert "genetic" in out

@@ -151,8 +151,8 @@ def test_a_pause_has_no_planner() -> None:
 @pytest.mark.parametrize(
     ("at_pick", "to_place", "sentence"),
     [
-        ("withdrawal: genetic,", "", "station pick: withdrawal 'genetic' is unknown: known are "),
-        ("", "planner: genetik,", "step 1 of the program: planner 'genetik' is unknown: known are "),
+        ("withdrawal: genetic,", "", "pick: withdrawal 'genetic' is unknown: known are "),
+        ("", "planner: genetik,", "step 2: planner 'genetik' is unknown: known are "),
     ],
 )
 def test_a_search_that_nobody_has_is_refused_with_those_that_are_known(

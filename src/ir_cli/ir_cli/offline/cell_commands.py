@@ -78,11 +78,18 @@ def run_check(arguments: argparse.Namespace) -> int:
     cell = _readable(arguments.file)
     if cell is None:
         return 1
-    from ..deep.stations import stations_of  # a planner, only for a cell that can be read
+    from ir_planner.program import unknown_searches  # a planner, only for a cell that can be read
+    from ir_planner.search import SEARCHES
+
+    from ..deep.stations import stations_of
 
     stations = stations_of(cell)
     suggestions, configurations = _deep(cell) if arguments.deep else ([], [])
-    findings: list[Finding | Suggestion] = [*check_cell(cell), *suggestions]
+    findings: list[Finding | Suggestion] = [
+        *check_cell(cell),
+        *unknown_searches(cell, cell.program, SEARCHES),
+        *suggestions,
+    ]
     if arguments.json:
         listed = {"findings": [asdict(f) for f in findings if isinstance(f, Finding)]}
         listed["suggestions"] = [asdict(s) for s in suggestions]

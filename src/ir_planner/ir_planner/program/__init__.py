@@ -1,5 +1,6 @@
 """Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
 
+from ir_planner.program.asked_searches import unknown_searches
 from ir_planner.program.charge import Charge
 from ir_planner.program.doors import Doors, doors_advice, doors_along, doors_text, with_doors
 from ir_planner.program.outlook import Outlook, outlook
@@ -37,6 +38,7 @@ __all__ = [
     "pause_by_itself",
     "placed_steps",
     "plan_program",
+    "unknown_searches",
     "with_doors",
     "with_intervals",
 ]

@@ -1,36 +1,20 @@
-"""The searches that a cell asks for at its stations and steps: whether they are known, and what they did for
-the chain that was chosen.
-"""
+"""What the searches that a cell asks for at its stations and steps did for the chain that was chosen."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from ir_description import Cell, Station
+from ir_description import Station
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.search_log import CorrectionLog, SearchLog, WithdrawalLog
 from ir_planner.program.choice import Choice
 from ir_planner.program.node import Node
-from ir_planner.program.steps import PlacedStep
-from ir_planner.regional import Searches
-from ir_planner.request import chosen
 from ir_planner.scene import PlanningScene
-from ir_planner.service import EXIT_SEARCHES, ExitPath
+from ir_planner.service import ExitPath
 
 _DROPPED = 300  # configurations that came too near something, kept for a picture
 _BETWEEN = 12  # positions of the tool along a step of a path
-
-
-def check_searches(cell: Cell, steps: Sequence[PlacedStep], searches: Searches) -> None:
-    """Raise RequestError for a step or a station that asks for a search nobody has."""
-    visited = {placed.step.target for placed in steps}
-    for k, placed in enumerate(steps):
-        chosen(placed.step.planner, ("", *searches), f"step {k} of the program: planner")
-    for station in cell.stations:
-        if station.name in visited:
-            known = ("", *EXIT_SEARCHES)
-            chosen(station.search.withdrawal, known, f"station {station.name}: withdrawal")
 
 
 def logs_of(choice: Choice) -> Iterator[SearchLog]:

@@ -16,11 +16,12 @@ from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
+from ir_planner.program.asked_searches import check_searches
 from ir_planner.program.choice import Steps
 from ir_planner.program.comparison import held_against_common
 from ir_planner.program.doors import doors_advice, doors_text
 from ir_planner.program.front import front_of
-from ir_planner.program.logs import check_searches, logs_of
+from ir_planner.program.logs import logs_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
 from ir_planner.program.route import Route
@@ -118,7 +119,7 @@ def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]
     request.check()
     cell = request.cell
     steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start(), request.doors)
-    check_searches(cell, steps, request.settings.searches)
+    check_searches(cell, [placed.step for placed in steps], request.settings.searches)
     settings, bare = request.settings, request.options.load == NO_LOAD
     scenes = Scenes(cell, request.power, settings.drives, bare)
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)

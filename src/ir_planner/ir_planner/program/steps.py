@@ -96,7 +96,7 @@ def placed_steps(
     RequestError for a step that can't be done.
     """
     result = []
-    for k, (step, doors) in enumerate(zip(steps, doors_along(cell, steps, begin), strict=True)):
+    for k, (step, doors) in enumerate(zip(steps, doors_along(cell, steps, begin), strict=True), 1):
         try:
             after = places.after(step)
         except (InvalidValueError, DescriptionNameError) as error:
