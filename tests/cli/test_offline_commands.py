@@ -67,6 +67,7 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
 def test_the_totals_of_a_program_are_the_sums_of_its_steps(capsys: pytest.CaptureFixture[str]) -> None:
     found = answered(capsys, *STATIONS)
     assert found["certified"]
+    assert found["notes"] == [DOORS]
     for key in ("seconds", "joules"):
         assert found[key] == pytest.approx(sum(step[key] for step in found["steps"]))
         moving = sum(step[key] for step in found["steps"] if step["kind"] != "pause")

@@ -63,8 +63,10 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     assert_planned_figures_are_those_of_the_answer(analysis, raw)
     (search,) = analysis.recording.searches  # configurations above the conveyor are searched
     assert isinstance(search, ConfigurationLog)
-    assert f"of {search.starts} random starts {search.accepted} were accepted" in report_html(analysis, ())
-    capsys.readouterr()
+    page, doors = report_html(analysis, ()), "assumed, as the cell has them: lathe door_open"
+    assert f"of {search.starts} random starts {search.accepted} were accepted" in page
+    assert f"<li>doors at the start <b>{doors}</b></li>" in page
+    assert capsys.readouterr().out.endswith(f"\nnote: doors at the start are {doors}\n")
     assert main(["replan", "plan.mcap"]) == 0
     assert "1 of 1 requests planned again with equal ids" in capsys.readouterr().out
     assert main(plan) == 1

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ir_description import CellPath, UnknownNameError, is_path, load_path
 from ir_msgs_py.cartesian import CartesianPath
-from ir_planner import CartesianPlan, Planner
+from ir_planner import CartesianPlan, Planner, assumed_doors
 
 from ..errors import InputError
 from ..suggestions import unknown_name
@@ -51,8 +51,10 @@ def run_path(arguments: argparse.Namespace) -> int:
         if arguments.start:
             start = configuration_of(arguments.start, planner, arguments.safety_distance, arguments.load)
         plan = planner.plan_cartesian(path, options_of(arguments), start, t1=arguments.t1)
+    notes = assumed_doors(planner.cell)
+    said = "".join(f"\nnote: {note}" for note in notes)
     if plan.trajectory is None:
-        return failed(plan.status.message)
+        return failed(plan.status.message + said)
     if arguments.trajectory:
         write_trace(arguments.trajectory, plan.trajectory)
     if arguments.json:
@@ -63,9 +65,10 @@ def run_path(arguments: argparse.Namespace) -> int:
             "lengths": plan.lengths,
             "configurations": plan.configurations,
         }
-        print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures_of(plan.report), **kept})
+        figures = {**figures_of(plan.report), **kept, "notes": notes}
+        print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures})
     else:
-        sys.stdout.write(f"{sentence_of(plan.report)}\n{_kept(plan)}\n")
+        sys.stdout.write(f"{sentence_of(plan.report)}\n{_kept(plan)}{said}\n")
     return 0
 
 

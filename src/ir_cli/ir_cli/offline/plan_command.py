@@ -12,7 +12,7 @@ from pathlib import Path
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
-from ir_planner import Planner, ProgramPlan
+from ir_planner import Planner, ProgramPlan, assumed_doors
 
 from .asking import (
     add_cell,
@@ -77,19 +77,21 @@ def run_plan(arguments: argparse.Namespace) -> int:
         )
     if arguments.html:
         _page(arguments, plan, planner, options)
+    notes = assumed_doors(planner.cell)
+    said = "".join(f"\nnote: {note}" for note in notes)
     if not plan.status.ok:
-        return failed(plan.status.message)
+        return failed(plan.status.message + said)
     if arguments.record:
         sys.stderr.write(f"ir: {_record(arguments.record, arguments, plan, planner, options)}\n")
     rows = rows_of(plan.movements)
     if arguments.json:
         saving = asdict(plan.savings) if plan.savings.available else None
-        print_json({**totals_of(plan), "steps": rows, "saving": saving})
+        print_json({**totals_of(plan), "steps": rows, "saving": saving, "notes": notes})
     elif arguments.csv:
         print_csv(rows)
     else:
         print_table(rows, COLUMNS)
-        sys.stdout.write("\n".join(sentences_of(plan)) + "\n")
+        sys.stdout.write("\n".join(sentences_of(plan)) + f"{said}\n")
     return 0
 
 

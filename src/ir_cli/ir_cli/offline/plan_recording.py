@@ -25,13 +25,14 @@ from ir_msgs_py.ros.conversions import (
     trajectory_to_msg,
 )
 from ir_msgs_py.settings import tree
-from ir_planner import Planner, ProgramPlan
+from ir_planner import Planner, ProgramPlan, assumed_doors
 from ir_planner.node.announcements import cell_state
 from ir_planner.node.answers import fill_program
 from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.write import CellFiles, RecordingSession, RecordingWriter
 
+_DOORS, _DOORS_ARE = "doors_at_the_start", "doors at the start are "
 _STEP = 1_000_000  # ns between two messages, so that their order is seen
 
 
@@ -61,8 +62,11 @@ def write_plan(
     """
     writer = RecordingWriter(path, overwrite=overwrite, roots=roots or FileRoots.of())
     now = time.time_ns()
-    session = RecordingSession(writer, {contents.PLAN: "never driven"}, now)
     cell = planner.cell
+    facts = {contents.PLAN: "never driven"}
+    if doors := assumed_doors(cell):
+        facts[_DOORS] = doors[0].removeprefix(_DOORS_ARE)
+    session = RecordingSession(writer, facts, now)
     urdf = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
     session.attach_cell(CellFiles(cell_to_yaml(cell), urdf), now)
     session.attach(contents.PARAMETERS.format(node=names.PLANNER), _parameters(planner), now)
