@@ -83,3 +83,23 @@ def test_numbers_of_entries_are_those_of_the_file(tmp_path: Path) -> None:
     first, second = read(tmp_path, text)
     assert first.sentence.startswith("equipment[0].bodies[0].kind")
     assert second.sentence.startswith("equipment[0].bodies[3].radius")
+
+
+MESH_CELL = """
+format: ir_cell/1
+name: bench
+robot: kr210_r2700_extra
+equipment:
+  - name: press
+    bodies:
+      - {name: press_cad, mesh: nowhere.stl, unit: mm, pieces: 4}
+      - {name: press_hood, mesh: hood.stl, unit: inch, colour: red, xyz: [0, 0, 3 m]}
+"""
+
+
+def test_a_mesh_that_cannot_be_read_makes_no_other_key_unknown(tmp_path: Path) -> None:
+    found = [error.sentence for error in read(tmp_path, MESH_CELL) if "bodies" in error.sentence]
+    places = ["[0].mesh: file", "[1] has the unknown key 'colour'", "[1].xyz[2] is '3 m'", "[1].mesh: file"]
+    assert len(found) == len(places), found
+    for place in places:
+        assert any(f"equipment[0].bodies{place}" in sentence for sentence in found), place

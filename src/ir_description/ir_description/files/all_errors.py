@@ -44,7 +44,7 @@ def document_errors(
             place = document.place_of(error.sentence)
             if not document.follows(error.sentence, place):
                 found.append(kind(source, error.line, document.renumbered(error.sentence, place)))
-            if not document.leave_out(place):
+            if not document.leave_out(place, unknown=_UNKNOWN_KEY.search(error.sentence) is not None):
                 break
     return tuple(sorted(found, key=lambda error: error.line))
 
@@ -56,6 +56,7 @@ class _Document:
         self.root = root
         self._names: set[str] = set()  # that stood in what was left out
         self._thinned: dict[int, Node] = {}  # by id: what misses something now, and what that is a part of
+        self._known: dict[int, Node] = {}  # by id: mappings of which a known key is missing now
         self._numbers: dict[int, list[int]] = {}  # of the entries that a list still has
 
     def place_of(self, sentence: str) -> tuple[Step, ...]:
@@ -71,13 +72,22 @@ class _Document:
         return (*steps, unknown.group(1)) if unknown else tuple(steps)
 
     def follows(self, sentence: str, place: tuple[Step, ...]) -> bool:
-        """Whether the error is only there because something was left out before."""
+        """Whether the error is only there because something was left out before.
+
+        The keys of a mapping are checked before the values of any: where a value was left out, a key that is
+        unknown now was known with it, as `unit` beside the `mesh` of a body.
+        """
+        if _UNKNOWN_KEY.search(sentence) is not None:
+            return id(self._at(place[:-1]).content) in self._known
         missing = _MISSING.search(sentence) is not None
         thinned = any(id(node) in self._thinned for node in self._along(place))
         return (missing and thinned) or any(f"'{name}' is unknown" in sentence for name in self._names)
 
-    def leave_out(self, place: tuple[Step, ...]) -> bool:
-        """Remove the smallest part at a place that stands for itself; False where there is none."""
+    def leave_out(self, place: tuple[Step, ...], unknown: bool = False) -> bool:
+        """Remove the smallest part at a place that stands for itself; False where there is none.
+
+        unknown: it is a key that is not known there.
+        """
         while place and isinstance(place[-1], int) and not isinstance(self._at(place).content, dict):
             place = place[:-1]  # a number of a vector is nothing without the others
         if not place:
@@ -95,6 +105,8 @@ class _Document:
             del parent.content[last]
         elif isinstance(parent.content, dict):
             del parent.content[str(last)]
+            if not unknown:
+                self._known[id(parent.content)] = parent
         return True
 
     def renumbered(self, sentence: str, place: tuple[Step, ...]) -> str:

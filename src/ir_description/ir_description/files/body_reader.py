@@ -94,8 +94,8 @@ class BodyReader:
         name = table["name"].name()
         with table["name"].blamed():
             self._shapes.add(name)
-        solid = self._solids.read(table)
         pose = pose_in(table)
+        solid = self._solids.read(table)
         names = piece_names(name, len(solid))
         bodies = []
         for number, (piece, vertices) in enumerate(zip(names, solid, strict=True)):
