@@ -43,6 +43,14 @@ def test_semicolons_decimal_commas_dates_and_missing_values(tmp_path: Path) -> N
     np.testing.assert_allclose(trace.joules(), [0.0, 1.5, 4.0])  # a missing mean counts as the one before
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_the_unicode_text_of_a_spreadsheet_is_read(encoding: str, tmp_path: Path) -> None:
+    mark = "\ufeff" if encoding.endswith("e") else ""  # "utf-16" writes its own
+    text = f"{mark}time\tpower [kW]\tStück\r\n0\t1,5\tä\r\n1\t2,5\tö\r\n"
+    (trace,) = read_traces(written(tmp_path, text.encode(encoding)))
+    np.testing.assert_allclose(trace.columns["power"], [1500.0, 2500.0])
+
+
 def test_a_mapping_names_columns_units_and_the_clock(tmp_path: Path) -> None:
     text = "format: ir_trace/1\ncolumns: {time: {column: t, unit: ms}, power: {column: P total, unit: kW}}\n"
     mapping = read_mapping(written(tmp_path, text + "clock_offset: 0.25\npower_is: sample\n", "map.yaml"))
@@ -65,6 +73,7 @@ def test_a_mapping_names_columns_units_and_the_clock(tmp_path: Path) -> None:
         ("time,power,power_kW\n0,1,1\n1,1,1\n", "column power is there twice"),
         ("time,joint_a1\n0,1\n1,1\n", "there is no column joint_a2"),
         (b"\xff\xfe\x00\x01" * 20, "there is no column time"),
+        ("time,power\n0,1\n1,1\n".encode("utf-16-le"), "t.csv:1: has zero bytes: it is no text in UTF-8"),
         ("time,power\n0," + "1" * 200_000 + "\n1,1\n", "t.csv"),
     ],
 )

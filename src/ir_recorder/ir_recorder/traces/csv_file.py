@@ -1,7 +1,8 @@
 """Traces as CSV: a line of headings, then numbers; commas, semicolons or tabs between them.
 
 Read in blocks, so that memory holds the wanted columns only. An empty cell is a missing value. Where
-semicolons separate, commas may be decimal. Time may be written as date and time of ISO 8601.
+semicolons or tabs separate, commas may be decimal. Time may be written as date and time of ISO 8601. The text
+is UTF-8, or UTF-16 with its byte order mark ("Unicode text" of a spreadsheet).
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import csv
 import os
 import stat
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from itertools import islice
@@ -57,7 +59,8 @@ def _opened(path: Path) -> TextIO:
     if fault:
         os.close(descriptor)
         raise TraceError(f"{path}: {fault}")
-    return os.fdopen(descriptor, encoding="utf-8-sig", errors="replace", newline="")
+    utf_16 = os.pread(descriptor, 2, 0) in (BOM_UTF16_LE, BOM_UTF16_BE)
+    return os.fdopen(descriptor, encoding="utf-16" if utf_16 else "utf-8-sig", errors="replace", newline="")
 
 
 class _Reader:
@@ -75,6 +78,9 @@ class _Reader:
     def _header(self) -> str:
         for line in self._file:
             self._begin += 1
+            if "\0" in line:
+                fault = "has zero bytes: it is no text in UTF-8, nor in UTF-16 with its mark"
+                raise TraceError(f"{self._path}:{self._begin}: {fault}; save it as CSV UTF-8")
             if line.strip() and not line.startswith("#"):
                 return line
         raise TraceError(f"{self._path}: has 0 points, a trace has at least 2")
@@ -149,7 +155,7 @@ class _Reader:
         if not text and name != TIME:
             return float("nan")
         try:
-            if self._delimiter == ";" and text.count(",") == 1:
+            if self._delimiter != "," and text.count(",") == 1:
                 return float(text.replace(",", "."))
             if name == TIME:
                 return datetime.fromisoformat(text).timestamp()
