@@ -120,7 +120,7 @@ def _old(cycle_time: float) -> BeforeAfter:
 
 def _trace(cycle_time: float) -> BeforeAfter:
     planner = _planner("open")
-    options = argparse.Namespace(mapping=TRACES / "rsi_log.yaml", load="", bandwidth=0.0)
+    options = argparse.Namespace(mapping=TRACES / "rsi_log.yaml", load="", bandwidth=0.0, between=None)
     return before_after(planner, today_of_trace(options, planner, TRACES / "rsi_log.csv"), cycle_time)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 
@@ -10,8 +11,10 @@ import pytest
 
 from ir_cli.errors import InputError
 from ir_cli.offline.measured import measured
+from ir_cli.offline.measured_options import between
+from ir_cli.offline.rows_of_robot import counted_turns
 from ir_cli.offline.today_trace import stretches_of
-from ir_cli.offline.trace_file import read_motion
+from ir_cli.offline.trace_file import Rows, read_motion, write_trace
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlanOptions, parse_goal
@@ -71,7 +74,7 @@ def test_much_noise_leaves_much_open(planner: Planner, movement: JointTrajectory
 def test_logs_of_controllers_are_read_by_their_mapping(name: str) -> None:
     found = read_motion(TRACES / f"{name}.csv", JOINT_NAMES, TRACES / f"{name}.yaml")
     assert not isinstance(found, JointTrajectory)
-    times, q = found
+    times, q, _ = found
     assert times[0] == 0.0
     assert times[-1] == pytest.approx(4.79, abs=0.01)
     assert np.degrees(q[0]) == pytest.approx([0.0, -90.0, 90.0, 0.0, 0.0, 0.0], abs=0.01)
@@ -92,7 +95,7 @@ def test_a_gap_in_which_the_robot_moved_is_refused(tmp_path: Path) -> None:
 
 def test_a_gap_at_a_standstill_is_one(tmp_path: Path) -> None:
     rows = [(0.01 * k, 0.0) for k in range(20)] + [(1.0 + 0.01 * k, 0.0) for k in range(20)]
-    times, _ = read_motion(trace_of(tmp_path / "still.csv", rows), JOINT_NAMES)
+    times, *_ = read_motion(trace_of(tmp_path / "still.csv", rows), JOINT_NAMES)
     assert times[-1] == pytest.approx(1.19)
 
 
@@ -101,6 +104,90 @@ def test_rows_in_a_wrong_unit_of_time_are_a_sentence() -> None:
     time = 12.0 * np.arange(300)
     with pytest.raises(InputError, match=r"the rows are 12 s apart: .* at most 0.1 s; is the unit of time"):
         measured(("a",), time, np.zeros((300, 1)), lambda _: 0.0)
+
+
+def logged(movement: JointTrajectory) -> tuple[np.ndarray, np.ndarray]:
+    times = np.arange(0.0, movement.duration, 0.004)
+    return times, movement.sample(times).q
+
+
+@pytest.mark.parametrize("first", [175.0, -175.0, 5.0])
+def test_turns_that_a_log_does_not_count_are_counted(
+    planner: Planner, movement: JointTrajectory, first: float
+) -> None:
+    """A log within half a turn jumps by a whole one where the joint goes on."""
+    robot, (times, q) = planner.cell.robot, logged(movement)
+    q = q + np.radians([0, 0, 0, 0, 0, first])
+    q[:, 5] += np.radians(20.0) * times / times[-1] * np.sign(first)
+    written = (q + np.pi) % (2.0 * np.pi) - np.pi
+    found, notes = counted_turns("log", times, written, robot)
+    np.testing.assert_allclose(np.diff(found, axis=0), np.diff(q, axis=0), atol=1e-12)
+    assert ((found >= robot.position_min) & (found <= robot.position_max)).all()
+    turned = abs(first) > 90.0
+    assert notes == (("joint_a6 jumps by whole turns in the file: taken as going on",) if turned else ())
+
+
+def test_what_the_robot_can_not_have_driven_is_refused(planner: Planner, movement: JointTrajectory) -> None:
+    """A wrong unit was a movement of 38 MJ, of which the planner saved 99 %."""
+    robot, (times, q) = planner.cell.robot, logged(movement)
+    jump = q + np.where(times > times[40], 0.5, 0.0)[:, None] * np.eye(6)[3]
+    for time_, positions, words in (
+        (times, np.degrees(q), "times as fast as it can: are the units"),
+        (times * 1e-3, q, "times as fast as it can"),
+        (times, jump, "joint_a4 moves by 28.6 deg between 0.160 s and 0.164 s"),
+        (times, 0.0 * q + np.eye(6)[0] * -90.0, "joint_a1 is at -5157 deg, its range is -185 to 185 deg"),
+    ):
+        with pytest.raises(InputError, match=re.escape(words)):
+            counted_turns("log", time_, positions, robot)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, 57.3])
+def test_speeds_that_positions_contradict_are_refused(
+    movement: JointTrajectory, factor: float, tmp_path: Path
+) -> None:
+    """Speeds of zero made 690 kJ of a movement of 7 kJ."""
+    at = movement.sample(np.arange(0.0, movement.duration, 0.012))
+    path = tmp_path / "t.csv"
+    times = np.arange(len(at.q)) * 0.012
+    write_trace(path, JointTrajectory.from_seconds(JOINT_NAMES, times, at.q, at.qd, at.qdd))
+    assert isinstance(read_motion(path, JOINT_NAMES), JointTrajectory)
+    wrong = JointTrajectory.from_seconds(JOINT_NAMES, times, at.q, factor * at.qd, factor * at.qdd)
+    write_trace(path, wrong)
+    with pytest.raises(InputError, match=r"rad in all, by its speeds it is .* which is right"):
+        read_motion(path, JOINT_NAMES)
+    write_trace(path, JointTrajectory.from_seconds(JOINT_NAMES, times, at.q, factor * at.qd))
+    assert not isinstance(read_motion(path, JOINT_NAMES), JointTrajectory)  # speeds alone are measured ones
+
+
+def test_one_cycle_is_taken_out_of_a_long_file() -> None:
+    rows = Rows(np.arange(10.0), np.zeros((10, 6)), ("a note",))
+    found = between(Path("t.csv"), rows, 3.0, 6.0)
+    np.testing.assert_array_equal(found.time, [0.0, 1.0, 2.0, 3.0])
+    assert found.notes == ("a note",)
+    for begin, end in ((6.0, 3.0), (100.0, 200.0), (float("nan"), 5.0)):
+        with pytest.raises(InputError, match=r"holds no two rows of t\.csv, which lasts 9 s"):
+            between(Path("t.csv"), rows, begin, end)
+
+
+@pytest.mark.parametrize("bandwidth", [-1.0, 0.001, 1e9, float("nan"), float("inf")])
+def test_a_bandwidth_that_makes_no_sense_is_refused(bandwidth: float) -> None:
+    """0.001 Hz smoothed the movement away and stated a bound of a fifth of the error."""
+    with pytest.raises(InputError, match="it must be 0, or 5 to 100 Hz"):
+        measured(JOINT_NAMES, 0.01 * np.arange(20.0), np.zeros((20, 6)), lambda _: 1.0, bandwidth)
+
+
+@pytest.mark.parametrize(("columns", "words"), [("{time: t, powr: P}", "'powr' is no column of a trace")])
+def test_a_name_that_a_mapping_gets_wrong_is_named(columns: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(f"format: ir_trace/1\ncolumns: {columns}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=words):
+        read_motion(TRACES / "rsi_log.csv", JOINT_NAMES, tmp_path / "m.yaml")
+
+
+def test_an_empty_column_is_named(tmp_path: Path) -> None:
+    head = "time," + ",".join(JOINT_NAMES)
+    (tmp_path / "t.csv").write_text(f"{head}\n0,0,0,,0,0,0\n1,0,0,,0,0,0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="the column of joint_a3 is empty"):
+        read_motion(tmp_path / "t.csv", JOINT_NAMES)
 
 
 def test_few_rows_are_a_sentence() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_recorder.errors import TraceError
@@ -66,7 +66,12 @@ def test_a_mapping_names_columns_units_and_the_clock(tmp_path: Path) -> None:
         ("time,power\n", "has 0 points"),
         ("time,power\n0,1\n1,1\n0.5,1\n", ":4: time is 0.5 s, it must increase"),
         ("time,power\n0,1\n\n\n1,1,1\n", ":5: has 3 values, the header names 2 columns"),
-        ("time,power\n0,1\n1,nan\n", ":3: power is 'nan', it must be finite"),
+        ("time,power\n0,1\n1,-inf\n", ":3: power is '-inf', it must be finite"),
+        ("time,power\n0,1\nnan,1\n", ":3: time is 'nan', it must be finite"),
+        ("time,power\n0,1\n1,2\n1,1\n", ":4: time is 1 s, it must increase"),
+        ("time,power\n0,1\n0,1\n1,2\n0.5,2\n", ":5: time is 0.5 s, it must increase"),
+        ("time,power\n0,1\n1,2\n2\n", ":4: has 1 values, the header names 2 columns"),
+        ("time,joint_a1,joint_a2,joint_a3\n0,1,1,1\n1,1,1,1\n", "joint_a3 is no joint of the robot"),
         ("time,power\n0,1\n1,1e999\n", ":3: power is '1e999', it must be finite"),
         ("time,power\n,1\n1,1\n", ":2: time is '', it must be a number"),
         ("time [parsec],power\n0,1\n1,1\n", "unit 'parsec' is unknown, known are s, ms"),
@@ -83,6 +88,41 @@ def test_what_makes_no_sense_is_named_with_its_line(
     with pytest.raises(TraceError) as caught:
         read_traces(written(tmp_path, content), joint_names=JOINTS)[0].joints(JOINTS)
     assert sentence in str(caught.value)
+
+
+def test_rows_said_twice_and_a_line_that_was_cut_are_left_out_with_a_sentence(tmp_path: Path) -> None:
+    text = "time;joint_a1;mode\n0;0,5;OFF\n0;0,5;OFF\n1;;OFF\n1;;OFF\n2;NaN;ON\n3;1,5"
+    (trace,) = read_traces(written(tmp_path, text), joint_names=JOINTS[:1])
+    np.testing.assert_array_equal(trace.time, [0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(trace.columns["joint_a1"], [0.5, np.nan, np.nan])
+    assert trace.texts["mode"] == ("OFF", "OFF", "ON")
+    assert trace.problems == (
+        "line 7, the last one, was cut: left out",
+        "2 rows repeat the one before: left out",
+    )
+
+
+@settings(max_examples=20)
+@given(
+    rows=st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=2, max_size=20),
+    sign=st.sampled_from(",;\t "),
+    end=st.sampled_from(("\n", "\r\n", "\r")),
+)
+def test_every_writing_of_the_same_numbers_is_read_alike(
+    rows: list[tuple[float, float, float]], sign: str, end: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Plain lines, which NumPy's parser reads, and the same ones in quotes, which it doesn't."""
+    lines = [[repr(float(k)), *map(repr, row)] for k, row in enumerate(rows)]
+    for quote in ("", '"'):
+        cells = [
+            ["time", "power", "joint_a1", "other"],
+            *([f"{quote}{one}{quote}" for one in row] for row in lines),
+        ]
+        text = "".join(sign.join(row) + end for row in cells)
+        folder = tmp_path_factory.mktemp("alike")
+        (trace,) = read_traces(written(folder, text), joint_names=JOINTS[:1])
+        np.testing.assert_array_equal(trace.columns["power"], [row[0] for row in rows])
+        np.testing.assert_array_equal(trace.columns["joint_a1"], [row[1] for row in rows])
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     else:
         sys.stdout.write(sentence_of(found.report) + "\n")
         if known is not None:
-            sys.stdout.write(known.sentence + "\n")
+            sys.stdout.write("\n".join(known.sentences) + "\n")
         if verification.violation is not None:
             sys.stdout.write(f"violated: {verification.status.message}\n")
     return 0 if verification.certified else FAILED

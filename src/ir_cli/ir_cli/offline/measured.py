@@ -22,6 +22,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ..errors import InputError
 
 BANDWIDTHS = (8.0, 11.0, 16.0, 22.0)  # Hz
+_LOWEST, _HIGHEST = 5.0, 100.0  # Hz: below it the movement itself is smoothed away
 _DEGREE = 5
 _ROWS_PER_KNOT = 2.0  # at least: fewer leave the ends of the spline to the noise
 _REPEATS = 4
@@ -33,6 +34,7 @@ _AT_REST = 0.02  # rad/s: a trace that ends with less ends at rest
 _DIFFERENCES = np.sqrt(20.0)  # the third difference of noise is so many times larger
 _ROWS_MAX = 200_000
 _PERIOD_MAX = 0.1  # s between rows: the least bandwidth needs as many
+_PERIOD_MIN = 1e-4  # s: no controller logs faster
 Joules = Callable[[JointTrajectory], float]
 
 
@@ -40,7 +42,7 @@ Joules = Callable[[JointTrajectory], float]
 class Measured:
     """A motion from positions alone: its bandwidth [Hz], the rate [Hz] and the noise [rad] (one standard
     deviation, worst joint) of the positions, the joules that the noise adds, and the bound [J] within which
-    the energy holds.
+    the energy holds. notes: what was left out of the file or assumed of it.
     """
 
     trajectory: JointTrajectory
@@ -49,10 +51,15 @@ class Measured:
     noise: float
     noise_joules: float
     bound: float
+    notes: tuple[str, ...] = ()
 
     @property
-    def sentence(self) -> str:
-        """What is to be known about an energy of this motion."""
+    def sentences(self) -> tuple[str, ...]:
+        """What is to be known about an energy of this motion: its worth, then the notes."""
+        return (self._worth, *self.notes)
+
+    @property
+    def _worth(self) -> str:
         return (
             f"from positions alone ({self.rate:.0f} Hz, {1e3 * self.noise:.3f} mrad of noise), smoothed at "
             f"{self.bandwidth:g} Hz: the energy holds within {self.bound:.0f} J, of which noise adds about "
@@ -96,12 +103,23 @@ def measured(
     leaves least open of its energy. InputError for too few or too many rows.
     """
     if not 8 <= len(time) <= _ROWS_MAX:
-        raise InputError(f"{len(time)} rows of positions alone: 8 to {_ROWS_MAX} can be smoothed")
+        raise InputError(
+            f"{len(time)} rows of positions alone: 8 to {_ROWS_MAX} can be smoothed; --between takes one "
+            "cycle out of a long file"
+        )
     period = float(np.median(np.diff(time)))
+    if period < _PERIOD_MIN:
+        raise InputError(
+            f"the rows are {period:.3g} s apart, no log has less than {_PERIOD_MIN:g} s: is the unit right?"
+        )
     if period > _PERIOD_MAX:
         raise InputError(
             f"the rows are {period:.3g} s apart: positions alone say how the robot moved where that is at "
             f"most {_PERIOD_MAX:g} s; is the unit of time right?"
+        )
+    if bandwidth != 0.0 and not _LOWEST <= bandwidth <= _HIGHEST:
+        raise InputError(
+            f"the bandwidth is {bandwidth:g} Hz: it must be 0, or {_LOWEST:g} to {_HIGHEST:g} Hz"
         )
     tried = [bandwidth] if bandwidth > 0.0 else BANDWIDTHS
     found = [_worth(names, time, positions, joules, one) for one in tried]
@@ -126,7 +144,8 @@ def _worth(
     period = float(np.median(np.diff(time)))
     share = _LEAST + (_COARSE_SHARE if period > _COARSE else 0.0)
     bound = added + 2.0 * float(np.std(noisy)) + _LOST * abs(again - once) + share * abs(once)
-    return Measured(motion, bandwidth, 1.0 / period, float(noise.max()), added, bound)
+    used = min(bandwidth, 0.5 / (_ROWS_PER_KNOT * period))  # as fine as the rows allow
+    return Measured(motion, used, 1.0 / period, float(noise.max()), added, bound)
 
 
 def _noise(time: FloatArray, positions: FloatArray, seen: FloatArray) -> FloatArray:

@@ -56,6 +56,6 @@ def run_optimize(arguments: argparse.Namespace) -> int:
         print_json({"before": before, "after": figures_of(found.after)})
         return 0
     said = [f"before: {sentence_of(found.before)}"]
-    said += [known.sentence] if known is not None else []
+    said += known.sentences if known is not None else ()
     sys.stdout.write("\n".join([*said, f"after: {sentence_of(found.after)}"]) + "\n")
     return 0

@@ -31,7 +31,7 @@ def today_of_trace(arguments: argparse.Namespace, planner: Planner, path: Path) 
     stretches, lost = stretches_of(motion, recorded_doors(path, planner.cell))
     if not stretches:
         raise InputError(f"{path}: the robot does not move in it")
-    notes = [] if known is None else [known.sentence]
+    notes = [] if known is None else list(known.sentences)
     if lost >= PAUSE:
         notes.append(f"{lost:.1f} s of standstill before the first and after the last movement are left out")
     notes += _meter(arguments, planner, path)

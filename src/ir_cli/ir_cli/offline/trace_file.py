@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces import Trace, read_mapping, read_traces
-from ir_recorder.traces.trace import ACCELERATION, GAP_FACTOR, VELOCITY
+from ir_recorder.traces import Trace, TraceMapping, column_names, read_mapping, read_traces
+from ir_recorder.traces.trace import ACCELERATION, EFFORT, GAP_FACTOR, VELOCITY
 
 from ..errors import InputError
 from .measured import BANDWIDTHS, smoothed
@@ -27,6 +28,9 @@ from .measured import BANDWIDTHS, smoothed
 ENDINGS = ("", VELOCITY, ACCELERATION)
 DAY = 86400.0  # s
 _SAME_PLACE = 0.001  # rad
+_NEAR = 0.02  # s: rows that lie nearer say by themselves how fast a joint is
+_APART = 0.2  # share of a joint's motion that its speeds may be off: encoders' noise is far less
+_ROWS_COMPARED = 8
 
 
 def write_trace(path: Path, trajectory: JointTrajectory) -> None:
@@ -63,20 +67,27 @@ def read_trace(path: Path, joint_names: Sequence[str]) -> JointTrajectory:
     found = read_motion(path, joint_names)
     if isinstance(found, JointTrajectory):
         return found
-    times, positions = found
-    return smoothed(tuple(joint_names), times, positions, BANDWIDTHS[-1])
+    return smoothed(tuple(joint_names), found.time, found.positions, BANDWIDTHS[-1])
+
+
+class Rows(NamedTuple):
+    """Positions alone: time (N,) [s] from 0 on, positions (N, n) [rad], and what was left out of the file."""
+
+    time: FloatArray
+    positions: FloatArray
+    notes: tuple[str, ...] = ()
 
 
 def read_motion(
     path: Path, joint_names: Sequence[str], mapping: Path | None = None
-) -> JointTrajectory | tuple[FloatArray, FloatArray]:
-    """The trajectory of a trace that gives speeds, else its positions alone: time (N,) [s], q (N, n).
+) -> JointTrajectory | Rows:
+    """The trajectory of a trace that gives speeds and accelerations, else its positions alone.
 
     What a recording or a mapped file gives is measured: its positions count. InputError with the line and
     the column that is wrong, and for a gap in which the robot moved.
     """
     try:
-        meaning = read_mapping(mapping) if mapping is not None else None
+        meaning = _mapping(mapping, joint_names) if mapping is not None else None
         trace = read_traces(path, meaning, joint_names)[0]
         positions = trace.joints(joint_names)
         velocities = trace.joints(joint_names, VELOCITY)
@@ -89,20 +100,58 @@ def read_motion(
     times = trace.time
     if not 0.0 <= times[0] <= DAY:  # of a clock that knows the date
         times = times - times[0]
-    if velocities is None or mapping is not None or path.suffix.lower() == ".mcap":
-        return _without_holes(trace.source, times, positions)
+    if accelerations is None or mapping is not None or path.suffix.lower() == ".mcap":
+        return _without_holes(trace, times, positions, joint_names)
     try:
-        return JointTrajectory.from_seconds(joint_names, times, positions, velocities, accelerations)
+        found = JointTrajectory.from_seconds(joint_names, times, positions, velocities, accelerations)
     except MsgsError as error:
         raise InputError(f"{trace.source}: {error}") from error
+    _check_speeds(trace.source, found)
+    return found
 
 
-def _without_holes(source: str, times: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Time (N,) from 0 on, and positions (N, n) of the rows that have all.
+def _mapping(path: Path, joint_names: Sequence[str]) -> TraceMapping:
+    """The mapping of a file. InputError for a name that is no column of a trace of this robot."""
+    found = read_mapping(path)
+    known = column_names(joint_names)
+    unknown = next((name for name in found.columns if name not in known), None)
+    if unknown is not None:
+        others = ", ".join(sorted(name for name in known if not name.startswith(tuple(joint_names))))
+        raise InputError(
+            f"{path}: {unknown[:40]!r} is no column of a trace: known are {others}, and "
+            f"{', '.join(joint_names)}, also with {VELOCITY}, {ACCELERATION} and {EFFORT}"
+        )
+    return found
 
-    InputError for a gap in which the robot moved.
-    """
-    whole = np.isfinite(positions).all(axis=1)
+
+def _check_speeds(source: str, motion: JointTrajectory) -> None:
+    """InputError where rows (N, n) that lie near each other have speeds that their positions contradict."""
+    q, qd, qdd = motion.positions, motion.velocities, motion.accelerations
+    assert qd is not None and qdd is not None  # noqa: PT018 - both were given
+    steps = np.diff(motion.times)[:, None]
+    if len(q) < _ROWS_COMPARED or np.median(steps) > _NEAR:
+        return
+    said = 0.5 * steps * (qd[1:] + qd[:-1]) + steps**2 / 12.0 * (qdd[:-1] - qdd[1:])
+    moved = np.diff(q, axis=0)
+    apart, path = np.abs(said - moved).sum(axis=0), np.abs(moved).sum(axis=0)
+    j = int(np.argmax(apart - _APART * path))
+    if apart[j] > _APART * path[j] + _SAME_PLACE:
+        raise InputError(
+            f"{source}: {motion.joint_names[j]} moves by {path[j]:.4g} rad in all, by its speeds it is "
+            f"{np.abs(said[:, j]).sum():.4g} rad: which is right? Without columns of speed or acceleration "
+            "the positions alone count"
+        )
+
+
+def _without_holes(
+    trace: Trace, times: FloatArray, positions: FloatArray, joint_names: Sequence[str]
+) -> Rows:
+    """The rows that have the positions of all joints. InputError for a gap in which the robot moved."""
+    source, known = trace.source, np.isfinite(positions)
+    empty = np.flatnonzero(~known.any(axis=0))
+    if len(empty):
+        raise InputError(f"{source}: the column of {joint_names[int(empty[0])]} is empty")
+    whole = known.all(axis=1)
     times, positions = times[whole], positions[whole]
     if len(times) < 2:
         raise InputError(f"{source}: {len(times)} rows have the positions of all joints")
@@ -114,4 +163,4 @@ def _without_holes(source: str, times: FloatArray, positions: FloatArray) -> tup
             f"{source}: between {times[k]:.3f} s and {times[k + 1]:.3f} s there are no rows, and the robot "
             f"moved by {moved[k]:.3f} rad: nobody knows how"
         )
-    return times - times[0], positions
+    return Rows(times - times[0], positions, trace.problems)

@@ -41,7 +41,7 @@ def with_meter(recording: Recording, path: str | Path, mapping: TraceMapping | N
     if power is None or len(power.time) < 2:
         raise TraceError(f"{recording.path} has no readings that a meter could be laid onto")
     mapping = mapping or TraceMapping()
-    trace = read_traces(path, mapping)[0]
+    trace = read_traces(path, mapping, joint_names=())[0]
     joules = trace.joules()
     if joules is None:
         raise TraceError(f"{trace.source}: has neither power nor energy")

@@ -2,7 +2,7 @@
 
 from ir_recorder.traces.align import ClockOffset, clock_offset, mean_power, resampled
 from ir_recorder.traces.mapping import TraceMapping, read_mapping
-from ir_recorder.traces.reader import read_traces
+from ir_recorder.traces.reader import column_names, read_traces
 from ir_recorder.traces.trace import Trace
 
 __all__ = [
@@ -10,6 +10,7 @@ __all__ = [
     "Trace",
     "TraceMapping",
     "clock_offset",
+    "column_names",
     "mean_power",
     "read_mapping",
     "read_traces",

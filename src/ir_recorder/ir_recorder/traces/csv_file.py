@@ -1,8 +1,9 @@
-"""Traces as CSV: a line of headings, then numbers; commas, semicolons or tabs between them.
+"""Traces as CSV: a line of headings, then numbers; commas, semicolons, tabs or spaces between them.
 
-Read in blocks, so that memory holds the wanted columns only. An empty cell is a missing value. Where
-semicolons or tabs separate, commas may be decimal. Time may be written as date and time of ISO 8601. The text
-is UTF-8, or UTF-16 with its byte order mark ("Unicode text" of a spreadsheet).
+Read in blocks, so that memory holds the wanted columns only. An empty cell and NaN are missing values. Where
+no commas separate, they may be decimal. Time may be written as date and time of ISO 8601. A row that says the
+same as the one before, and a last line that was cut, are left out; the trace's problems say so. The text is
+UTF-8, or UTF-16 with its byte order mark ("Unicode text" of a spreadsheet).
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ import csv
 import os
 import stat
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
-from itertools import islice
+from itertools import compress, islice, pairwise
 from pathlib import Path
 from sys import intern
 from types import MappingProxyType
@@ -21,7 +22,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_recorder.errors import TraceError
 from ir_recorder.traces.mapping import TraceMapping
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
@@ -40,7 +41,7 @@ def read_csv(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
     """The trace of a CSV file; TraceError with the line and the column that is wrong."""
     with _opened(path) as file:
         try:
-            return _Reader(path, file, wanted, mapping).trace()
+            return _Reader(path, file, wanted, mapping, _cut(file)).trace()
         except csv.Error as error:
             raise TraceError(f"{path}: {error}") from error
 
@@ -63,17 +64,35 @@ def _opened(path: Path) -> TextIO:
     return os.fdopen(descriptor, encoding="utf-16" if utf_16 else "utf-8-sig", errors="replace", newline="")
 
 
+def _cut(file: TextIO) -> bool:
+    """Whether the last line lacks its end: what writes the file may have been stopped in it."""
+    size = os.fstat(file.fileno()).st_size
+    end = os.pread(file.fileno(), 2, max(size - 2, 0)).strip(b"\0")  # UTF-16 has two bytes for each
+    return not end.endswith((b"\r", b"\n"))
+
+
 class _Reader:
-    def __init__(self, path: Path, file: Iterator[str], wanted: Wanted, mapping: TraceMapping) -> None:
-        self._path, self._mapping = path, mapping
+    """cut: the last line has no end; one that lacks values is left out then."""
+
+    def __init__(
+        self, path: Path, file: Iterator[str], wanted: Wanted, mapping: TraceMapping, cut: bool
+    ) -> None:
+        self._path, self._mapping, self._cut = path, mapping, cut
         self._file, self._begin = file, 0
+        self._problems: list[str] = []
         header = self._header()
-        self._delimiter = max(";\t,", key=header.count)
-        self._headings = [each.strip() for each in next(csv.reader([header], delimiter=self._delimiter), [])]
+        self._delimiter = max(
+            ";\t, ", key=lambda sign: (header.count(sign) > 0, sign != " ", header.count(sign))
+        )
+        self._headings = [each.strip() for each in next(self._split([header]), [])]
         self._places = self._chosen(wanted)
         if TIME not in self._places:
             known = ", ".join(self._headings)[:200]
             raise TraceError(f"{path}:{self._begin}: there is no column time, there is: {known}")
+
+    def _split(self, lines: Iterable[str]) -> Iterator[list[str]]:
+        """Rows of cells; several spaces separate as one does."""
+        return csv.reader(lines, delimiter=self._delimiter, skipinitialspace=self._delimiter == " ")
 
     def _header(self) -> str:
         for line in self._file:
@@ -110,22 +129,59 @@ class _Reader:
         numbers = [name for name in self._places if name not in _WORDS]
         texts: dict[str, list[str]] = {name: [] for name in self._places if name in _WORDS}
         blocks, lines, size, line = [], [], 0, self._begin
-        rows = csv.reader(self._file, delimiter=self._delimiter)
-        while block := list(islice(rows, _BLOCK)):
-            own = [(line + k, row) for k, row in enumerate(block, 1) if row]
-            blocks.append(self._block(own, numbers))
-            lines.append(np.array([number for number, _ in own], np.int64))
-            for name, words in texts.items():
-                words.extend(intern(row[self._places[name][0]].strip()) for _, row in own)
+        following = list(islice(self._file, _BLOCK))
+        while block := following:
+            following = list(islice(self._file, _BLOCK))
+            plain = None if texts else self._plain(block, numbers)
+            if plain is not None:
+                blocks.append(plain)
+                lines.append(line + 1 + np.arange(len(block)))
+            else:
+                own = self._rows(block, line, last=not following)
+                blocks.append(self._block(own, numbers))
+                lines.append(np.array([number for number, _ in own], np.int64))
+                for name, words in texts.items():
+                    words.extend(intern(row[self._places[name][0]].strip()) for _, row in own)
             line, size = line + len(block), size + blocks[-1].size
             if size > VALUES_MAX:
                 raise TraceError(f"{self._path}:{line}: more than {VALUES_MAX} values, the limit")
         values = np.concatenate(blocks) if blocks else np.empty((0, len(numbers)))
         columns = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(numbers)}
+        spoken = {name: tuple(each) for name, each in texts.items()}
+        still = not (np.diff(columns[TIME]) > 0.0).all()
+        if still and not (kept := _once(values, spoken)).all():
+            self._problems.append(f"{np.count_nonzero(~kept)} rows repeat the one before: left out")
+            columns = {name: each[kept] for name, each in columns.items()}
+            spoken = {name: tuple(compress(each, kept)) for name, each in spoken.items()}
+            lines = [np.concatenate(lines)[kept]]
         time = columns.pop(TIME)
         self._check_time(time, lines)
-        spoken = MappingProxyType({name: tuple(each) for name, each in texts.items()})
-        return Trace(str(self._path), time, MappingProxyType(columns), spoken, sampled=self._mapping.sampled)
+        texts_of = MappingProxyType(spoken)
+        problems, sampled = tuple(self._problems), self._mapping.sampled
+        return Trace(str(self._path), time, MappingProxyType(columns), texts_of, problems, sampled)
+
+    def _rows(self, block: Sequence[str], before: int, last: bool) -> list[tuple[int, list[str]]]:
+        """The lines of a block as rows of cells with their numbers; blank ones are none."""
+        own = [(before + k, row) for k, row in enumerate(self._split(block), 1) if row]
+        if self._cut and last and own and len(own[-1][1]) < len(self._headings):
+            self._problems.append(f"line {own.pop()[0]}, the last one, was cut: left out")
+        return own
+
+    def _plain(self, block: Sequence[str], names: Sequence[str]) -> FloatArray | None:
+        """Values of these columns (rows, names) in SI where the lines hold finite numbers alone, by NumPy's
+        parser; None where anything else is in them.
+        """
+        between = len(self._headings) - 1
+        if any(line.count(self._delimiter) != between for line in block):
+            return None
+        places = [self._places[name][0] for name in names]
+        try:
+            values = np.loadtxt(block, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2)
+        except ValueError:
+            return None
+        if values.shape != (len(block), len(names)) or not np.isfinite(values).all():
+            return None
+        return np.asarray(values * [self._places[name][1] for name in names])
 
     def _block(self, rows: Sequence[tuple[int, Sequence[str]]], names: Sequence[str]) -> FloatArray:
         """Values of these columns (rows, names) in SI."""
@@ -147,7 +203,7 @@ class _Reader:
         except ValueError:
             value = self._unusual(text.strip(), name, line)
         else:
-            if value - value != 0.0:  # inf or nan, written out
+            if value - value != 0.0 and (value == value or name == TIME):  # inf; nan is a missing value
                 raise TraceError(f"{self._path}:{line}: {name} is {text[:40]!a}, it must be finite")
         return value
 
@@ -172,6 +228,16 @@ class _Reader:
                 f"{self._path}:{line}: time is {time[k]:.12g} s, it must increase: the row before has "
                 f"{time[k - 1]:.12g} s"
             )
+
+
+def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
+    """Which rows (N,) say something else than the one before, in values (N, columns) or words."""
+    before, after = values[:-1], values[1:]
+    kept = np.ones(len(values), bool)
+    kept[1:] = ((before != after) & ~(np.isnan(before) & np.isnan(after))).any(axis=1)
+    for words in spoken.values():
+        kept[1:] |= [first != second for first, second in pairwise(words)]
+    return kept
 
 
 def _named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
