@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from ir_cli.main import main
 from ir_msgs_py.before_after import BeforeAfter
@@ -61,6 +62,10 @@ def test_the_table_has_the_years_of_the_costs(compared: BeforeAfter, tmp_path: P
         rows = list(csv.DictReader(file))
     assert len(rows) == len(columns["program"])
     assert float(rows[row]["energy_j"]) == side.report.energy
+    stored = parquet.read_table(
+        write_before_after_table(compared, tmp_path / "table.parquet", Costs(price=0.5))
+    )
+    np.testing.assert_equal(stored.to_pydict(), columns)
 
 
 def test_the_command_writes_the_page_and_prints_the_figures(

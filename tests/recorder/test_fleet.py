@@ -7,12 +7,14 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pyarrow import parquet
 
 from ir_cli.main import main
 from ir_recorder import Analysis
 from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import Member, fleet_columns, fleet_html, member_of
+from ir_recorder.report.fleet import Member, fleet_columns, fleet_html, member_of, write_fleet_table
 from ir_recorder.report.fleet.totals import by_measure, by_mode, by_movement, robots_of, yearly_of
 
 
@@ -75,6 +77,11 @@ def test_the_command_sums_folders_up_and_names_what_it_leaves_out(
     with table.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["what"] == "cycle"]
     assert [row["robot"] for row in rows] == ["left", "right"]
+
+
+def test_the_table_as_parquet_has_the_same_columns(member: Member, tmp_path: Path) -> None:
+    stored = parquet.read_table(write_fleet_table([member], tmp_path / "fleet.parquet")).to_pydict()
+    np.testing.assert_equal(stored, fleet_columns([member]))
 
 
 def test_nothing_to_sum_up_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

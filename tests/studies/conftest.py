@@ -35,6 +35,7 @@ def fought(tmp_path: Path, command: tuple[str, ...]) -> Fought:
         seeds: int = 2,
         progress: Progress = nobody,
         hang_after: float = 60.0,
+        parquet: bool = False,
     ) -> Finished:
         settings = ArenaSettings(
             cells=("open",),
@@ -44,6 +45,7 @@ def fought(tmp_path: Path, command: tuple[str, ...]) -> Fought:
             seconds=0.01,
             hang_after=hang_after,
         )
-        return run_arena(settings, tmp_path / folder, Means(2, progress=progress, command=command))
+        means = Means(2, progress=progress, command=command)
+        return run_arena(settings, tmp_path / folder, means, parquet=parquet)
 
     return run

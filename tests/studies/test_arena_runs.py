@@ -8,10 +8,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pyarrow import parquet
 
 from ir_studies import Means
 from ir_studies.arena import ArenaSettings, Finished, run_arena
+from ir_studies.arena.table import columns
 from ir_studies.errors import FolderError, WorkerError
 from ir_studies.work.results import NAME
 
@@ -41,6 +44,13 @@ def test_what_hangs_is_cut_and_what_dies_is_tried_once_more(fought: Fought) -> N
     assert outcomes(hanging) == {"rrt": {"cut"}}
     assert [row["solved"] for row in table(hanging)] == ["0"] * 2
     assert {run.row["message"] for run in hanging.runs} == {"no answer within 1.01 s"}
+
+
+def test_the_table_as_parquet_has_the_same_columns(fought: Fought) -> None:
+    finished = fought("sbl", "prm", parquet=True)
+    stored = parquet.read_table(finished.files[1]).to_pydict()
+    np.testing.assert_equal(stored, columns(finished.runs))
+    assert stored["solved"] == [1, 0] * 2
 
 
 def test_interrupted_and_resumed_it_gives_the_same_table(fought: Fought, tmp_path: Path) -> None:

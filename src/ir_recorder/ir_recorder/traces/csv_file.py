@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import csv
 import os
-import stat
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from itertools import compress, islice, pairwise
 from pathlib import Path
@@ -24,42 +23,28 @@ import numpy as np
 
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_recorder.errors import TraceError
+from ir_recorder.traces.headings import Wanted, chosen
 from ir_recorder.traces.mapping import TraceMapping
+from ir_recorder.traces.regular_file import opened
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
-from ir_recorder.traces.units import parsed
 
-BYTES_MAX = 500_000_000
 VALUES_MAX = 50_000_000  # 400 MB of memory
 _BLOCK = 10_000  # lines that are converted at a time
-_WORDS = (MODE, LOAD)  # columns of words
-
-Wanted = Callable[[str], bool]
-"""Whether a column of this name is read where no mapping names the columns."""
+WORDS = (MODE, LOAD)  # columns of words
 
 
 def read_csv(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
     """The trace of a CSV file; TraceError with the line and the column that is wrong."""
-    with _opened(path) as file:
+    with _lines(path) as file:
         try:
             return _Reader(path, file, wanted, mapping, _cut(file)).trace()
         except csv.Error as error:
             raise TraceError(f"{path}: {error}") from error
 
 
-def _opened(path: Path) -> TextIO:
-    """A regular file of bounded size as lines; never waits on a FIFO or device."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise TraceError(f"{path}: can't be opened: {reason}") from error
-    status = os.fstat(descriptor)
-    fault = "is not a regular file" if not stat.S_ISREG(status.st_mode) else ""
-    if not fault and status.st_size > BYTES_MAX:
-        fault = f"has {status.st_size} bytes, at most {BYTES_MAX} are read"
-    if fault:
-        os.close(descriptor)
-        raise TraceError(f"{path}: {fault}")
+def _lines(path: Path) -> TextIO:
+    """The lines of a file in UTF-8 or, where it begins so, UTF-16."""
+    descriptor = opened(path)
     utf_16 = os.pread(descriptor, 2, 0) in (BOM_UTF16_LE, BOM_UTF16_BE)
     return os.fdopen(descriptor, encoding="utf-16" if utf_16 else "utf-8-sig", errors="replace", newline="")
 
@@ -85,10 +70,7 @@ class _Reader:
             ";\t, ", key=lambda sign: (header.count(sign) > 0, sign != " ", header.count(sign))
         )
         self._headings = [each.strip() for each in next(self._split([header]), [])]
-        self._places = self._chosen(wanted)
-        if TIME not in self._places:
-            known = ", ".join(self._headings)[:200]
-            raise TraceError(f"{path}:{self._begin}: there is no column time, there is: {known}")
+        self._places = chosen(self._headings, f"{path}:{self._begin}", wanted, mapping)
 
     def _split(self, lines: Iterable[str]) -> Iterator[list[str]]:
         """Rows of cells; several spaces separate as one does."""
@@ -104,30 +86,10 @@ class _Reader:
                 return line
         raise TraceError(f"{self._path}: has 0 points, a trace has at least 2")
 
-    def _chosen(self, wanted: Wanted) -> dict[str, tuple[int, float]]:
-        """Place and factor of each column by its name."""
-        where = f"{self._path}:{self._begin}"
-        places: dict[str, tuple[int, float]] = {}
-        for name, column in self._mapping.columns.items():
-            if column.heading not in self._headings:
-                known = ", ".join(self._headings)[:200]
-                raise TraceError(f"{where}: there is no column {column.heading[:80]!r}, there is: {known}")
-            places[name] = self._headings.index(column.heading), column.factor
-        if self._mapping.columns:
-            return places
-        for k, heading in enumerate(self._headings):
-            name, scale = _named(heading, where, wanted)
-            if not wanted(name):
-                continue
-            if name in places:
-                raise TraceError(f"{where}: column {name} is there twice")
-            places[name] = k, scale
-        return places
-
     def trace(self) -> Trace:
         """All rows."""
-        numbers = [name for name in self._places if name not in _WORDS]
-        texts: dict[str, list[str]] = {name: [] for name in self._places if name in _WORDS}
+        numbers = [name for name in self._places if name not in WORDS]
+        texts: dict[str, list[str]] = {name: [] for name in self._places if name in WORDS}
         blocks, lines, size, line = [], [], 0, self._begin
         following = list(islice(self._file, _BLOCK))
         while block := following:
@@ -238,11 +200,3 @@ def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
     for words in spoken.values():
         kept[1:] |= [first != second for first, second in pairwise(words)]
     return kept
-
-
-def _named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
-    """Name and factor of a heading; a unit in brackets has to be known only where the name is wanted."""
-    bare = heading.split("[")[0].split("(")[0].strip()
-    if wanted(heading) or (bare != heading and not wanted(bare)):
-        return heading, 1.0
-    return parsed(heading, where)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -10,10 +12,11 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.errors import TraceError
-from ir_recorder.traces.csv_file import VALUES_MAX, Wanted
+from ir_recorder.traces.csv_file import VALUES_MAX, WORDS
+from ir_recorder.traces.headings import Wanted, chosen
 from ir_recorder.traces.mapping import TraceMapping
-from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
-from ir_recorder.traces.units import parsed
+from ir_recorder.traces.regular_file import opened
+from ir_recorder.traces.trace import TIME, Trace
 
 
 def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
@@ -23,53 +26,52 @@ def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
     except ImportError as error:
         raise TraceError(f"{path}: Parquet needs pyarrow: pip install pyarrow") from error
     try:
-        file = parquet.ParquetFile(path)
-        places = _places(path, [str(name) for name in file.schema_arrow.names], wanted, mapping)
-        if file.metadata.num_rows * len(places) > VALUES_MAX:
-            raise TraceError(f"{path}: more than {VALUES_MAX} values, the limit")
-        table = file.read(columns=[heading for heading, _ in places.values()])
-        words = {
-            name: tuple(str(each) for each in table.column(heading).to_pylist())
-            for name, (heading, _) in places.items()
-            if name in (MODE, LOAD)
-        }
-        columns = {
-            name: scale * _numbers(path, table.column(heading), name)
-            for name, (heading, scale) in places.items()
-            if name not in words
-        }
+        with os.fdopen(opened(path), "rb") as stream:
+            file = parquet.ParquetFile(stream)
+            places = chosen([str(name) for name in file.schema_arrow.names], str(path), wanted, mapping)
+            if file.metadata.num_rows * len(places) > VALUES_MAX:
+                raise TraceError(f"{path}: more than {VALUES_MAX} values, the limit")
+            table = _read(file, [place for place, _ in places.values()])
     except (ArrowException, OSError) as error:
         raise TraceError(f"{path}: {error}") from error
+    columns, texts = dict[str, FloatArray](), dict[str, tuple[str, ...]]()
+    for (name, (_, scale)), column in zip(places.items(), table, strict=True):
+        if name in WORDS:
+            texts[name] = tuple("" if each is None else str(each).strip() for each in column.to_pylist())
+        else:
+            columns[name] = scale * _numbers(path, column, name)
     time = columns.pop(TIME)
-    return Trace(str(path), time, MappingProxyType(columns), MappingProxyType(words), sampled=mapping.sampled)
+    return Trace(str(path), time, MappingProxyType(columns), MappingProxyType(texts), sampled=mapping.sampled)
 
 
-def _places(
-    path: Path, headings: list[str], wanted: Wanted, mapping: TraceMapping
-) -> dict[str, tuple[str, float]]:
-    """Heading and factor of each column by its name."""
-    if mapping.columns:
-        places = {name: (column.heading, column.factor) for name, column in mapping.columns.items()}
-    else:
-        named = {heading: parsed(heading, str(path)) for heading in headings if not wanted(heading)}
-        places = {name: (heading, scale) for heading, (name, scale) in named.items() if wanted(name)}
-        places |= {heading: (heading, 1.0) for heading in headings if wanted(heading)}
-    missing = [heading for heading, _ in places.values() if heading not in headings]
-    if missing or TIME not in places:
-        known = ", ".join(headings)[:200]
-        raise TraceError(f"{path}: there is no column {(missing or [TIME])[0]}, there is: {known}")
-    return places
+def _read(file: Any, places: list[int]) -> list[Any]:
+    """The columns at these places of the schema; only they are read."""
+    names = [file.schema_arrow.names[place] for place in places]
+    table = file.read(columns=names)
+    return [table.column(name) for name in names]
+
+
+def _numeric(types: Any) -> tuple[Callable[[Any], bool], ...]:
+    """What holds numbers; a column without a single value is of type null."""
+    return types.is_integer, types.is_floating, types.is_decimal, types.is_null
 
 
 def _numbers(path: Path, column: Any, name: str) -> FloatArray:
-    """Values (N,); a date becomes seconds."""
-    values = column.to_numpy()
-    if np.issubdtype(values.dtype, np.datetime64):
-        return np.asarray(values.astype("datetime64[ns]").astype(np.int64) * 1e-9, np.float64)
-    try:
-        numbers = np.array(values, np.float64)
-    except (TypeError, ValueError) as error:
-        raise TraceError(f"{path}: column {name} holds no numbers: {error}") from error
-    if np.isinf(numbers).any() or (name == TIME and np.isnan(numbers).any()):
-        raise TraceError(f"{path}: row {int(np.argmax(~np.isfinite(numbers)))} of {name} must be finite")
+    """Values (N,), NaN where a cell is empty; times may be dates. TraceError for what is no number."""
+    from pyarrow import ArrowException, types
+
+    if name == TIME and types.is_timestamp(column.type):
+        instants = column.to_numpy().astype("datetime64[ns]")
+        numbers = np.where(np.isnat(instants), np.nan, instants.astype(np.int64) * 1e-9)
+    elif any(each(column.type) for each in _numeric(types)):
+        try:
+            numbers = np.array(column.cast("float64").to_numpy(), np.float64)
+        except ArrowException as error:
+            raise TraceError(f"{path}: column {name}: {error}") from error
+    else:
+        raise TraceError(f"{path}: column {name} is of {column.type}, it must be of numbers")
+    wrong = np.flatnonzero(~np.isfinite(numbers) if name == TIME else np.isinf(numbers))
+    if len(wrong):
+        row = int(wrong[0])
+        raise TraceError(f"{path}: row {row + 1}: {name} is {numbers[row]:g}, it must be finite")
     return numbers

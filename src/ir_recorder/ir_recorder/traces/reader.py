@@ -8,7 +8,8 @@ from pathlib import Path
 from ir_msgs_py.names import JOINT_NAMES
 from ir_recorder.errors import TraceError
 from ir_recorder.read.reader import read_recording
-from ir_recorder.traces.csv_file import Wanted, read_csv
+from ir_recorder.traces.csv_file import read_csv
+from ir_recorder.traces.headings import Wanted
 from ir_recorder.traces.mapping import TraceMapping
 from ir_recorder.traces.parquet_file import read_parquet
 from ir_recorder.traces.recorded import recorded_traces
