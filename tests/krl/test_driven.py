@@ -90,6 +90,24 @@ def test_a_circ_is_round(planner: Planner, followed: Follow) -> None:
     assert places[:, 2].max() == pytest.approx(places[0, 2] + 0.2, abs=1e-4)
 
 
+@pytest.mark.parametrize("angle", ["", ",CA 90", ",CA 360"])
+def test_an_arc_in_a_spline_is_the_circle(planner: Planner, followed: Follow, angle: str) -> None:
+    begin = START + "LIN {X 1500,Y 0,Z 1200,A 0,B 90,C 0}\n"
+    arc = f"SCIRC {{X 1500,Y 100,Z 1300}},{{X 1500,Y 200,Z 1200}}{angle}"
+    _, alone = steps_of(followed(begin + arc), planner)
+    _, block = steps_of(followed(f"{begin}SPLINE\n{arc}\nENDSPLINE"), planner)
+    assert block.duration == pytest.approx(alone.duration, rel=0.02)
+    chain = planner.scene("none").chain
+    places = chain.tcp_poses(block.sample(np.linspace(0.0, block.duration, 200)).q)[:, :3, 3]
+    ends = [chain.tcp_poses(one.positions[-1:])[0, :3, 3] for one in (alone, block)]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
+    begins = chain.tcp_poses(alone.positions[:1])[0, :3, 3]
+    others = chain.tcp_poses(alone.sample(np.linspace(0.0, alone.duration, 7)[1:4]).q)[:, :3, 3]
+    centre = begins + np.array([0.0, 0.1, 0.0])
+    for found in (places, others):
+        np.testing.assert_allclose(np.linalg.norm(found - centre, axis=1), 0.1, atol=1e-5)
+
+
 def test_ca_sets_the_angle_of_a_circ(planner: Planner, followed: Follow) -> None:
     (trajectory,) = steps_of(followed(START + "CIRC_REL {Y 200,Z 200},{Y 400,Z 0}, CA 90"), planner)
     ends = planner.scene("none").chain.tcp_poses(trajectory.positions[[0, -1]])[:, :3, 3]

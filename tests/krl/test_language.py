@@ -57,6 +57,18 @@ WAITS = {  # statements that end in WAIT SEC of what they compute
     "a comparison is weaker than AND": ("IF (1<2) AND (3<4) THEN\nWAIT SEC 1\nENDIF", 1.0),
     "NOT": ("IF NOT FALSE THEN\nWAIT SEC 1\nENDIF", 1.0),
     "EXOR": ("IF TRUE EXOR FALSE THEN\nWAIT SEC 1\nENDIF", 1.0),
+    "a group of outputs": (
+        "SIGNAL G $OUT[3] TO $OUT[6]\nG=5\nIF $OUT[5] AND NOT $OUT[4] THEN\nWAIT SEC G\nENDIF",
+        5.0,
+    ),
+    "an output that was never set": ("IF NOT $OUT[3] THEN\nWAIT SEC 1\nENDIF", 1.0),
+    "a wait that may end by a timer": (
+        "$TIMER[1]=-5000\n$TIMER_STOP[1]=FALSE\nIF NOT $TIMER_FLAG[1] THEN\nWAIT SEC 2\nENDIF",
+        2.0,
+    ),
+    "VARSTATE": ('DECL INT N\nIF VARSTATE("N")==#DECLARED THEN\nN=1\nENDIF\nWAIT SEC N', 1.0),
+    "messages": ('MsgNotify("Größe")\nWAIT SEC 1', 1.0),
+    "loads of the controller": ("$LOAD=LOAD_DATA[2]\n$LOAD.M=10.0\nWAIT SEC 1", 1.0),
     "comments": ("WAIT SEC 1 ; and no more", 1.0),
     "folds": (";FOLD INI;%{PE}\nWAIT SEC 2\n;ENDFOLD (INI)", 2.0),
     "frames compose": (
@@ -70,7 +82,7 @@ WAITS = {  # statements that end in WAIT SEC of what they compute
 @pytest.mark.parametrize("name", WAITS)
 def test_what_a_program_computes(name: str, followed: Follow) -> None:
     lines, seconds = WAITS[name]
-    (wait,) = followed(lines).commands
+    *_, wait = followed(lines).commands
     assert isinstance(wait, Wait)
     assert wait.seconds == pytest.approx(seconds, abs=1e-9)
 
@@ -105,6 +117,24 @@ REFUSED = {
     "an INT beyond its range": ("WAIT SEC 99999*99999", "1:10", "an INT is at most 2147483647"),
     "an INT of many digits": ("WAIT SEC " + "9" * 6000, "1:10", "6000 digits"),
     "a loop that squares": ("X=2\nWHILE TRUE\nX=X*X\nENDWHILE", None, "an INT is at most"),
+    "a component that no position has": ("PTP {A1 0,A7 5}", "1:5", "A7 is no component of a position"),
+    "an external axis that moves": ("PTP {A1 0,E1 0}\nPTP {A1 5,E1 500}", "2:5", "E1 moves from 0 to 500"),
+    "an external axis by steps": ("PTP_REL {E1 10,A1 0}", "1:9", "E1 moves from 0 to 10"),
+    "a condition of an unknown name": ("WAIT FOR $IN[1] OR PART_THER", "1:20", "PART_THER isn't declared"),
+    "a system variable": ("IF $MODE_OP==#EX THEN\nENDIF", "1:4", "$MODE_OP has no value: it is known on"),
+    "a group that can't hold a number": ("SIGNAL G $OUT[1] TO $OUT[2]\nG=4", "2:1", "it can't hold 4"),
+    "a group of inputs that is set": ("SIGNAL G $IN[1] TO $IN[2]\nG=1", "2:1", "it can't be set"),
+    "a group that ends before it begins": (
+        "SIGNAL G $OUT[4] TO $OUT[2]",
+        "1:1",
+        "must be a group of 1 to 32",
+    ),
+    "a group of an input that isn't given": (
+        "SIGNAL G $IN[1] TO $IN[2]\nSWITCH G\nCASE 1\nENDSWITCH",
+        "2:8",
+        "$IN[1]",
+    ),
+    "a routine of another file": ("OTHER()", "1:1", "there is no routine OTHER in the files that are given"),
     "a component twice": ("PTP {A1 0,A1 1}", "1:11", "component A1 is given twice"),
 }
 
@@ -127,6 +157,8 @@ SYNTAX = {
     "a loop that isn't closed": ("LOOP\nWAIT SEC 1", 4, 1),
     "an aggregate that isn't closed": ("PTP {A1 0", 2, 10),
     "analog outputs": ("ANOUT ON X = 1", 2, 1),
+    "a statement that is none": ("  ON_ERROR_PROCEED", 2, 3),
+    "a call without brackets": ("  OPEN_GRIPPER", 2, 3),
 }
 
 
@@ -258,6 +290,48 @@ def test_spline_blocks_and_time_blocks(followed: Follow) -> None:
     assert len(block.parts) == 2
     (times,) = block.times
     assert (times.first, times.last, times.marks, times.seconds) == (0, 2, ((1, 25.0),), 3.5)
+
+
+def test_a_group_of_inputs_chooses_the_case(followed: Follow) -> None:
+    """SWITCH of a group took the first input alone, and another branch, with a note."""
+    cases = "CASE 1,2\nWAIT SEC 1\nCASE 6\nWAIT SEC 6\nDEFAULT\nWAIT SEC 9"
+    lines = f"SIGNAL TYPE $IN[11] TO $IN[13]\nSWITCH TYPE\n{cases}\nENDSWITCH"
+    for value in range(8):
+        inputs = {11 + k: bool(value >> k & 1) for k in range(3)}
+        (wait,) = followed(lines, inputs=inputs).commands
+        assert isinstance(wait, Wait)
+        assert wait.seconds == {1: 1.0, 2: 1.0, 6: 6.0}.get(value, 9.0)
+
+
+def test_what_a_spline_does_meanwhile_is_noted(followed: Follow) -> None:
+    lines = (
+        "SPLINE\nSPL {X 1}\nCONST_VEL START=10 ONSTART\nSTOP WHEN PATH=5 IF $IN[3]\nSPL {X 2}\n"
+        "CONST_VEL END=-10\nSPL {X 3}\nENDSPLINE"
+    )
+    program = followed(lines)
+    (block,) = program.commands
+    assert isinstance(block, SplineBlock)
+    assert len(block.parts) == 3
+    assert [note.text.split(" ")[0] for note in program.notes] == ["CONST_VEL", "STOP", "CONST_VEL"]
+
+
+def test_triggers_of_a_spline_switch_around_it(followed: Follow) -> None:
+    """They switched at the next motion after it, and its process was nobody's."""
+    program = followed(
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE\nSPLINE\nSPL {X 1}\n"
+        "TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[2]=TRUE\nSPL {X 2}\n"
+        "TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[2]=FALSE\n"
+        "TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[3]=FALSE\nTRIGGER WHEN PATH=0 DELAY=0 DO $OUT[3]=TRUE\n"
+        "SPL {X 3}\nENDSPLINE\nPTP {A1 0}"
+    )
+    found = [(one.number, one.value) if isinstance(one, SetOutput) else "moves" for one in program.commands]
+    assert found == [(1, True), (2, True), "moves", (2, False), (3, False), (3, True), "moves"]
+
+
+def test_an_external_axis_that_stands_is_noted(followed: Follow) -> None:
+    assert followed("PTP {A1 0,E1 0.0,E2 0.0}\nPTP {A1 5}").notes == ()
+    (note,) = followed("PTP {A1 0,E1 500}").notes
+    assert note.text == "E1 stays at 500: external axes are taken as part of the cell"
 
 
 def test_an_endless_loop_is_followed_once_and_says_so(followed: Follow) -> None:

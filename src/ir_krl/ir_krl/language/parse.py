@@ -28,6 +28,8 @@ _SPELLED = {  # what a user calls the parser's terminals
     "NUMBER": "a number",
     "STRING": "a text",
     "ENUM_VALUE": "a value such as #BASE",
+    "APPROXIMATE": "C_PTP, C_DIS, C_VEL, C_ORI or C_SPL",
+    "COMPARED": "a comparison",
     "$END": "the end of the file",
     "EQUAL": "=",
     "LPAR": "(",
@@ -48,6 +50,11 @@ _KNOWN_ELSEWHERE = {  # constructs of KRL that aren't read: named, so that nobod
     "CWRITE": "channels",
     "CREAD": "channels",
     "COPEN": "channels",
+    "CHANNEL": "channels",
+    "IMPORT": "variables of other modules",
+    "ON_ERROR_PROCEED": "what follows an error",
+    "CONFIRM": "messages",
+    "STOP": "stops of a spline by a condition, outside of a SPLINE",
 }
 
 
@@ -175,6 +182,11 @@ def _complaint(error: Any, text: str) -> tuple[str, int]:
     first = line.split()[0].upper() if line.split() else ""
     if first in _KNOWN_ELSEWHERE:
         return f"{first} ({_KNOWN_ELSEWHERE[first]}) isn't read", line.upper().index(first) + 1
+    if {"LPAR", "EQUAL"} <= set(error.expected) and not line[: error.column - 1].split()[1:]:
+        name = first[:40]
+        return f"{name} is no statement of KRL: a call has brackets, an assignment =", line.upper().index(
+            name
+        ) + 1
     word = str(error.token).strip()
     found = f"{word[:40]!r}" if word else "the line ends, or the file"
     expected = sorted(_spelled(name) for name in error.expected)

@@ -68,7 +68,11 @@ class Control:
 
     def note(self, tree: Tree | Word, text: str) -> None:
         """Note once what a reader should know."""
-        note = Note(self.place(tree), text)
+        self.note_at(self.place(tree), text)
+
+    def note_at(self, place: Place, text: str) -> None:
+        """The same of a place."""
+        note = Note(place, text)
         if note not in self.notes:
             self.notes.append(note)
 
@@ -157,6 +161,12 @@ class Control:
     def _halt(self, tree: Tree) -> None:
         self.note(tree, "HALT waits for the operator: taken as no pause")
 
+    def _const_vel(self, tree: Tree) -> None:
+        self.note(tree, "CONST_VEL isn't modelled: the tool accelerates and brakes within the range as well")
+
+    def _stop_when(self, tree: Tree) -> None:
+        self.note(tree, "STOP WHEN isn't followed: taken as not stopping")
+
     def _continue_(self, tree: Tree) -> None:
         """Keeps the advance run going: an output that follows is set without a stop."""
 
@@ -176,7 +186,19 @@ class Control:
             self.commands.append(Wait(seconds, self.place(tree)))
 
     def _wait_for(self, tree: Tree) -> None:
+        self._check_names(tree.children[0])
         self.commands.append(WaitFor(_written(tree.children[0]), self.place(tree)))
+
+    def _check_names(self, tree: Any) -> None:
+        """Raise KrlRunError for a name in a condition that nothing is known of."""
+        if isinstance(tree, Tree) and tree.data == "access":
+            name = str(tree.children[0])
+            signals, memory = self.expressions.signals, self.memory
+            declared = name in signals.aliases or name in signals.groups or memory.declared(name)
+            if not declared and not name.startswith("$"):
+                raise KrlRunError(f"{name} isn't declared", self.place(tree))
+        for child in tree.children if isinstance(tree, Tree) else ():
+            self._check_names(child)
 
 
 def _written(tree: Any) -> str:

@@ -11,6 +11,7 @@ from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
 from ir_krl.run.frames import FRAME_NAMES, frame, pose
 from ir_krl.run.memory import Memory, Step
+from ir_krl.run.signals import SINGLE, Signals
 from ir_krl.run.values import (
     INT_MAX,
     Structure,
@@ -44,11 +45,10 @@ Caller = Callable[[str, list[Any], Place], Value]
 
 @dataclass
 class Expressions:
-    """Evaluates trees in a memory. `aliases` are the signals by name; `read_input` gives $IN[number]."""
+    """Evaluates trees in a memory; `call` calls functions."""
 
     memory: Memory
-    aliases: dict[str, tuple[Step, ...]]
-    read_input: Callable[[int, Place], bool]
+    signals: Signals
     call: Caller
     file: str = ""
 
@@ -70,7 +70,7 @@ class Expressions:
         steps: list[Step] = []
         for name, index in zip(access.children[::2], access.children[1::2], strict=True):
             steps.append((str(name), None if index is None else self.index(index)))
-        return self.aliases.get(steps[0][0], tuple(steps)) if len(steps) == 1 else tuple(steps)
+        return self.signals.aliases.get(steps[0][0], tuple(steps)) if len(steps) == 1 else tuple(steps)
 
     def index(self, tree: Tree) -> tuple[int, ...] | None:
         """Whole numbers of an index; None for []."""
@@ -83,8 +83,10 @@ class Expressions:
     def _access(self, tree: Tree, place: Place) -> Value:
         path = self.path(tree)
         name, index = path[0]
-        if name == "$IN" and index is not None:
-            return self.read_input(index[0], place)
+        if index is None and name in self.signals.groups:
+            return self.signals.group_value(name, place)
+        if index is not None and name in SINGLE:
+            return self.signals.read(name, index[0], place)
         return self.memory.get(path, place)
 
     def _call(self, tree: Tree, place: Place) -> Value:

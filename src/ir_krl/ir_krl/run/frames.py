@@ -12,6 +12,7 @@ from ir_msgs_py.arrays import FloatArray
 PLACE_NAMES = ("X", "Y", "Z")
 ANGLE_NAMES = ("A", "B", "C")
 FRAME_NAMES = (*PLACE_NAMES, *ANGLE_NAMES)
+EXTERNAL_NAMES = ("E1", "E2", "E3", "E4", "E5", "E6")
 AXIS_NAMES = ("A1", "A2", "A3", "A4", "A5", "A6")
 _MM = 1e-3  # m
 

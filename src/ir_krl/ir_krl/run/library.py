@@ -19,6 +19,9 @@ WITHOUT_EFFECT = frozenset(
         "BAS_EX",
         "H70",
         "IR_STOPM",
+        "MSGNOTIFY",
+        "MSGQUIT",
+        "MSGSTATE",
         "SET_CD_PARAMS",
         "SGEAR_JERK",
         "SJERK",
@@ -57,6 +60,7 @@ class Library:
             "STOOL2": lambda given, place: self._tool(_component(given, "TOOL_NO", place), place),
             "STOOL": lambda given, place: self._tool(_whole(given, "STOOL", place), place),
             "SBASE": lambda given, place: self._base(_whole(given, "SBASE", place), place),
+            "VARSTATE": self._state,
             "INV_POS": lambda given, place: frame(
                 inverse(pose(_first(given, "INV_POS", place), "INV_POS", place))
             ),
@@ -148,6 +152,15 @@ class Library:
             return
         path: tuple[Step, ...] = ((variable, None), (component, None)) if component else ((variable, None),)
         self._memory.set(path, value, Place())
+
+    def _state(self, arguments: Arguments, place: Place) -> Value:
+        """VARSTATE("NAME"): whether a variable has a value."""
+        name = _first(arguments, "VARSTATE", place)
+        if not isinstance(name, str):
+            raise KrlRunError(f"VARSTATE is given {kind_of(name)}, not the name of a variable", place)
+        if self._memory.has(name.upper()):
+            return Symbol("INITIALIZED")
+        return Symbol("DECLARED" if self._memory.declared(name.upper()) else "UNDEFINED")
 
     def _all_axes(self, name: str) -> Callable[[Arguments, Place], Value]:
         def applied(arguments: Arguments, place: Place) -> Value:

@@ -28,13 +28,14 @@ class Scope:
 @dataclass
 class Memory:
     """`shared` holds what is known everywhere, `modules` the data lists by the names of their modules,
-    `scopes` the calls that run. module: whose statements run.
+    `scopes` the calls that run. module: whose statements run; listed: all names that data lists declare.
     """
 
     shared: dict[str, Value]
     scopes: list[Scope] = field(default_factory=list)
     modules: dict[str, dict[str, Value]] = field(default_factory=dict)
     module: str = ""
+    listed: set[str] = field(default_factory=set)
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
         """A call begins, with these parameters and their values."""
@@ -50,6 +51,7 @@ class Memory:
             self.scopes[-1].names.add(name)
             home = self.scopes[-1].values
         else:
+            self.listed.add(name)
             home = self.shared if everywhere else self._own()
         if value is not None:
             home[name] = value
@@ -57,6 +59,11 @@ class Memory:
     def has(self, name: str) -> bool:
         """Whether a variable of this name has a value."""
         return name in self._home(name)
+
+    def declared(self, name: str) -> bool:
+        """Whether a variable of this name is declared where statements run, with or without a value."""
+        own = self.scopes[-1].names if self.scopes else set()
+        return self.has(name) or name in own or name in self.listed
 
     def get(self, path: tuple[Step, ...], place: Place) -> Value:
         """The value at a path such as XP1.X or BASE_DATA[2]. Raises KrlRunError."""
@@ -68,7 +75,8 @@ class Memory:
                     f"{name} is known on the controller only: a program that computes with it isn't read",
                     place,
                 )
-            raise KrlRunError(f"{name} has no value", place)
+            where = ": it is known on the controller only" if name.startswith("$") else ""
+            raise KrlRunError(f"{name} has no value{where}", place)
         value = _element(home[name], name, index, place)
         written = name if index is None else f"{name}[{', '.join(map(str, index))}]"
         for part, part_index in rest:

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import get_args
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
 from ir_krl.run.commands import Blend, Kind, Motion, Speeds, Target
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.frames import FRAME_NAMES, axes, components, is_axis_value, pose
+from ir_krl.run.frames import AXIS_NAMES, EXTERNAL_NAMES, FRAME_NAMES, axes, components, is_axis_value, pose
 from ir_krl.run.memory import Memory
 from ir_krl.run.system import AXES, FULL, STANDING
 from ir_krl.run.values import Structure, Symbol, integer, kind_of, number
 
+_COMPONENTS = frozenset((*FRAME_NAMES, *AXIS_NAMES, *EXTERNAL_NAMES, "S", "T"))
+_STANDS = 1e-3  # mm or deg: an external axis that moves by less stands
 _KINDS: dict[str, Kind] = {kind: kind for kind in get_args(Kind)}
 _MM = 1e-3  # m
 _BLEND_WORDS = {"C_PTP": "CPTP", "C_DIS": "CDIS", "C_ORI": "CORI", "C_VEL": "CVEL", "C_SPL": "CDIS"}
 
 
 class Motions:
-    """Builds motions from trees; `expressions` evaluates what stands in them."""
+    """Builds motions from trees; `expressions` evaluates what stands in them, `noted` hears assumptions."""
 
-    def __init__(self, expressions: Expressions, memory: Memory) -> None:
-        self._expressions = expressions
-        self._memory = memory
+    def __init__(self, expressions: Expressions, memory: Memory, noted: Callable[[Place, str], None]) -> None:
+        self._expressions, self._memory, self._noted = expressions, memory, noted
+        self._external: dict[str, float] = {}  # where the external axes stand, as the program says
 
     def motion(self, tree: Tree) -> Motion:
         """One of PTP, LIN, CIRC and their relatives, SPL. Raises KrlRunError."""
@@ -52,6 +55,7 @@ class Motions:
         value = self._expressions.value(tree)
         if not isinstance(value, Structure):
             raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
+        self._check_components(value, relative, place)
         base, tool = (
             pose(self._memory.get(((name, None),), place), name, place) for name in ("$BASE", "$TOOL")
         )
@@ -65,6 +69,18 @@ class Motions:
             integer(value.fields[part], part, place) if part in value.fields else None for part in ("S", "T")
         )
         return Target(None, frame, status, turn, relative, in_tool, base, tool, name)
+
+    def _check_components(self, value: Structure, relative: bool, place: Place) -> None:
+        """Raise KrlRunError for a component that no position has, and for an external axis that moves."""
+        unknown = next((name for name in value.fields if name not in _COMPONENTS), None)
+        if unknown is not None:
+            raise KrlRunError(f"{unknown} is no component of a position", place)
+        for name, at in components(value, EXTERNAL_NAMES, place).items():
+            before = self._external.setdefault(name, 0.0 if relative else at)
+            if abs(at if relative else at - before) > _STANDS:
+                raise KrlRunError(f"{name} moves from {before:g} to {at:g}: external axes aren't read", place)
+            if before != 0.0:
+                self._noted(place, f"{name} stays at {before:g}: external axes are taken as part of the cell")
 
     def _here(self, name: str, place: Place) -> Target:
         """Where the robot stands: PTP $AXIS_ACT, as programs begin."""

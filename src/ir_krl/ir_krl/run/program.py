@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Routine, Source, Tree, place_of
-from ir_krl.run.commands import Command, Motion, SetOutput, SplineBlock, TimeBlock
-from ir_krl.run.control import Control, LoopExit, Note, Returned
+from ir_krl.run.commands import Command, SetOutput
+from ir_krl.run.control import LoopExit, Note, Returned
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import Library
 from ir_krl.run.memory import Memory
 from ir_krl.run.motions import Motions
+from ir_krl.run.moving import Moving
 from ir_krl.run.routines import Routines, module_of
+from ir_krl.run.signals import OUTPUT, SIGNALS, Signals
 from ir_krl.run.system import HARMLESS, MODELLED, system_variables
 from ir_krl.run.values import Array, Symbol, Value, copied, kind_of, typed
 from ir_msgs_py.arrays import FloatArray
@@ -23,8 +25,6 @@ GLOBAL, CONFIGURATION = "GLOBAL", "$CONFIG"
 NESTED = "brackets, signs or blocks are nested too deeply"
 DEPTH_MAX = 60
 """Calls within calls."""
-OUTPUTS = 8192
-"""A KR C4 has $OUT[1] to $OUT[8192]."""
 
 
 @dataclass(frozen=True)
@@ -68,15 +68,15 @@ def follow(
     return Followed(name, tuple(run.commands), tuple(run.notes))
 
 
-class _Run(Control):
+class _Run(Moving):
     """Calls, declarations and motions, beside the control structures."""
 
     def __init__(self, routines: Routines, memory: Memory, inputs: dict[int, bool], loop_passes: int) -> None:
         super().__init__(memory, loop_passes)
-        self._routines, self._inputs = routines, inputs
-        self._library = Library(memory)
-        self.expressions = Expressions(memory, {}, self._input, self._called)
-        self._motions = Motions(self.expressions, memory)
+        self._routines, self._library = routines, Library(memory)
+        self._signals = Signals(memory, inputs, self.note_at)
+        self.expressions = Expressions(memory, self._signals, self._called)
+        self._motions = Motions(self.expressions, memory, self.note_at)
         self._triggers: list[tuple[float, Tree]] = []
 
     def data(self, body: Tree, file: str) -> None:
@@ -130,31 +130,35 @@ class _Run(Control):
 
     def _signal(self, tree: Tree) -> None:
         name, first, last = tree.children
-        if last is not None:
-            self.note(tree, f"the group signal {name} isn't modelled")
-        self.expressions.aliases[str(name)] = self.expressions.path(first)
+        end = None if last is None else self.expressions.path(last)
+        self._signals.declare(str(name), self.expressions.path(first), end, self.place(tree))
 
     def _assignment(self, tree: Tree) -> None:
         access, expression = tree.children
         path, value = self.expressions.path(access), self.expressions.value(expression)
-        name, index = path[0]
-        if name == "$OUT" and index is not None:
+        (name, index), where = path[0], self.place(tree)
+        if name in self._signals.groups and index is None:
+            for number, level in self._signals.group_bits(name, value, where):
+                self._set_output(number, level, where)
+            return
+        if name == OUTPUT and index is not None:
             if not isinstance(value, bool):
-                raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", self.place(tree))
-            where = self.place(tree)
-            self.commands.append(SetOutput(_output(index[0], where), value, where, on_path=self.continuing))
-        elif name == "$IPO_MODE" and value != Symbol("BASE"):
-            raise KrlRunError(
-                f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", self.place(tree)
-            )
-        elif name.startswith("$") and name not in MODELLED and name not in HARMLESS:
+                raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", where)
+            self._set_output(index[0], value, where)
+            return
+        if name == "$IPO_MODE" and value != Symbol("BASE"):
+            raise KrlRunError(f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", where)
+        if name.startswith("$") and name not in MODELLED and name not in HARMLESS:
             self.note(tree, f"{name} isn't modelled")
-        self.memory.set(path, value, self.place(tree))
+        self.memory.set(path, value, where)
 
-    def _input(self, number_: int, place: Place) -> bool:
-        if number_ not in self._inputs:
-            raise KrlRunError(f"the value of $IN[{number_}] decides something here and isn't given", place)
-        return self._inputs[number_]
+    def _set_output(self, number: float, level: bool, place: Place, pulse: float = 0.0) -> None:
+        """Set a digital output. Raises KrlRunError for one that no controller has."""
+        if number != int(number) or not 1 <= number <= SIGNALS:
+            raise KrlRunError(f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place)
+        self.commands.append(SetOutput(int(number), level, place, pulse, self.continuing))
+        if pulse == 0.0:
+            self.memory.set(((OUTPUT, (int(number),)),), level, place)
 
     # calls
 
@@ -173,7 +177,7 @@ class _Run(Control):
             values = [None if one is None else self.expressions.value(one) for one in trees]
             return self._library.call(name, values, place)
         if routine is None:
-            raise KrlRunError(f"there is no routine {name}", place)
+            raise KrlRunError(f"there is no routine {name} in the files that are given", place)
         values = [None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)]
         result = self.routine(routine, values, place)
         left = self.memory.leave()
@@ -197,7 +201,7 @@ class _Run(Control):
             raise KrlRunError(f"PULSE sets outputs, not {name}", place)
         seconds = self.expressions.number(trees[2], "the time of PULSE")
         level = self.expressions.truth(trees[1], "the value of PULSE")
-        self.commands.append(SetOutput(_output(index[0], place), level, place, seconds, self.continuing))
+        self._set_output(index[0], level, place, seconds)
         return 0
 
     # interrupts
@@ -211,85 +215,3 @@ class _Run(Control):
         """Interrupts aren't followed: their declaration says so."""
 
     _brake = _resume = _interrupt_switched
-
-    def _trigger(self, tree: Tree) -> None:
-        when, where, delay, action = tree.children[0], *tree.children[1:4]
-        at = self.expressions.number(where, str(when))
-        if str(when) not in ("DISTANCE", "PATH") or self.expressions.number(delay, "DELAY") != 0.0:
-            self.note(tree, "a TRIGGER acts at an end of its motion: path and delay aren't modelled")
-        self._triggers.append((at if str(when) == "DISTANCE" else 1.0, action))
-
-    # motions
-
-    def _ptp(self, tree: Tree) -> None:
-        due, self._triggers = self._triggers, []
-        self._act(action for at, action in due if at == 0.0)
-        self.commands.append(self._with_settings(tree, lambda: self._motions.motion(tree)))
-        self._act(action for at, action in due if at != 0.0)
-
-    def _act(self, actions: Iterable[Tree]) -> None:
-        """What triggers do while the robot moves."""
-        for action in actions:
-            self.continuing = True
-            getattr(self, f"_{action.data}")(action)
-        self.continuing = False
-
-    _lin = _circ = _ptp
-
-    def _spline_block(self, tree: Tree) -> None:
-        self.commands.append(self._with_settings(tree, lambda: self._block(tree)))
-
-    def _with_settings(self, tree: Tree, build: Any) -> Any:
-        """Build with what stands after WITH; it holds for this motion only."""
-        settings = next(
-            child for child in tree.children if isinstance(child, Tree) and child.data == "settings"
-        )
-        assignments = [one for one in settings.children if one is not None]
-        if not assignments:
-            return build()
-        shared = self.memory.shared
-        before = {name: copied(value) for name, value in shared.items() if name.startswith("$")}
-        for assignment in assignments:
-            self._assignment(assignment)
-        built = build()
-        for name in [name for name in shared if name.startswith("$") and name not in before]:
-            del shared[name]
-        shared.update(before)
-        return built
-
-    def _block(self, tree: Tree) -> SplineBlock:  # long: one case per line of a block
-        word, _, *parts, approximation = tree.children
-        motions: list[Motion] = []
-        times: list[TimeBlock] = []
-        start: int | None = None
-        marks: list[tuple[int, float]] = []
-        for part in parts:
-            match part.data:
-                case "time_start":
-                    start, marks = len(motions), []
-                case "time_part":
-                    marks.append((len(motions), self.expressions.number(part.children[0], "TIME_BLOCK PART")))
-                case "time_end":
-                    seconds = self.expressions.number(part.children[0], "TIME_BLOCK END")
-                    if start is None or seconds <= 0.0 or start == len(motions):
-                        raise KrlRunError(
-                            "TIME_BLOCK END needs a START, motions and a time above 0 s", self.place(part)
-                        )
-                    times.append(TimeBlock(start, len(motions), tuple(marks), seconds, self.place(part)))
-                    start = None
-                case "assignment" | "trigger":
-                    getattr(self, f"_{part.data}")(part)
-                case _:
-                    motions.append(self._with_settings(part, lambda part=part: self._motions.motion(part)))
-        if not motions:
-            raise KrlRunError("a spline block without motions", self.place(tree))
-        axis = str(word) == "PTP_SPLINE"
-        blend = self._motions.blend(approximation)
-        return SplineBlock(axis, tuple(motions), tuple(times), self.place(tree), blend)
-
-
-def _output(number: float, place: Place) -> int:
-    """The number of an output. Raises KrlRunError for one that no controller has."""
-    if number != int(number) or not 1 <= number <= OUTPUTS:
-        raise KrlRunError(f"$OUT[{number:g}]: outputs have whole numbers from 1 to {OUTPUTS}", place)
-    return int(number)

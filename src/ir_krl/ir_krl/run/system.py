@@ -69,6 +69,7 @@ def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
         "$WORLD": Structure(dict(NULL)),
         "$ROBROOT": Structure(dict(NULL)),
         "TOOL_DATA": Array({(n,): tool_frame.copied() for n in range(1, TOOLS + 1)}),
+        "LOAD_DATA": Array({(n,): Structure({}, "LOAD") for n in range(1, TOOLS + 1)}),
         "BASE_DATA": Array({(n,): Structure(dict(NULL)) for n in range(1, BASES + 1)}),
         "XHOME": Structure(dict(angles), "E6AXIS"),
         "$H_POS": Structure(dict(angles), "E6AXIS"),

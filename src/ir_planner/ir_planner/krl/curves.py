@@ -77,15 +77,21 @@ def tool_ends(motion: Motion, start: FloatArray, arm: Arm) -> tuple[FloatArray, 
     its base, and the places between. Raises KrlMotionError.
     """
     first = arm.tool_pose(motion.target, start)
+    last, path = drawn_from(motion, first, arm)
+    return first, last, path
+
+
+def drawn_from(motion: Motion, first: FloatArray, arm: Arm) -> tuple[FloatArray, Arc | Line]:
+    """The same from a pose (4, 4) of its tool in its base: where it ends, and the places between."""
     last = arm.pose(motion.target, first)
     if motion.keeps_orientation:
         last[:3, :3] = first[:3, :3]
     if motion.via is None:
-        return first, last, Line(first[:3, 3], last[:3, 3])
+        return last, Line(first[:3, 3], last[:3, 3])
     arc = arc_through(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion.angle)
     if arc is None:
         raise KrlMotionError("CIRC: start, auxiliary point and end lie on a line", motion.place)
-    return first, last, arc
+    return last, arc
 
 
 def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:

@@ -158,6 +158,8 @@ class _Drive:
             self._step(driven, (block.place,), moves=True)
             return
         curve = block_curve(block, self.here, self.arm)
+        if any(part.speeds != block.parts[0].speeds for part in block.parts):
+            self.notes.append(Note(block.place, "parts have speeds of their own: driven as its first part"))
         least = sum(one.seconds for one in block.times)
         drawn = None if block.axis else tool_spline(block, self.here, self.arm)
         self._drive(curve, block, block.parts[0].speeds, drawn, least)

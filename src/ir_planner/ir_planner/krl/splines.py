@@ -2,23 +2,27 @@
 
 Assumptions, where KUKA publishes no formula: a PTP_SPLINE is the interpolating spline of degree five through
 its points; with one TIME_BLOCK over all of its parts it passes them at the marked times, at rest at both
-ends. A SPLINE is the same of the tool, straight between the ends of its SLIN parts as far as a spline
-through points of the line is.
+ends. A SPLINE is the same of the tool, straight between the ends of its SLIN parts and round along its SCIRC
+parts as far as a spline through their points is, at the speeds of its first part.
 """
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
-from ir_krl import KrlMotionError, SplineBlock, TimeBlock
+from ir_krl import KrlMotionError, Motion, SplineBlock, TimeBlock
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.krl.curves import AxisCurve, followed, through_axes
+from ir_planner.cartesian import Line
+from ir_planner.krl.curves import AxisCurve, drawn_from, followed, through_axes
 from ir_planner.krl.geometry import Arm
 from ir_planner.krl.passing import resting_spline
 from ir_planner.timing import GRID_NS, GRID_S
 
 _LINE_POINTS = 9  # of an SLIN part, so that the spline through them is straight
+_ARC_STEP = np.radians(
+    5.0
+)  # between points of an SCIRC part: the spline leaves the arc by 1e-6 of its radius
 _STEP_M = 4e-3
 _SAMPLES_MIN, _SAMPLES_MAX = 33, 20_001
 _DEGREE = 5
@@ -84,14 +88,34 @@ def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
     first = block.parts[0]
     poses = [arm.tool_pose(first.target, start)]
     for part in block.parts:
-        if part.kind in ("ptp", "circ"):
-            raise KrlMotionError(f"{part.kind.upper()} inside of SPLINE isn't read", part.place)
+        if part.kind == "ptp":
+            raise KrlMotionError("a SPLINE has SPL, SLIN and SCIRC parts only, no SPTP", part.place)
         if not np.array_equal(part.target.base, first.target.base) or not np.array_equal(
             part.target.tool, first.target.tool
         ):
             raise KrlMotionError("a SPLINE keeps its tool and its base", part.place)
-        poses += _line(poses[-1], arm.pose(part.target, poses[-1]), _LINE_POINTS if part.kind == "lin" else 1)
+        poses += _part(part, poses[-1], arm)
     return np.array(poses)
+
+
+def _part(part: Motion, now: FloatArray, arm: Arm) -> list[FloatArray]:
+    """Poses (4, 4) after `now` (4, 4) that a part passes: its end, and before it what makes it round."""
+    if part.kind == "spl":
+        end = arm.pose(part.target, now)
+        end[:3, :3] = now[:3, :3] if part.keeps_orientation else end[:3, :3]
+        return [end]
+    last, path = drawn_from(part, now, arm)
+    count = (
+        _LINE_POINTS
+        if isinstance(path, Line)
+        else max(int(np.ceil(abs(path.angle) / _ARC_STEP)), _LINE_POINTS)
+    )
+    share = np.linspace(0.0, 1.0, count + 1)[1:]
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, 3] = path.at(share * path.length)
+    ends = Rotation.from_matrix(np.stack([now[:3, :3], last[:3, :3]]))
+    poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(share).as_matrix()
+    return list(poses)
 
 
 def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
@@ -110,13 +134,3 @@ def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     q = followed(along, first, start, arm)
     turning = float(Rotation.from_matrix(stacked[0, :3, :3].T @ stacked[-1, :3, :3]).magnitude())
     return AxisCurve(make_interp_spline(fine, q, k=_DEGREE), length, turning)
-
-
-def _line(first: FloatArray, last: FloatArray, count: int) -> list[FloatArray]:
-    """`count` poses (4, 4) on the straight line, without its first end."""
-    share = np.linspace(0.0, 1.0, count + 1)[1:]
-    poses = np.tile(np.eye(4), (count, 1, 1))
-    poses[:, :3, 3] = first[:3, 3] + share[:, None] * (last[:3, 3] - first[:3, 3])
-    ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
-    poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(share).as_matrix()
-    return list(poses)
