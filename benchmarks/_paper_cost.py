@@ -17,7 +17,7 @@ from scipy.stats import kendalltau
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import movement_cost
 
-PAIRS, QUICK_PAIRS = 1000, 60  # per seed
+PAIRS, QUICK_PAIRS = 2000, 60  # per seed
 RANKS = 0.8  # rank correlation from which on W puts about four of five random pairs in the order of joules
 LOSES = 5.0  # % of the least joules that a choice by W may cost
 DIRECTIONS = ("up", "down", "level")

@@ -71,11 +71,11 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         ("drives", "of the drives, in their movements"),
         ("mains", "at the mains, pauses included"),
     ):
-        saved = [row[key] for row in rows]
+        saved, programs = [row[key] for row in rows], [(row["cell"], row["stops"]) for row in rows]
         count = len(saved), "programs"
-        share = interval(lambda x: 100.0 * float(np.mean(x)), saved)
-        line = interval(lambda x: robot * float(np.mean(x)), saved)
-        left = interval(lambda x: after(float(np.mean(x))), saved)
+        share = interval(lambda x: 100.0 * float(np.mean(x)), saved, groups=programs)
+        line = interval(lambda x: robot * float(np.mean(x)), saved, groups=programs)
+        left = interval(lambda x: after(float(np.mean(x))), saved, groups=programs)
         found += [
             Statement(f"energy {what}: saved at equal cycle time", "mean", *share, *count, "%"),
             Statement(f"energy {what}: the line saves more than its PLCs and network take",

@@ -20,10 +20,16 @@ of them with small samples; rows as JSON and CSV are in `out/paper`.
 
 A statement **holds** where the whole 95 % interval (bootstrap over what was drawn independently; Wilson's for
 shares that never vary) keeps its bound, it **does not hold** where none of the interval does, else it
-**cannot be decided**. All of it is done with {seeds} seeds that share nothing: where one seed alone says
-otherwise, it cannot be decided either, and the row says so. `measured` claims nothing; `calibration` is no
-evidence, the data were made to fit. All energies are predicted by the planner's model of robot and drives, no
-robot was measured; times are processor times{machine}.
+**cannot be decided**. All of it is done with {seeds} that share nothing: where one seed alone says otherwise,
+it cannot be decided either, and the row says so, and how much larger a sample would decide it if the figure
+stays. `measured` claims nothing; `calibration` is no evidence, the data were made to fit. All energies are
+predicted by the planner's model of robot and drives, no robot was measured; times are processor
+times{machine}.
+
+How large the samples are follows from a pilot with seeds 0 and 1, whose draws are not used here: where an
+interval was too wide to decide, the sample grew with the square of its width over its distance to the bound, on
+whichever side of it the figure was, as far as an hour of processor time for all claims allows; where a fraction
+would have decided it stayed. What is drawn independently are cells and movements, not the searches in them.
 """
 
 
@@ -38,9 +44,12 @@ class Chapter:
     seconds: float
 
 
-def page(chapters: Sequence[Chapter], missing: Sequence[str], seeds: int, machine: str, quick: bool) -> str:
+def page(
+    chapters: Sequence[Chapter], missing: Sequence[str], seeds: Sequence[int], machine: str, quick: bool
+) -> str:
     """The whole page."""
-    parts = [HEAD.format(seeds=seeds, machine=f" on {machine}" if machine else "")]
+    named = f"{'seeds' if len(seeds) > 1 else 'seed'} {' and '.join(map(str, seeds))}"
+    parts = [HEAD.format(seeds=named, machine=f" on {machine}" if machine else "")]
     if quick:
         parts.append("**Short version**: small samples; nothing here is to be quoted.\n")
     parts.append(_summary(chapters))
@@ -60,7 +69,8 @@ def _summary(chapters: Sequence[Chapter]) -> str:
         anchor = "".join(c for c in anchor if c.isalnum() or c in " -_").replace(" ", "-")
         line: Row = {"claim": f"[{chapter.experiment.title}](#{anchor})"}
         line |= {verdict: counted[verdict] or "" for verdict in JUDGED}
-        rows.append(line | {"no claim": sum(counted.values()) - sum(counted[v] for v in JUDGED) or ""})
+        line |= {"no claim": sum(counted.values()) - sum(counted[v] for v in JUDGED) or ""}
+        rows.append(line | {"processor time": f"{chapter.seconds:.0f} s"})
     return table(rows) + "\n"
 
 

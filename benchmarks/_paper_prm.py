@@ -12,7 +12,8 @@ from _paper_zones import KINDS, MOST, questions
 from _regional_tasks import tasks_of
 
 DRAWS, EDGES = 8, 15_000  # of each planner per task; checks
-TASKS, PLACES = 4, 2  # tasks of cells, and as many of each type of zones, in so many cells per seed
+TASKS, PLACES, AMONG = 5, 4, 2  # tasks of cells; cells of each type of zones per seed, and movements in each
+_SEEDS = 2000  # between the cells of two seeds, which are others than those of the claims on zones
 MOSTLY = 0.8  # share of the draws that must be solved: where checks end the others, time can't vary
 CELLS = ("open", "table_columns", "cnc_door")
 OTHERS = ("kpiece", "bkpiece", "lbkpiece", "sbl", "rrt", "rrt_connect", "tree", "genetic")
@@ -22,26 +23,34 @@ def measure(seed: int, quick: bool) -> list[Row]:
     """A row per search: tasks whose straight movement is not free, planner and draw."""
     draws = 5 if quick else DRAWS
     rows = []
-    for label, question in _blocked(seed, quick):
+    for place, label, question in _blocked(seed, quick):
         for planner in ("prm", *OTHERS):
             for draw in range(draws):
                 found = searched(planner, question, draw + draws * seed, EDGES)
-                row = {"task": f"{label} {seed}", "draw": draw, "planner": planner, "solved": found.solved}
+                row = {"place": f"{place} {seed}", "task": f"{label} {seed}", "draw": draw}
+                row |= {"planner": planner, "solved": found.solved}
                 rows.append(row | {"edges": found.edges, "seconds": found.seconds})
     return rows
 
 
-def _blocked(seed: int, quick: bool) -> list[tuple[str, Question]]:
-    """Questions whose straight movement is not free: tasks of cells, and among MOST zones of each type."""
+def _blocked(seed: int, quick: bool) -> list[tuple[str, str, Question]]:
+    """Questions whose straight movement is not free: tasks of cells, and among MOST zones of each type; each
+    with where it is asked (there and back, and movements among the same zones, are one place) and its name.
+    """
     tasks = [task for cell in CELLS for task in tasks_of(cell)]
-    asked = [(task.label, Question(task.scene, task.start, task.goal, task.margin)) for task in tasks]
-    blocked = [one for one in asked if not one[1].straight_is_free()]
+    asked = [
+        (" ".join((task.cell, *sorted(task.name.split("->")))), task.label,
+         Question(task.scene, task.start, task.goal, task.margin))
+        for task in tasks
+    ]  # fmt: skip
+    blocked = [one for one in asked if not one[2].straight_is_free()]
     chosen = np.random.default_rng(5).permutation(len(blocked))[seed % 2 :: 2]
     found = [blocked[k] for k in chosen[: 1 if quick else TASKS]]
     for kind in KINDS:
         for place in range(1 if quick else PLACES):
-            among = questions(kind, (MOST,), 1 if quick else TASKS // PLACES, PLACES * seed + place)
-            found += [(f"{kind.lower()} zones {place} {k}", one[MOST]) for k, one in enumerate(among)]
+            among = questions(kind, (MOST,), 1 if quick else AMONG, _SEEDS * seed + place)
+            name = f"{kind.lower()} zones {place}"
+            found += [(name, f"{name} {k}", one[MOST]) for k, one in enumerate(among)]
     return found
 
 
@@ -60,16 +69,18 @@ def _variations(rows: Sequence[Row], planner: str, key: str = "seconds") -> dict
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """Variation of PRM's time, and against every other planner's."""
-    prm = _variations(rows, "prm")
+    prm, places = _variations(rows, "prm"), {row["task"]: row["place"] for row in rows}
     found = [
         Statement("PRM's time is unpredictable: it varies as much as it lasts",
                   "coefficient of variation of the processor time, median of the tasks",
-                  *interval(median, list(prm.values())), len(prm), "tasks", bound=1.0)
+                  *interval(median, list(prm.values()), groups=[places[task] for task in prm]),
+                  len(prm), "tasks", bound=1.0)
     ]  # fmt: skip
     for name in OTHERS:
         other = _variations(rows, name)
         tasks = [task for task in prm if prm[task] > 0.0 and other.get(task, 0.0) > 0.0]
-        ratio = interval(geometric_mean, [prm[task] / other[task] for task in tasks])
+        ratios = [prm[task] / other[task] for task in tasks]
+        ratio = interval(geometric_mean, ratios, groups=[places[task] for task in tasks])
         says = f"PRM's time varies more than that of {name}"
         figure = "ratio of the coefficients of variation, geometric mean"
         found.append(Statement(says, figure, *ratio, len(tasks), "tasks", bound=1.0))

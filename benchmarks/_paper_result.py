@@ -2,7 +2,8 @@
 
 A statement names a figure and the bound from which on the paper is right. It holds where the whole 95 %
 interval keeps the bound, it does not where none of it does, else it can't be decided. An experiment runs with
-several seeds, which share nothing: where one of them alone says otherwise, it can't be decided either.
+several seeds, which share nothing: where one of them alone says otherwise, it can't be decided either. What
+can't be decided says how much larger a sample would decide it, if its figure stays.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ Row = dict[str, Any]
 HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be decided"
 MEASURED, CALIBRATED = "measured", "calibration"
 JUDGED = (HOLDS, FAILS, OPEN)
+MOST_TIMES = 50  # a sample so many times as large is not made
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,14 @@ class Statement:
             kept = (self.high <= self.bound, self.low <= self.bound)
         return HOLDS if kept[0] else OPEN if kept[1] else FAILS
 
+    def short_by(self, seeds: int) -> float:
+        """How many times the sample each of so many seeds would need alone for an interval that ends at the
+        bound: it narrows with the root of the sample. Inf where the figure is the bound, nan without a width.
+        """
+        gap = abs(self.value - self.bound)
+        width = self.value - self.low if self.value > self.bound else self.high - self.value
+        return seeds * (width / gap) ** 2 if gap > 0.0 else math.inf
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -79,9 +89,8 @@ def judged(experiment: Experiment, rows: Sequence[Row]) -> list[Statement]:
     """The statements over all rows, each with its verdict; one that a seed alone contradicts is open."""
     whole = experiment.judge(rows)
     seeds = sorted({row["seed"] for row in rows})
-    if len(seeds) < 2:
-        return [replace(statement, verdict=statement.alone) for statement in whole]
-    apart = [experiment.judge([row for row in rows if row["seed"] == seed]) for seed in seeds]
+    several = seeds if len(seeds) > 1 else []
+    apart = [experiment.judge([row for row in rows if row["seed"] == seed]) for seed in several]
     found = []
     for k, statement in enumerate(whole):
         others = [by_seed[k].alone for by_seed in apart]
@@ -89,5 +98,16 @@ def judged(experiment: Experiment, rows: Sequence[Row]) -> list[Statement]:
         if verdict in (HOLDS, FAILS) and any(other != verdict for other in others):
             note = f"over all seeds it {verdict}; seed by seed: {', '.join(others)}"
             verdict = OPEN
+        if verdict == OPEN:
+            note = "; ".join(filter(None, (note, _larger(statement.short_by(len(seeds))))))
         found.append(replace(statement, verdict=verdict, note=note))
     return found
+
+
+def _larger(times: float) -> str:
+    """The size of a sample that would decide, as words."""
+    if math.isnan(times):
+        return ""
+    if times > MOST_TIMES:
+        return f"too near its bound for {MOST_TIMES} times the sample"
+    return f"about {max(math.ceil(times), 2)} times the sample would"

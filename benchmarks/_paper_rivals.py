@@ -17,7 +17,10 @@ from ir_msgs_py.arrays import FloatArray
 EDGES = 6000  # checks of a search, in certified edges: one that spends them counts with them
 SIZES = (0, 1, 3, 10, 30, MOST)
 FEW = 10  # zones up to which there are few
-PLACES, TASKS = 8, 3  # cells per type and seed, movements in each
+KPIECE_SIZES = (1, 10, 30, MOST)
+KPIECE_PLACES, PLACES, TASKS = 32, 8, 3  # cells per type and seed of either claim, movements in each
+CROWDED, RIVALS = 48, ("rrt", "genetic")  # cells among MOST zones alone, and who searches there
+_SEEDS = 1000  # between the cells of two seeds
 ONE_CELL = 100.0  # rad: larger than every joint's range
 SUPERFLUOUS = 0.9  # of the checks without cells: less would be worth having them
 SLOWER = 1.2  # times the checks among one zone from which on a planner has slowed down
@@ -25,15 +28,14 @@ COMPARED = ("rrt", "rrt_connect", "tree", "genetic")
 
 
 def _among_zones(
-    seed: int, sizes: tuple[int, ...], *, quick: bool
-) -> Iterator[tuple[str, int, int, Question]]:
-    """Type of the zones, their number, number of the movement, and the question."""
-    places, tasks = (1, 1) if quick else (PLACES, TASKS)
+    seed: int, sizes: tuple[int, ...], places: Sequence[int], *, quick: bool
+) -> Iterator[tuple[Row, Question]]:
+    """What rows say of a question (type and number of zones, cell, movement), and the question."""
     for kind in KINDS:
-        for place in range(places):
-            for k, asked in enumerate(questions(kind, sizes, tasks, places * seed + place)):
+        for place in places[:1] if quick else places:
+            for k, asked in enumerate(questions(kind, sizes, 1 if quick else TASKS, _SEEDS * seed + place)):
                 for size, question in asked.items():
-                    yield kind, size, tasks * place + k, question
+                    yield {"kind": kind, "zones": size, "place": place, "task": k}, question
 
 
 def _row(planner: str, question: Question, seed: int, cell: float | None = None, edges: int = EDGES) -> Row:
@@ -42,18 +44,18 @@ def _row(planner: str, question: Question, seed: int, cell: float | None = None,
 
 
 def _ratios(rows: Sequence[Row], one: Row, other: Row, key: str = "edges") -> tuple[FloatArray, list[str]]:
-    """Ratios of a figure between rows that agree in what both conditions say, question by question; and the
-    question of each.
+    """Ratios of a figure between rows that differ in what the two conditions say only; and the cell with its
+    smaller and larger versions that each comes from: cells are what is drawn independently.
     """
+    named = [name for name in ("seed", "kind", "place", "zones", "task", "draw") if name not in one]
 
     def taken(condition: Row) -> dict[tuple[object, ...], float]:
         same = [row for row in rows if all(row[k] == v for k, v in condition.items())]
-        free = [k for k in ("seed", "kind", "zones", "task", "draw") if k not in condition]
-        return {tuple(row.get(k) for k in free): max(float(row[key]), 1e-4) for row in same}
+        return {tuple(row.get(name) for name in named): max(float(row[key]), 1e-4) for row in same}
 
     a, b = taken(one), taken(other)
     both = [k for k in a if k in b]
-    return np.array([a[k] / b[k] for k in both]), [f"{k[0]} {k[1:]}" for k in both]
+    return np.array([a[k] / b[k] for k in both]), [str(k[:3]) for k in both]
 
 
 # -- KPIECE
@@ -62,11 +64,10 @@ def _ratios(rows: Sequence[Row], one: Row, other: Row, key: str = "edges") -> tu
 def measure_kpiece(seed: int, quick: bool) -> list[Row]:
     """A row per search with cells of 0.3 rad, and with a grid of one cell per quadrant of the joints."""
     rows = []
-    for kind, size, number, question in _among_zones(seed, SIZES[1:], quick=quick):
+    for asked, question in _among_zones(seed, KPIECE_SIZES, range(KPIECE_PLACES), quick=quick):
         for draw in range(1 if quick else 2):
             for name, cell in (("cells", None), ("no cells", ONE_CELL)):
-                row = _row("kpiece", question, draw, cell)
-                rows.append({"grid": name, "kind": kind, "zones": size, "task": number, "draw": draw} | row)
+                rows.append(asked | {"grid": name, "draw": draw} | _row("kpiece", question, draw, cell))
     return rows
 
 
@@ -77,13 +78,12 @@ def judge_kpiece(rows: Sequence[Row]) -> list[Statement]:
         (f"up to {FEW} zones", [row for row in rows if row["zones"] <= FEW]),
         (f"more than {FEW} zones", [row for row in rows if row["zones"] > FEW]),
     ):
-        ratio, groups = _ratios(some, {"grid": "cells"}, {"grid": "no cells"})
-        tasks = [group.rsplit(",", 2)[0] for group in groups]
+        ratio, places = _ratios(some, {"grid": "cells"}, {"grid": "no cells"})
         found.append(
             Statement(
                 f"among {name} the cells save no checks worth the name",
                 "checks with cells over without, geometric mean",
-                *interval(geometric_mean, ratio, groups=tasks),
+                *interval(geometric_mean, ratio, groups=places),
                 len(ratio),
                 "pairs of searches",
                 bound=SUPERFLUOUS,
@@ -109,11 +109,15 @@ def follows_kpiece(statements: Sequence[Statement]) -> str:
 
 
 def measure_rrt(seed: int, quick: bool) -> list[Row]:
-    """A row per search of each planner in every size of the cell."""
+    """A row per search of each planner in every size of some cells, and of two among MOST zones of others."""
     rows: list[Row] = []
-    for kind, size, number, question in _among_zones(seed, SIZES, quick=quick):
-        asked = {"kind": kind, "zones": size, "task": number}
-        rows.extend(asked | _row(planner, question, number) for planner in COMPARED)
+    for sizes, places, planners in (
+        (SIZES, range(PLACES), COMPARED),
+        ((MOST,), range(PLACES, PLACES + CROWDED), RIVALS),
+    ):
+        for asked, question in _among_zones(seed, sizes, places, quick=quick):
+            draw = TASKS * asked["place"] + asked["task"]
+            rows.extend(asked | _row(planner, question, draw) for planner in planners)
     return rows
 
 
@@ -201,7 +205,8 @@ KPIECE = Experiment(
     "OMPL's KPIECE1 among 1 to 100 zones (open, semi-closed, closed; machines of 0.3 to 0.6 m at random "
     "around the robot), with cells of 0.3 rad over the first three joints, and with cells larger than "
     "the joints' range. Movements between free configurations, the same ones in every size, whose "
-    f"straight movement is blocked in the largest. Counted: checks until the first path, at most {EDGES}. "
+    f"straight movement is blocked in the largest; {KPIECE_PLACES} cells of each type and seed. "
+    f"Counted: checks until the first path, at most {EDGES}. "
     f"Superfluous: at least {SUPERFLUOUS:.0%} of the checks that it takes without cells.",
     measure_kpiece,
     judge_kpiece,
@@ -211,9 +216,10 @@ RRT = Experiment(
     "rrt_zones",
     "RRT and the number of zones",
     "RRT becomes slow as the number of forbidden zones grows.",
-    "The same cells and movements among 0 to 100 zones; OMPL's RRT and RRTConnect, the planner's own "
-    f"bidirectional tree and the genetic correction, at most {EDGES} checks each. Slower: at least "
-    f"{SLOWER} times the checks among one zone.",
+    f"Cells and movements drawn as for KPIECE, {PLACES} cells of each type and seed among 0 to 100 zones, "
+    f"and for the last statement {CROWDED} further ones among {MOST}; OMPL's RRT and RRTConnect, the "
+    f"planner's own bidirectional tree and the genetic correction, at most {EDGES} checks each. Slower: "
+    f"at least {SLOWER} times the checks among one zone.",
     measure_rrt,
     judge_rrt,
     follows_rrt,

@@ -16,7 +16,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
 
-PAIRS, QUICK_PAIRS = 1000, 24  # per seed
+PAIRS, QUICK_PAIRS = 1200, 24  # per seed
 LOW, HIGH = -80.0, 20.0  # % of section V
 WITHIN = 0.95  # share of the movements that must lie within
 LARGE = 1000.0  # J of the common PTP from which on a relative change is no accident of a small reference
@@ -26,7 +26,7 @@ ARMS = {  # objective, whether the duration is that of the PTP, and one of how m
     SAME_TIME: ("energy", True, 1),
     "free, least J": ("time_and_energy", False, 1),
     "free, least time": ("time", False, 2),
-    "free, least W": ("movement_cost", False, 2),
+    "free, least W": ("movement_cost", False, 1),
 }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations import free_configurations
 from ir_planner.scene import PlanningScene
 
-Key = tuple[int, str, int]
+Key = tuple[int, str, str, int]  # seed, cell, station, draw
 CELLS = ("cnc_door", "deep_box", "demo", "table_columns", "open")
 
 
@@ -30,9 +30,9 @@ class Place:
     q: FloatArray
 
     @property
-    def label(self) -> str:
-        """Cell and station."""
-        return f"{self.scene.cell.name} {self.station.name}"
+    def words(self) -> Row:
+        """What rows say of it."""
+        return {"cell": self.scene.cell.name, "station": self.station.name, "zone": self.station.zone}
 
     @property
     def threshold(self) -> FloatArray:
@@ -41,13 +41,13 @@ class Place:
 
 
 def places(cells: tuple[str, ...], seed: int, variants: int) -> Iterator[Place]:
-    """Stations that have a free configuration, of so many variants of each cell; with seed 0 the first of
-    them is the cell as it is.
+    """Stations that have a free configuration, of so many variants of each cell; with an even seed the first
+    of them is the cell as it is.
     """
     for name in cells:
         cell = load_cell(name)
         for k in range(variants):
-            one = cell if seed == 0 and k == 0 else variant(cell, 100 + seed, k)
+            one = cell if seed % 2 == k == 0 else variant(cell, 100 + seed, k)
             scene = scene_of_cell(one)
             for station in one.stations:
                 margin = margin_at(scene, station)
@@ -58,15 +58,25 @@ def places(cells: tuple[str, ...], seed: int, variants: int) -> Iterator[Place]:
 
 
 def of_reading(rows: Sequence[Row], reading: str) -> dict[Key, Row]:
-    """Rows of one reading of an equation by seed, station and draw."""
+    """Rows of one reading of an equation by seed, cell, station and draw."""
     return {
-        (row["seed"], row["station"], row.get("draw", 0)): row for row in rows if row["reading"] == reading
+        (row["seed"], row["cell"], row["station"], row.get("draw", 0)): row
+        for row in rows
+        if row["reading"] == reading
     }
 
 
 def difference(
     rows: Sequence[Row], one: str, other: str, success: Callable[[Row], float]
 ) -> tuple[list[float], list[Key]]:
-    """Success of one reading less the other's [percentage points], and of what each is."""
+    """Success of one reading less the other's [percentage points] where both were tried, and of what each
+    is.
+    """
     a, b = of_reading(rows, one), of_reading(rows, other)
-    return [100.0 * (success(a[key]) - success(b[key])) for key in a], list(a)
+    both = [key for key in a if key in b]
+    return [100.0 * (success(a[key]) - success(b[key])) for key in both], both
+
+
+def cells_of(keys: Iterable[Key]) -> list[tuple[int, str]]:
+    """Seed and cell of each: stations of one cell stand among the same machines, cells are drawn apart."""
+    return [key[:2] for key in keys]

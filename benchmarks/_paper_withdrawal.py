@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from _paper_result import Experiment, Row, Statement
-from _paper_stations import Place, difference, of_reading, places
+from _paper_stations import Place, cells_of, difference, of_reading, places
 from _paper_statistics import geometric_mean, interval, mean, percent, share
 
 from ir_msgs_py.arrays import FloatArray
@@ -23,7 +23,7 @@ from ir_planner.service.exit_tree import ExitTree
 from ir_planner.service.modified_ga import ModifiedGa
 
 CELLS = ("cnc_door", "deep_box", "demo")
-VARIANTS, DRAWS, QUICK_DRAWS = 26, 1, 1  # of each cell and seed; searches per station and reading
+VARIANTS, DRAWS, QUICK_DRAWS = 52, 1, 1  # of each cell and seed; searches per station and reading
 EDGES, SECONDS = 8_000, 20.0  # certified edges of a search, and its ceiling
 SURE = 95.0  # % of the searches
 POINTS = 2.0  # percentage points of searches from which on a difference is worth having
@@ -67,7 +67,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     for place in places(CELLS[:1] if quick else CELLS, seed, 1 if quick else VARIANTS):
         for name, reading in READINGS.items():
             for draw in range(QUICK_DRAWS if quick else DRAWS):
-                row = {"station": place.label, "zone": place.station.zone, "reading": name, "draw": draw}
+                row = place.words | {"reading": name, "draw": draw}
                 rows.append(row | _searched(place, reading, 1000 * seed + draw))
     return rows
 
@@ -95,7 +95,7 @@ def _searched(place: Place, reading: Reading, seed: int) -> Row:
 
 def _success(rows: Sequence[Row], zones: str, kinds: tuple[str, ...]) -> Statement:
     some = [row for row in rows if row["reading"] == DEFAULT and row["zone"] in kinds]
-    stations = [(row["seed"], row["station"]) for row in some]
+    stations = [(row["seed"], row["cell"], row["station"]) for row in some]
     solved = percent(share([row["solved"] for row in some], stations))
     says = f"eq. (7) leaves {zones} zones"
     what = f"searches at {len(set(stations))} stations"
@@ -114,10 +114,10 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         ("eq. (7) leaves more often than two trees", DEFAULT, TREES),
     ):
         some, keys = difference(rows, one, other, lambda row: row["solved"])
-        stations = [key[:2] for key in keys]
+        cells = cells_of(keys)
         figure = f"searches that leave, {one} less {other}"
-        what = f"searches at {len(set(stations))} stations"
-        means = interval(mean, some, groups=stations)
+        what = f"searches in {len(set(cells))} cells"
+        means = interval(mean, some, groups=cells)
         found.append(Statement(says, figure, *means, len(some), what, "points", POINTS))
     over = "processor time over that of the other, geometric mean"
     for says, other, figure, key, bound in (
@@ -135,7 +135,8 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
     ):
         a, b = of_reading(rows, DEFAULT), of_reading(rows, other)
         both = [k for k in a if a[k]["solved"] and b[k]["solved"] and b[k][key] > 0.0]
-        ratio = interval(geometric_mean, [a[k][key] / b[k][key] for k in both], groups=[k[:2] for k in both])
+        ratios = [a[k][key] / b[k][key] for k in both]
+        ratio = interval(geometric_mean, ratios, groups=cells_of(both))
         found.append(Statement(says, figure, *ratio, len(both), "searches", "", bound, at_least=False))
     return found
 

@@ -35,7 +35,7 @@ _WALLS = {
 
 def zones_cell(kind: str, count: int, seed: int) -> Cell:
     """The cell `open` with `count` machines of a type; those of a smaller cell stand in every larger one."""
-    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    rng = np.random.default_rng([seed, KINDS.index(kind), 0])
     cell = load_cell("open")
     machines = []
     for k in range(MOST):
@@ -73,7 +73,8 @@ def questions(kind: str, sizes: tuple[int, ...], count: int, seed: int) -> list[
     largest, where the straight movement is not free.
     """
     scenes = {size: scene_of_cell(zones_cell(kind, size, seed)) for size in sizes}
-    crowded, rng = scenes[max(sizes)], np.random.default_rng([seed, 2])
+    crowded = scenes[max(sizes)]
+    rng = np.random.default_rng([seed, KINDS.index(kind), 1])
     robot = crowded.cell.robot
     found: list[dict[int, Question]] = []
     kept = np.full(len(crowded.collision.pairs), CLEARANCE)

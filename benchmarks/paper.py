@@ -1,7 +1,7 @@
 """Which of the paper's claims hold?
 
-    python benchmarks/paper.py [--only NAME]... [--seeds N] [--again] [--write] [--out FOLDER] [--page FILE]
-                               [--quick] [--json FILE]
+    python benchmarks/paper.py [--only NAME]... [--seeds N] [--first-seed N] [--again] [--write]
+                               [--out FOLDER] [--page FILE] [--quick] [--json FILE]
 
 Every claim is an experiment of its own (`_paper_<claim>.py`). What one has found is stored as JSON and CSV in
 --out; the next run goes on with those that are missing, --only measures the named ones anew, --again all.
@@ -28,7 +28,7 @@ from _results import Claim, add_ending, commit, machine, print_claims, write_jso
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "reproduction.md"
-SEEDS = 2
+SEEDS, FIRST = 2, 2  # seeds 0 and 1 are those of the pilot that the sizes of the samples come from
 
 
 def arguments() -> argparse.Namespace:
@@ -39,6 +39,7 @@ def arguments() -> argparse.Namespace:
     names = ", ".join(EXPERIMENTS)
     parser.add_argument("--only", action="append", choices=list(EXPERIMENTS), metavar="NAME", help=names)
     parser.add_argument("--seeds", type=int, default=SEEDS, help=f"independent repetitions; default: {SEEDS}")
+    parser.add_argument("--first-seed", type=int, default=FIRST, help=f"the first of them; default: {FIRST}")
     parser.add_argument("--again", action="store_true", help="measure also what is stored")
     parser.add_argument("--write", action="store_true", help="measure nothing: the page from what is stored")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "paper", help="where rows are stored")
@@ -49,6 +50,11 @@ def arguments() -> argparse.Namespace:
         given.seeds, given.out = 1, given.out / "quick"
     given.page = given.page or (given.out / "reproduction.md" if given.quick else PAGE)
     return given
+
+
+def seeds_of(given: argparse.Namespace) -> list[int]:
+    """Of the independent repetitions."""
+    return list(range(given.first_seed, given.first_seed + given.seeds))
 
 
 def processor_seconds() -> float:
@@ -62,10 +68,10 @@ def run(experiment: Experiment, given: argparse.Namespace) -> None:
     begin, wall = processor_seconds(), time.perf_counter()
     rows = [
         {"seed": seed, **row}
-        for seed in range(given.seeds if experiment.seeded else 1)
+        for seed in seeds_of(given)[: None if experiment.seeded else 1]
         for row in experiment.measure(seed, given.quick)
     ]
-    stored = {"name": experiment.name, "seeds": given.seeds, "commit": commit(), "machine": machine()}
+    stored = {"name": experiment.name, "seeds": seeds_of(given), "commit": commit(), "machine": machine()}
     stored |= {"processor_s": processor_seconds() - begin, "wall_s": time.perf_counter() - wall, "rows": rows}
     given.out.mkdir(parents=True, exist_ok=True)
     part = given.out / f"{experiment.name}.part"
@@ -78,10 +84,10 @@ def run(experiment: Experiment, given: argparse.Namespace) -> None:
 
 
 def stored(experiment: Experiment, given: argparse.Namespace) -> dict[str, Any] | None:
-    """What was stored with as many seeds, None where nothing was."""
+    """What was stored with the same seeds, None where nothing was."""
     file = given.out / f"{experiment.name}.json"
     found: dict[str, Any] | None = json.loads(file.read_text()) if file.exists() else None
-    return found if found is not None and found["seeds"] == given.seeds else None
+    return found if found is not None and found["seeds"] == seeds_of(given) else None
 
 
 def chapter(experiment: Experiment, found: dict[str, Any], images: Path, folder: Path) -> Chapter:
@@ -118,7 +124,7 @@ def main() -> None:
     chapters = [chapter(EXPERIMENTS[name], found, folder / "images", folder) for name, found in there.items()]
     left = [name for name in EXPERIMENTS if name not in there]
     machines = {found["machine"].split(", load")[0] for found in there.values()}
-    text = page(chapters, left, given.seeds, ", ".join(sorted(machines)), given.quick)
+    text = page(chapters, left, seeds_of(given), ", ".join(sorted(machines)), given.quick)
     write(text, given.page)
     claims, rows = [], []
     for one in chapters:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import base64
 import csv
 import io
-import math
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,9 @@ from ir_recorder import Analysis, analyse, findings
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.front import Point, front_chart, front_section, pareto
 from ir_recorder.report.headline import source
+from ir_recorder.report.marks import COLOURS, MARKS
 from ir_recorder.report.money import cycle_of
+from ir_recorder.report.page import asset
 from ir_recorder.report.step_table import step_columns, write_table
 from ir_recorder.report_main import main
 
@@ -130,8 +132,28 @@ def test_no_point_beats_one_of_the_front_and_each_other_one_is_beaten(points: li
         assert beaten != any((b.seconds, b.energy) == (point.seconds, point.energy) for b in best)
     drawn = front_chart(points)
     assert "nan" not in drawn
-    numbers = [float(x) for x in re.findall(r'c[xy]="([-\d.]+)"', drawn)]
-    assert all(math.isfinite(x) and 0.0 <= x <= 720.0 for x in numbers)
+    places = re.findall(r"translate\(([-\d.]+) ([-\d.]+)\)", drawn)
+    assert len(places) == len(points)
+    assert all(0.0 <= float(x) <= 720.0 and 0.0 <= float(y) <= 300.0 for x, y in places)
+
+
+def test_names_of_points_that_nearly_coincide_stand_below_each_other() -> None:
+    points = [Point(f"planner {k}", 2.0, 2051.0 + 1e-3 * k, "measured") for k in range(11)]
+    drawn = front_chart(points)
+    names = sorted(float(y) for y in re.findall(r'y="([-\d.]+)" class="name"', drawn))
+    assert len(names) == 11
+    assert all(b - a >= 13.9 for a, b in pairwise(names))
+    ticks = re.findall(r'text-anchor="end">([^<]+)<', drawn)
+    assert len(set(ticks)) == len(ticks) > 2  # no two read alike
+
+
+def test_fifty_series_look_different_and_the_charts_draw_the_same_marks() -> None:
+    assert len({(k % COLOURS, MARKS[k % len(MARKS)]) for k in range(50)}) == 50
+    script = asset("axes.js")
+    assert f"COLOURS = {COLOURS}," in script
+    drawn = script.partition("const MARKS = [")[2].partition("]")[0]
+    assert re.findall(r'"([^"]+)"', drawn) == list(MARKS)
+    assert all(f"--s{k}:" in asset("page.css") for k in range(1, COLOURS + 1))
 
 
 def test_plans_that_were_not_driven_are_compared_by_what_was_predicted(analysis: Analysis) -> None:

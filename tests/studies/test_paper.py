@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import _paper_claims
+import _paper_rivals
 import _paper_statistics as statistics
 import numpy as np
 import paper
@@ -66,6 +67,37 @@ def test_a_seed_that_says_otherwise_leaves_it_open() -> None:
     assert "seed by seed: holds, does not hold" in found.note
 
 
+def test_what_is_open_says_how_much_larger_a_sample_would_decide_it() -> None:
+    rng = np.random.default_rng(3)
+    x = rng.normal(1.05, 1.0, 400)
+    (wide,) = judged(experiment(means), [{"seed": 0, "x": float(one)} for one in x])
+    assert wide.verdict == OPEN
+    times = wide.short_by(1)
+    assert f"about {math.ceil(times)} times the sample would" == wide.note
+    many = [{"seed": 0, "x": float(one)} for one in np.tile(x, math.ceil(1.3 * times))]
+    assert judged(experiment(means), many)[0].verdict == HOLDS
+    assert statement(1.0, 0.5, 1.5).short_by(2) == math.inf  # the figure is the bound
+    assert statement(1.1, 0.9, 1.3).short_by(2) == pytest.approx(8.0)
+    assert math.isnan(statement(1.1, math.nan, math.nan).short_by(2))
+
+
+def test_cells_are_drawn_not_the_searches_in_them() -> None:
+    rng = np.random.default_rng(4)
+    rows: list[Row] = []
+    for place in range(6):
+        helped = rng.normal(0.0, 0.5)  # what a cell does to all searches in it
+        for task in range(3):
+            for draw in range(8):
+                asked = {"seed": 2, "kind": "OPEN", "place": place, "zones": 100, "task": task, "draw": draw}
+                rows.append(asked | {"grid": "no cells", "edges": 100.0})
+                rows.append(asked | {"grid": "cells", "edges": 100.0 * math.exp(helped)})
+    ratio, cells = _paper_rivals._ratios(rows, {"grid": "cells"}, {"grid": "no cells"})
+    assert len(ratio) == 6 * 3 * 8
+    assert sorted(set(cells)) == [f"(2, 'OPEN', {place})" for place in range(6)]
+    many = _paper_rivals.judge_kpiece(rows)[1]
+    assert many.high / many.low > 1.3  # six cells say little, however often each is searched
+
+
 def test_an_interval_of_95_percent_holds_the_mean_about_so_often() -> None:
     rng, inside, count = np.random.default_rng(12), 0, 30
     for _ in range(count):
@@ -101,7 +133,11 @@ def test_ranks_are_those_of_spearman() -> None:
 def test_the_page_shows_verdict_interval_bound_and_what_is_missing() -> None:
     one = experiment(means)
     rows = [{"seed": 0, "x": 2.0}, {"seed": 0, "x": 2.5}]
-    text = page([Chapter(one, judged(one, rows), rows, "", 60.0)], ["other"], 2, "a machine", quick=False)
+    text = page(
+        [Chapter(one, judged(one, rows), rows, "", 60.0)], ["other"], [2, 3], "a machine", quick=False
+    )
+    assert "done with seeds 2 and 3 that share nothing" in text
+    assert "|  | 60 s |" in text
     assert "| it helps | how much | 2.25 [2, 2.5], 10 tasks | ≥ 1 | **holds** |" in text
     assert "[One claim](#one-claim)" in text
     assert "Not run: `other`" in text

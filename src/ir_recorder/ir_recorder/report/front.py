@@ -9,10 +9,13 @@ from dataclasses import dataclass
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis
 from ir_recorder.report.bars import tick_step
+from ir_recorder.report.marks import mark
 from ir_recorder.report.words import joules, seconds, text
 
 WIDTH, HEIGHT = 720.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 84.0, 190.0, 18.0, 44.0
+_NAME, _LINE = 90.0, 14.0  # how wide and how high a name is
+_LEAST_S, _LEAST_J = 0.05, 5.0  # span of an axis: what differs by less reads alike
 
 
 @dataclass(frozen=True)
@@ -58,10 +61,11 @@ def front_chart(points: Sequence[Point], along: str = "cycle time") -> str:
     if len(points) < 2:
         return ""
     times, energies = [p.seconds for p in points], [p.energy for p in points]
-    x = _Axis(min(times), max(times), _LEFT, WIDTH - _RIGHT)
-    y = _Axis(min(energies), max(energies), HEIGHT - _BOTTOM, _TOP)
+    x = _Axis(min(times), max(times), _LEAST_S, _LEFT, WIDTH - _RIGHT)
+    y = _Axis(min(energies), max(energies), _LEAST_J, HEIGHT - _BOTTOM, _TOP)
     line = " ".join(f"{x.at(p.seconds):.1f},{y.at(p.energy):.1f}" for p in pareto(points))
-    marks = "".join(_mark(point, k, x, y) for k, point in enumerate(points))
+    heights = _heights(points, x, y)
+    marks = "".join(_mark(point, k, heights[k], x, y) for k, point in enumerate(points))
     said = "; ".join(f"{p.name} {seconds(p.seconds)}, {joules(p.energy)}, {p.source}" for p in points)
     return (
         '<div class="figure scroll"><svg class="front" id="energy_over_cycle_time" '
@@ -76,19 +80,27 @@ class _Axis:
 
     low: float
     high: float
+    least: float
     start: float
     end: float
 
+    @property
+    def span(self) -> float:
+        """Of what is shown without the margin, the middle of the values in its middle."""
+        return max(self.high - self.low, self.least)
+
+    @property
+    def first(self) -> float:
+        """The value at the start."""
+        return 0.5 * (self.low + self.high) - 0.6 * self.span
+
     def at(self, value: float) -> float:
-        span = (self.high - self.low) or max(abs(self.high), 1.0)
-        share = (value - self.low + 0.1 * span) / (1.2 * span)
-        return self.start + share * (self.end - self.start)
+        return self.start + (value - self.first) / (1.2 * self.span) * (self.end - self.start)
 
     def ticks(self) -> list[float]:
-        span = (self.high - self.low) or max(abs(self.high), 1.0)
-        low, step = self.low - 0.1 * span, tick_step(1.2 * span)
-        first = math.ceil(low / step)
-        return [k * step for k in range(first, math.floor((low + 1.2 * span) / step) + 1)]
+        step = tick_step(1.2 * self.span)
+        first, last = math.ceil(self.first / step), math.floor((self.first + 1.2 * self.span) / step)
+        return [k * step for k in range(first, last + 1)]
 
 
 def _grid(x: _Axis, y: _Axis, along: str) -> str:
@@ -106,12 +118,31 @@ def _grid(x: _Axis, y: _Axis, along: str) -> str:
     return "".join(parts) + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
 
 
-def _mark(point: Point, index: int, x: _Axis, y: _Axis) -> str:
+def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:
+    """Where the names of points go: beside them, or below another name that stands there."""
+    heights = [y.at(point.energy) for point in points]
+    placed: list[tuple[float, float]] = []
+    for k in sorted(range(len(points)), key=heights.__getitem__):
+        at = x.at(points[k].seconds)
+        for other, high in sorted(placed, key=lambda one: one[1]) if points[k].name else ():
+            if abs(other - at) < _NAME and abs(high - heights[k]) < _LINE:
+                heights[k] = high + _LINE
+        placed += [(at, heights[k])] if points[k].name else []
+    return heights
+
+
+def _mark(point: Point, index: int, label: float, x: _Axis, y: _Axis) -> str:
     at, high = x.at(point.seconds), y.at(point.energy)
     name = point.name or "program of the front"
     words = f"{name}, {point.source}: {seconds(point.seconds)}, {joules(point.energy)}"
-    filled = "hollow" if point.source == "predicted" else f"a{index % 6 + 1}"
+    title = f"<title>{text(words)}</title>"
+    if point.source == "predicted":
+        drawn = f'<circle class="hollow" cx="{at:.1f}" cy="{high:.1f}" r="6">{title}</circle>'
+    else:
+        drawn = mark(index, at, high, title)
+    leader = (
+        f'<path class="grid" d="M{at:.1f} {high:.1f}L{at + 10:.1f} {label:.1f}"/>' if label != high else ""
+    )
     return (
-        f'<circle class="{filled}" cx="{at:.1f}" cy="{high:.1f}" r="6"><title>{text(words)}</title></circle>'
-        f'<text x="{at + 10:.1f}" y="{high + 4:.1f}" class="name">{text(point.name)}</text>'
+        f'{leader}{drawn}<text x="{at + 12:.1f}" y="{label + 4:.1f}" class="name">{text(point.name)}</text>'
     )

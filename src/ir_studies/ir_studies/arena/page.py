@@ -37,8 +37,8 @@ from ir_studies.page import BUTTON, page
 
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
 _HEADS = (
-    "planner", ">solved", ">first answer", ">best answer", ">J above the best known", ">W above the least",
-    ">duration", ">energy", ">least clearance", ">cut or dead",
+    "planner", ">solved", ">first answer", ">best answer", ">J above the best", ">W above the least",
+    ">duration", ">energy", ">clearance", ">cut or dead",
 )  # fmt: skip
 _TIE = 5e-5  # of J: less is not shown
 _ABOVE = 300.0  # percent: what a curve of costs shows where nothing, or something dearer, is known
@@ -57,7 +57,7 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings) -> str:
         "title": "Arena",
         "subtitle": text(
             f"{len(planners)} planners, {len(settings.cells)} cells, {questions} questions, "
-            f"{settings.seeds} seeds: {len(runs)} runs of {settings.seconds:g} s of processor"
+            f"{settings.seeds} seed{'s' if settings.seeds > 1 else ''}: {len(runs)} runs of {settings.seconds:g} s of processor"
         ),
         "verdict": verdict(runs, settings),
         "cells": "".join(_cell_section(runs, cell, planners) for cell in settings.cells),

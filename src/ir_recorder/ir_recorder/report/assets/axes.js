@@ -1,6 +1,24 @@
 "use strict";
 /* Curves of the axes: one chart per quantity, with the limits of the robot, on the time axis of all charts. */
 
+/* How named curves differ, as in marks.py: a colour, a mark, and beyond seven a dash too. */
+const COLOURS = 7, DASHES = [[], [7, 4], [2, 3]], APART = 90; /* pixels between the marks on a curve */
+const MARKS = [
+  "M-4 0A4 4 0 1 0 4 0A4 4 0 1 0 -4 0Z", "M-3.6 -3.6H3.6V3.6H-3.6Z", "M0 -4.8L4.6 3.4H-4.6Z", "M0 -5.2L5.2 0L0 5.2L-5.2 0Z",
+  "M0 4.8L4.6 -3.4H-4.6Z", "M-1.4 -4.6H1.4V-1.4H4.6V1.4H1.4V4.6H-1.4V1.4H-4.6V-1.4H-1.4Z", "M-5 -2H5V2H-5Z", "M-2 -5H2V5H-2Z",
+];
+const look = (k) => ({ colour: `--s${k % COLOURS + 1}`, mark: MARKS[k % MARKS.length], dash: DASHES[Math.floor(k / COLOURS) % DASHES.length] });
+
+/* A piece of a named curve, for the box that shows it. */
+function sample(k) {
+  const { colour, mark, dash } = look(k), key = document.createElement("span");
+  key.className = "sample";
+  key.style.color = `var(${colour})`;
+  key.innerHTML = `<svg viewBox="-17 -7 34 14" aria-hidden="true"><path d="M-17 0H17" fill="none" stroke="currentColor" stroke-width="1.6"
+    stroke-dasharray="${dash.join(" ")}"/><path d="${mark}" fill="currentColor"/></svg>`;
+  return key;
+}
+
 class AxesChart extends TimeChart {
   constructor(canvas, timeline, tip, curves, shown) {
     super(canvas, timeline, tip);
@@ -34,13 +52,17 @@ class AxesChart extends TimeChart {
     this.valueAxis(g, low, high, this.curves.unit, y);
     this.plot(g);
     for (const k of axes) {
-      g.strokeStyle = css(this.curves.series === "tool" ? "--accent" : `--a${k % 6 + 1}`);
+      const named = this.curves.names ? look(k) : null;
+      g.strokeStyle = css(named ? named.colour : this.curves.series === "tool" ? "--accent" : `--a${k % 6 + 1}`);
       if (limits) {
         g.setLineDash([6, 4]);
         for (const bound of limits[k]) line(g, this.left, y(bound), this.width - this.right, y(bound));
         g.setLineDash([]);
       }
+      if (named) g.setLineDash(named.dash);
       this.curve(g, k, first, until, y);
+      g.setLineDash([]);
+      if (named) this.marks(g, k, y, named);
     }
     g.restore();
     this.cursor(g);
@@ -68,6 +90,19 @@ class AxesChart extends TimeChart {
     g.stroke();
     g.lineWidth = 1;
   }
+  /* Marks on a named curve, beside those of the others. */
+  marks(g, k, y, { colour, mark }) {
+    const n = this.curves.count, path = new Path2D(mark), last = this.curves.ends ? this.curves.ends[k] : Infinity;
+    g.fillStyle = css(colour);
+    for (let x = this.left + (0.3 + k / n) * APART; x < this.width - this.right; x += APART) {
+      const time = this.time(x);
+      if (time > last) break;
+      g.save();
+      g.translate(x, y(this.high[floorIndex(this.times, time) * n + k]));
+      g.fill(path);
+      g.restore();
+    }
+  }
   describe(time) {
     const i = floorIndex(this.times, time), n = this.curves.count, names = this.names();
     const rows = this.used().map((k) => `${names[k]}  ${(+this.high[i * n + k].toPrecision(4))} ${this.curves.unit}`);
@@ -77,7 +112,7 @@ class AxesChart extends TimeChart {
 
 /* Toggles for axes, quantities and limits, and a chart for each quantity. */
 function axesSection(place, timeline, tip, list) {
-  const shown = { axes: Array(12).fill(true), limits: false }, charts = [];
+  const shown = { axes: Array(list.reduce((n, c) => Math.max(n, c.count), 0)).fill(true), limits: false }, charts = [];
   const bar = place.querySelector(".toggles"), most = list.reduce((n, c) => Math.max(n, c.series === "tool" ? 0 : c.count), 0);
   const toggle = (label, checked, change, style) => {
     const box = document.createElement("label"), input = document.createElement("input");
@@ -85,12 +120,13 @@ function axesSection(place, timeline, tip, list) {
     input.checked = checked;
     input.addEventListener("change", () => { change(input.checked); for (const c of charts) c.schedule(); });
     box.append(input);
-    if (style) { const key = document.createElement("i"); key.className = `key ${style}`; box.append(key); }
+    if (typeof style === "number") box.append(sample(style));
+    else if (style) { const key = document.createElement("i"); key.className = `key ${style}`; box.append(key); }
     box.append(label);
     bar.append(box);
   };
   const names = list.length && list[0].names;
-  for (let k = 0; k < most; k++) toggle(names ? names[k] : `A${k + 1}`, true, (on) => { shown.axes[k] = on; }, `a${k % 6 + 1}`);
+  for (let k = 0; k < most; k++) toggle(names ? names[k] : `A${k + 1}`, true, (on) => { shown.axes[k] = on; }, names ? k : `a${k % 6 + 1}`);
   if (list.some((c) => c.limits)) toggle("limits", false, (on) => { shown.limits = on; });
   for (const curves of list) {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption"), canvas = document.createElement("canvas");
