@@ -27,9 +27,9 @@ predicted by the planner's model of robot and drives, no robot was measured; tim
 times{machine}.
 
 How large the samples are follows from a pilot with seeds 0 and 1, whose draws are not used here: where an
-interval was too wide to decide, the sample grew with the square of its width over its distance to the bound, on
-whichever side of it the figure was, as far as an hour of processor time for all claims allows; where a fraction
-would have decided it stayed. What is drawn independently are cells and movements, not the searches in them.
+interval was too wide to decide, the sample grew with the square of its width over its distance to the bound,
+on whichever side of it the figure was, as far as an hour of processor time for all claims allows. What is
+drawn independently are cells and movements, not the searches in them.
 """
 
 

@@ -1,6 +1,6 @@
 """How named curves and points of one drawing differ: by a colour, a mark, and beyond seven by a dash too.
 
-The colours are those of Okabe and Ito, which the colour-blind distinguish; axes.js draws curves with the same.
+The colours are those of Okabe and Ito, which the colour-blind distinguish; axes.js draws curves with them.
 """
 
 from __future__ import annotations

@@ -57,7 +57,8 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings) -> str:
         "title": "Arena",
         "subtitle": text(
             f"{len(planners)} planners, {len(settings.cells)} cells, {questions} questions, "
-            f"{settings.seeds} seed{'s' if settings.seeds > 1 else ''}: {len(runs)} runs of {settings.seconds:g} s of processor"
+            f"{settings.seeds} seed{'s' if settings.seeds > 1 else ''}: {len(runs)} runs of "
+            f"{settings.seconds:g} s of processor"
         ),
         "verdict": verdict(runs, settings),
         "cells": "".join(_cell_section(runs, cell, planners) for cell in settings.cells),
