@@ -19,6 +19,7 @@ from ir_cli.main import main
 from ir_cli.node_parameters import given_parameters
 from ir_cli.node_settings import parameters_of
 from ir_cli.nodes import cell_nodes
+from ir_cli.ports import TCP, UDP, free_port, is_free
 from ir_cli.up_command import choose_ports
 
 WAITING = """
@@ -123,6 +124,16 @@ def test_taken_ports_are_replaced_by_free_ones_for_driver_and_runner() -> None:
     assert driver["wake_port"] == values["ir_program_runner"]["wake_port"] != 9009
     assert driver["modbus_port"] != 5020
     assert [line.rpartition(": ")[2] for line in lines] == ["9009 is taken", "5020 is taken"]
+
+
+@pytest.mark.parametrize("kind", [UDP, TCP])
+def test_a_free_port_is_none_that_the_system_or_dds_gives_away_meanwhile(kind: socket.SocketKind) -> None:
+    found = [free_port(kind) for _ in range(50)]
+    assert len(set(found)) > 1  # two that start at once choose different ones
+    for port in found:
+        assert is_free(port, kind)
+        assert 1024 < port < 32_768
+        assert (port - 7_400) % 250 >= 10 + 2 * 95  # PB + DG * domain + d1 + PG * participant
 
 
 def test_a_given_port_that_is_taken_is_refused() -> None:

@@ -14,8 +14,8 @@ from types import TracebackType
 
 from .errors import ProcessError
 
-STOP_SECONDS = 10.0
-"""How long a node may take to end after SIGINT before it is killed."""
+STOP_SECONDS = 30.0
+"""How long a node may take to end after SIGINT before it is killed; on a busy machine four end at once."""
 
 
 @dataclass(frozen=True)
