@@ -10,15 +10,18 @@ import os
 import sys
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.testing import own_domain
 
-# The same examples in every run, however long one takes: a red test is a change of the code, never luck.
+# The same examples in every run, however long it takes to make and to try one: a red test is a change of the
+# code, never luck or a busy machine.
 # To look for new examples:
 # pytest --hypothesis-profile=default --hypothesis-seed=N
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("repeatable")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,7 @@ OLD = (Path(__file__).parent / "old.src").read_text(encoding="utf-8")
 
 @pytest.fixture(scope="session")
 def planner() -> Planner:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)  # a clock that cuts no plan of a busy machine
     planner.set_cell("", "open")
     return planner
 

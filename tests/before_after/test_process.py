@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -148,7 +147,7 @@ def test_the_cells_own_path_gives_what_it_allows(planner: Planner, found: Evalua
     assert (driven.path.tool_speed, driven.path.blending_radius) == pytest.approx((SPEED, CORNER))
     own = CellPath("bead", replace(driven.path, tool_speed=0.3, free_angle=0.5))
     cell = replace(planner.cell, paths=(own,))
-    theirs = Planner(time.monotonic, planner.settings, read_cell=lambda _text, _name: cell)
+    theirs = Planner(lambda: 0.0, planner.settings, read_cell=lambda _text, _name: cell)
     theirs.set_cell("cell", "")
     asked = asked_program(today, theirs.scene("")).cell
     assert [step.target for step in asked.program] == ["bead", "home"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import pytest
@@ -16,7 +15,7 @@ from ir_planner.krl.judged import judge_of
 @pytest.fixture(scope="module")
 def out_of_the_lathe() -> tuple[Planner, PlannedMovement]:
     """A service line through the open door, in a cell whose door is closed at first."""
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     planner.set_equipment("lathe", None, True, "door_open")
     found = planner.plan_service("lathe_work", "exit", None, planner.cell.machine_home, 1, PlanOptions())

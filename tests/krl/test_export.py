@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +25,7 @@ from _tool_path_judge import seen
 
 @pytest.fixture(scope="module")
 def planned() -> tuple[Planner, object]:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     plan = planner.plan_program(("gauge_measure", "home"), 0.0, PlanOptions(), planner.cell.posture("park"))
     return planner, plan
@@ -102,7 +101,7 @@ def path_movement(planner: Planner, name: str, path: CellPath) -> PlannedMovemen
 
 @pytest.fixture(scope="module")
 def bench() -> Planner:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "kr6_bench")
     return planner
 

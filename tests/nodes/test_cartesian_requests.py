@@ -32,7 +32,7 @@ SEAM = """paths:
 
 @pytest.fixture(scope="module")
 def requests() -> Requests:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell(cell_to_yaml(load_cell("open")) + SEAM, "")
     return Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
 
@@ -122,7 +122,7 @@ def test_t1_keeps_250_mm_per_second(requests: Requests) -> None:
 
 
 def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "kr6_bench")
     own = Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
     found = answer(own, PlanCartesianMovement.Request(path="bead"))
@@ -133,7 +133,7 @@ def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
 
 
 def test_a_program_drives_a_path_that_is_named_as_a_stop() -> None:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "kr6_bench")
     own = Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
     request = PlanProgram.Request(stations=["bead"])

@@ -85,7 +85,7 @@ def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_ta
     ],
 )
 def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the_signal(said, sentence):
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     start = np.array(planner.cell.machine_home)
     planner.heard.machines = (said, MachineState("a machine of another cell", "open"))
@@ -136,7 +136,7 @@ def test_a_door_that_closes_on_the_robot_is_refused():
 
 
 def planner_that_hears(*said: MachineState) -> Planner:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     planner.heard.machines = said
     return planner

@@ -1,6 +1,5 @@
 """The torque that plans leave to the feedback: kept at every instant, said in every report, paid in time."""
 
-import time
 from dataclasses import replace
 from functools import cache
 
@@ -19,7 +18,7 @@ RESERVES = (0.0, 0.1, 0.3)
 @cache
 def movement(reserve: float) -> tuple[Planner, MovementPlan]:
     """The fastest movement of a task of the open cell."""
-    planner = Planner(time.monotonic, PlannerSettings(torque_reserve=reserve))
+    planner = Planner(lambda: 0.0, PlannerSettings(torque_reserve=reserve))
     task = planner.set_cell("", "open").task("home->p1")
     goal = Goal(configuration=task.goal, text="p1")
     return planner, planner.plan_regional(task.start, goal, PlanOptions(objective="time"))
