@@ -11,9 +11,12 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from ir_msgs.msg import PowerState
 from ir_msgs_py import names
+from ir_sim_driver.node import SimDriver
+from ir_sim_driver.node.node import REFUSALS
 
 
 def command(**parameters):
@@ -27,19 +30,32 @@ def command(**parameters):
     ("parameters", "sentence"),
     [
         ({"cell": "nowhere"}, "known are"),
-        ({"mac": "abc"}, "six hex bytes"),
-        ({"joint_state_rate": 300}, "must divide 1000 Hz"),
-        ({"backend": "ode"}, "known are pybullet, ideal"),
-        ({"load": "anvil"}, "anvil"),
         ({"plc.owner": r'"\e[2Jme"'}, 'owner is "\\x1b[2Jme": known are any'),
     ],
 )
-def test_a_parameter_that_makes_no_sense_ends_the_start_with_a_sentence(parameters, sentence):
+def test_a_parameter_that_makes_no_sense_ends_the_process_with_a_sentence(parameters, sentence):
     answer = subprocess.run(command(**parameters), capture_output=True, text=True, timeout=180, check=False)
     assert answer.returncode == 1
     assert sentence in answer.stderr
     assert "\x1b" not in answer.stderr
     assert "Traceback" not in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("mac", "abc", "six hex bytes"),
+        ("joint_state_rate", 300, "must divide 1000 Hz"),
+        ("backend", "ode", "known are pybullet, ideal"),
+        ("load", "anvil", "anvil"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_a_refusal_of_the_node(ros_context, name, value, sentence):
+    """One of those that end the process as above."""
+    values = {"cell": "open", "backend": "ideal", "wake_port": 0, name: value}
+    overrides = [Parameter(key, value=each) for key, each in values.items()]
+    with pytest.raises(REFUSALS, match=sentence):
+        SimDriver(context=ros_context, parameter_overrides=overrides)
 
 
 @pytest.mark.parametrize(
@@ -61,7 +77,7 @@ def test_signals_end_it_cleanly_also_two(signals, wait_for):
             executor.spin_once(timeout_sec=0.1)
             return heard
 
-        wait_for(power, timeout=60.0)
+        wait_for(power)
         for number in signals:
             process.send_signal(number)
         assert process.wait(60.0) == 0

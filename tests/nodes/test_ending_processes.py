@@ -52,22 +52,21 @@ def watcher(monkeypatch):
     context.try_shutdown()
 
 
+QUICK = [(names.PLANNER, [TERM, INT]), (names.RECORDER, [INT]), ("ir_play", [TERM, INT])]
+"""Of the others test_driver_process.py, test_runner_process.py and test_recorder_node.py show some."""
+EVERY = [(name, signals) for name in MODULES for signals in ([INT], [TERM], [INT, INT], [TERM, INT])]
+
+
 @pytest.mark.parametrize(
-    "signals",
-    [
-        [INT],
-        [TERM, INT],
-        pytest.param([TERM], marks=pytest.mark.long),
-        pytest.param([INT, INT], marks=pytest.mark.long),
-    ],
+    ("name", "signals"),
+    [*QUICK, *(pytest.param(*each, marks=pytest.mark.long) for each in EVERY if each not in QUICK)],
 )
-@pytest.mark.parametrize("name", MODULES)
 def test_a_node_that_is_asked_to_end_ends_well(name, signals, recording, tmp_path, watcher, wait_for):
     file = recording if name == "ir_play" else tmp_path / "new.mcap"
     words = [str(file) if word == "FILE" else word for word in MODULES[name]]
     process = subprocess.Popen([sys.executable, "-m", *words], stderr=subprocess.PIPE, text=True)
     try:
-        wait_for(lambda: name in watcher.get_node_names(), timeout=60.0)
+        wait_for(lambda: name in watcher.get_node_names())
         for number in signals:
             process.send_signal(number)
         assert process.wait(60.0) == 0
