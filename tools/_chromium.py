@@ -29,7 +29,7 @@ FLAGS = (
     *("--headless=new", "--no-sandbox", "--hide-scrollbars", "--use-angle=swiftshader"),
     *("--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--remote-debugging-port=0", "about:blank"),
 )
-START_SECONDS = 30.0
+START_SECONDS = 60.0
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 ANSWER_SECONDS = 60.0  # a busy machine draws 3D in software
 
@@ -60,7 +60,13 @@ class Browser:
         self._process = subprocess.Popen(
             command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_end_with_parent
         )
-        self._socket = connect(self._address(), max_size=None)
+        self._socket = connect(
+            self._address(),
+            max_size=None,
+            proxy=None,
+            open_timeout=START_SECONDS,
+            ping_timeout=ANSWER_SECONDS,
+        )
         self._number = 0
         self.events: list[Mapping[str, Any]] = []
         return self

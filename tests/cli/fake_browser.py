@@ -13,6 +13,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
+PATIENCE = 60.0  # s: a busy machine
+
 
 class FakeBrowser:
     """Connected until it is closed; `controls` are the panel's by uuid, `nodes` the scene's by name."""
@@ -24,6 +26,9 @@ class FakeBrowser:
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
             origin=None if origin is None else Origin(origin),
             max_size=None,
+            proxy=None,
+            open_timeout=PATIENCE,
+            ping_timeout=PATIENCE,
         )
         self.controls: dict[str, dict[str, Any]] = {}
         self.nodes: dict[str, dict[str, Any]] = {}
@@ -95,4 +100,4 @@ class FakeBrowser:
     def close(self) -> None:
         """Close the connection."""
         self._socket.close()
-        self._thread.join(10.0)
+        self._thread.join(PATIENCE)

@@ -13,6 +13,7 @@ from ir_cli.main import main
 from ir_msgs.msg import Signal
 from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.ros.testing import WaitFor
 
 SERVICE = "/machine/set"
 TOPIC = "/machine/signal"
@@ -73,9 +74,16 @@ def test_echo_prints_the_latched_message(machine: Node, capsys: pytest.CaptureFi
     assert "name: door_open\nvalue: true\n---" in output
 
 
-def test_list_shows_names_with_types(machine: Node, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["list", "topics"]) == 0
-    assert f"{TOPIC} [ir_msgs/msg/Signal]\n" in capsys.readouterr().out
+def test_list_shows_names_with_types(
+    machine: Node, capsys: pytest.CaptureFixture[str], wait_for: WaitFor
+) -> None:
+    """What is there at that moment: discovery may take a busy machine longer than a graph takes to settle."""
+
+    def listed() -> bool:
+        assert main(["list", "topics"]) == 0
+        return f"{TOPIC} [ir_msgs/msg/Signal]\n" in capsys.readouterr().out
+
+    wait_for(listed, what="the topic is listed")
 
 
 def test_a_typo_is_answered_with_the_name_that_was_meant(

@@ -27,6 +27,7 @@ from ir_cli.view.watched import STILL, Watched
 from ir_description import load_cell
 
 PATIENCE = 60.0  # s: a busy machine
+DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # what is here needs no proxy
 CELL = """\
 format: ir_cell/1
 name: small  # a comment
@@ -247,7 +248,7 @@ def _asked(url: str, cookie: str = "") -> tuple[int, str]:
     """Status of a page and the cookie that it sets."""
     request = urllib.request.Request(url, headers={"Cookie": cookie} if cookie else {})
     try:
-        with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+        with DIRECT.open(request, timeout=PATIENCE) as answer:
             return answer.status, answer.headers.get("Set-Cookie", "")
     except urllib.error.HTTPError as error:
         with error:

@@ -47,7 +47,7 @@ def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
     try:
         node = guest.add_node(rclpy.create_node("guest", context=context))
         client = guest.run(lambda: ActionClient(node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY))
-        wait_for(client.server_is_ready, timeout=60.0)
+        wait_for(client.server_is_ready)
         goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(long_movement()))
         heard: list[Any] = []
         accepted = guest.run(lambda: client.send_goal_async(goal, feedback_callback=heard.append))

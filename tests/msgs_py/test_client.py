@@ -15,6 +15,7 @@ from ir_msgs.msg import PowerState, Station, Status
 from ir_msgs.srv import GetTrajectory, SetCell
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros import goals
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
@@ -80,7 +81,8 @@ def cell(ros_context, ros_executor):
 
 
 @pytest.fixture
-def client(cell, ros_context):
+def client(cell, ros_context, monkeypatch):
+    monkeypatch.setattr(client_module, "_CANCEL_GRACE", 60.0)  # s: a busy machine
     with Client(context=ros_context, timeout=60.0) as client:
         yield client
 

@@ -8,6 +8,7 @@ ip link set lo up
 ip link add near type veth peer name far
 unshare --net --mount bash -c 'mount -t tmpfs tmpfs /dev/shm && exec sleep 300' &
 host=$!
+trap 'kill $(jobs -p) 2> /dev/null' EXIT
 for _ in $(seq 100); do [ "$(readlink /proc/$host/ns/net)" != "$(readlink /proc/self/ns/net)" ] && break; sleep 0.05; done
 ip link set far netns $host
 ip addr add 10.9.0.1/24 dev near

@@ -49,7 +49,7 @@ def planner_node(ros_context: Any, cell_name: str) -> Iterator[PlannerNode]:
 def call(planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any) -> Call:
     """Call a service of the planner by its type, name and request; no plan is cut by its usual time."""
 
-    def ask(kind: Any, name: str, /, timeout: float = 120.0, **fields: Any) -> Any:
+    def ask(kind: Any, name: str, /, timeout: float = PATIENT, **fields: Any) -> Any:
         client = ros_executor.run(lambda: ros_node.create_client(kind, f"/ir_planner/{name}"))
         wait_for(client.service_is_ready, what=f"{name} is offered")
         request = kind.Request(**fields)

@@ -59,7 +59,7 @@ def test_a_driver_that_nothing_can_wake_refuses_to_hibernate(
         10,
     )
     start_driver("cell_2", taken_port)
-    with Client("cell_2", context=ros_context) as client:
+    with Client("cell_2", context=ros_context, timeout=60.0) as client:
         answer = client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
         assert "HIB is 1 but ignored: nothing could wake the controller" in answer.status.message
         assert str(taken_port) in answer.status.message
@@ -78,7 +78,7 @@ def test_a_driver_that_nothing_can_wake_refuses_to_hibernate(
 
 def test_a_driver_that_can_be_woken_hibernates(start_driver, ros_context, wait_for):
     start_driver("cell_1", 0)
-    with Client("cell_1", context=ros_context) as client:
+    with Client("cell_1", context=ros_context, timeout=60.0) as client:
         answer = client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
         assert answer.status.message == ""
         wait_for(

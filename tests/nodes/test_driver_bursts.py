@@ -129,7 +129,7 @@ def test_a_press_by_service_counts_in_a_burst_and_all_are_answered(
     wait_for(client.service_is_ready, what="set_plc_input is offered")
     requests = [SetPlcInput.Request(name="emergency_stop", value=k == 0) for k in range(200)]
     futures = ros_executor.run(lambda: [client.call_async(request) for request in requests])
-    wait_for(lambda: all(future.done() for future in futures), timeout=120.0, what="all are answered")
+    wait_for(lambda: all(future.done() for future in futures), what="all are answered")
     wait_for(lambda: PowerMode.EMERGENCY_STOP in modes, what="the stop is latched")
 
 
@@ -143,7 +143,7 @@ def test_more_requests_than_may_wait_are_all_answered(
     wait_for(client.service_is_ready, what="query_modes is offered")
     sent = range(REQUESTS_WAITING + 200)
     futures = ros_executor.run(lambda: [client.call_async(QueryModes.Request()) for _ in sent])
-    wait_for(lambda: all(future.done() for future in futures), timeout=120.0, what="all are answered")
+    wait_for(lambda: all(future.done() for future in futures), what="all are answered")
     refusals = {future.result().status.message for future in futures} - {""}
     assert all("are waiting: send fewer at once" in sentence for sentence in refusals)
 
@@ -175,9 +175,9 @@ def test_forty_goals_are_all_answered_with_a_result(
     )
     wait_for(client.server_is_ready, what="execute_trajectory is offered")
     sent = ros_executor.run(lambda: [client.send_goal_async(ExecuteTrajectory.Goal()) for _ in range(40)])
-    wait_for(lambda: all(future.done() for future in sent), timeout=60.0, what="all goals are taken")
+    wait_for(lambda: all(future.done() for future in sent), what="all goals are taken")
     goals = [future.result() for future in sent]
     results = ros_executor.run(lambda: [goal.get_result_async() for goal in goals if goal.accepted])
-    wait_for(lambda: all(future.done() for future in results), timeout=60.0, what="all goals end")
+    wait_for(lambda: all(future.done() for future in results), what="all goals end")
     assert len(results) == 40
     assert all(future.result().result.error_string for future in results)

@@ -162,7 +162,7 @@ def test_a_jump_aborts_the_goal_with_its_reason_and_the_grid_starts_anew(
     result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=120.0)
     assert result.error_code == ExecuteTrajectory.Result.INVALID_GOAL
     assert f"the clock jumped {where}" in result.error_string
-    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=60.0).error_code == 0
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=120.0).error_code == 0
     assert all(stamp % PERIOD == 0 for stamp in stamps)
     assert sum(gap != PERIOD for gap in gaps(stamps)) == 1
 
@@ -179,7 +179,7 @@ def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(client, c
     clock.start(10 * NS)
     wait_for(lambda: len(stamps) > 100)
     clock.run_at(100.0)
-    wait_for(lambda: stamps[-1] > 40 * NS, timeout=60.0)
+    wait_for(lambda: stamps[-1] > 20 * NS)
     clock.run_at(0.3)  # a busy machine may not follow even at the speed of real time, a frozen clock nobody
     wait_for(lambda: clock.now - stamps[-1] < NS)
     clock.run_at(1.0)

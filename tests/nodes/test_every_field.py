@@ -25,6 +25,7 @@ from ir_cli.processes import NodeProcesses
 from ir_msgs.msg import Status
 from ir_msgs_py.errors import CallTimedOutError
 from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.types import interface_type
 from ir_program_runner.node import ProgramRunnerNode
@@ -141,11 +142,12 @@ def test_a_sample_of_all_fields_is_answered(
     ros_context: Any, ros_executor: Any, wait_for: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(client_module, "_CANCEL_GRACE", ANSWERED)
     overrides = [Parameter(name, value=value) for name, value in {"cell": "demo", **DRIVER}.items()]
     ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
     for make in (ProgramRunnerNode, RecorderNode):
         ros_executor.add_node(make(context=ros_context))
-    with Client(context=ros_context) as client:
+    with Client(context=ros_context, timeout=ANSWERED) as client:
         attack = Attack(client, wait_for)
         attack.put(sampled(attack.cases, seed=1))
         assert attack.wrong == []
@@ -162,6 +164,7 @@ def test_every_field_is_answered_and_no_process_ends_or_grows(
     ros_domain_id: int, wait_for: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(client_module, "_CANCEL_GRACE", ANSWERED)
     with (
         NodeProcesses(tmp_path / "log", {}) as nodes,
         Client(domain_id=ros_domain_id, timeout=ANSWERED) as client,

@@ -53,7 +53,7 @@ def test_a_foreign_type_is_named_where_our_node_is_missing_and_ignored_where_it_
     ros_context: Any, ros_executor: Any, wait_for: Any
 ) -> None:
     name = f"/{names.QUERY_MODES}"
-    with Client(context=ros_context) as client:
+    with Client(context=ros_context, timeout=60.0) as client:
         topic = f"/{names.POWER_STATE}"
         wait_for(lambda: name in client.graph.services(), what="the foreign service is seen")
         wait_for(lambda: topic in client.graph.topics(), what="the foreign topic is seen")

@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from ir_description import cell_to_yaml, load_cell
 from ir_msgs.msg import CellState, Contact, MachineStates, PowerState, ProgramState
 from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_recorder.live import commands
 from ir_recorder.live.node import LiveNode
 from ir_sim_driver.node import SimDriver
 
@@ -64,7 +65,8 @@ class Browser:
 
 
 @pytest.fixture
-def live(ros_context: Any, ros_executor: Any) -> LiveNode:
+def live(ros_context: Any, ros_executor: Any, monkeypatch: pytest.MonkeyPatch) -> LiveNode:
+    monkeypatch.setattr(commands, "PATIENCE", 60.0)  # s: a busy machine
     node: LiveNode = ros_executor.add_node(LiveNode(context=ros_context))
     return node
 

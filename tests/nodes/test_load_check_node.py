@@ -46,7 +46,7 @@ def test_a_load_that_is_not_the_declared_one_is_said_to_everybody(
     sent = ros_executor.run(lambda: client.send_goal_async(goal))
     wait_for(sent.done, what="the goal is taken")
     ended = ros_executor.run(lambda: sent.result().get_result_async())
-    wait_for(ended.done, timeout=60.0, what="the movement ends")
+    wait_for(ended.done, what="the movement ends")
     result = ended.result().result
     assert result.error_code == ExecuteTrajectory.Result.SUCCESSFUL
     (found,) = result.load_check

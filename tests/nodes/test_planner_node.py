@@ -196,7 +196,7 @@ def test_evaluate_trajectory_agrees_with_the_plan_and_gives_profiles(call: Call)
 
 
 def test_plan_program_and_get_program(call: Call) -> None:
-    answer = call(PlanProgram, "plan_program", timeout=120.0)
+    answer = call(PlanProgram, "plan_program")
     assert answer.status.code == Status.SUCCESS, answer.status.message
     assert all(movement.report.certified for movement in answer.movements)
     assert sum(movement.report.energy for movement in answer.movements) == pytest.approx(answer.report.energy)
@@ -216,7 +216,7 @@ def test_a_program_comes_with_its_savings_and_its_front(
         )
     )
     wait_for(lambda: subscription.get_publisher_count() == 1, what="the savings have a publisher")
-    answer = call(PlanProgram, "plan_program", stations=["home", "park"], front_points=3, timeout=120.0)
+    answer = call(PlanProgram, "plan_program", stations=["home", "park"], front_points=3)
     savings = answer.savings
     assert savings.available, savings.sentence
     assert savings.total.share == pytest.approx(1.0 - savings.total.planned / savings.total.common)
@@ -231,7 +231,7 @@ def test_a_program_comes_with_its_savings_and_its_front(
         assert stored.report.duration == pytest.approx(point.cycle_time)
     wait_for(lambda: heard, what="the savings are published")
     assert heard[-1].program_id == savings.program_id
-    plain = call(PlanProgram, "plan_program", stations=["home", "park"], savings=False, timeout=120.0)
+    plain = call(PlanProgram, "plan_program", stations=["home", "park"], savings=False)
     assert not plain.savings.available
     assert "not asked for" in plain.savings.sentence
     ros_executor.run(lambda: ros_node.destroy_subscription(subscription))
@@ -284,7 +284,7 @@ def test_the_action_plans_the_program_with_feedback(
     )
     wait_for(sent.done)
     result = ros_executor.run(sent.result().get_result_async)
-    wait_for(result.done, timeout=60.0)
+    wait_for(result.done)
     assert result.result().result.status.code == Status.SUCCESS
     wait_for(lambda: {"configurations", "movements"} <= set(phases), what="feedback of both phases")
 

@@ -148,10 +148,15 @@ def test_only_the_recorders_own_cell_is_recorded(
         state.publish(PowerState())
     rosout.publish(Log(name="cell_1.ir_planner", msg="last"))
 
-    def last_has_come() -> bool:
-        return any(b"last" in message for message in so_far(tmp_path / "own.mcap", "/rosout"))
+    def own_have_come() -> bool:
+        """The last word, and of each other topic the cell's own message, which comes when it likes."""
+        ends = {"/rosout": b"last", "/diagnostics": b"cell_1/", "/parameter_events": b"/cell_1/"}
+        return all(
+            any(end in message for message in so_far(tmp_path / "own.mcap", topic))
+            for topic, end in ends.items()
+        )
 
-    wait_for(last_has_come)
+    wait_for(own_have_come)
     ros_executor.run(recorder.finish)
     raw = read_raw(tmp_path / "own.mcap")
     assert all(c.topic.startswith("/cell_1/") or c.topic in GLOBAL for c in raw.channels)
@@ -348,7 +353,7 @@ def test_an_unknown_cell_is_refused_before_a_file_is_made(recorder: RecorderNode
     assert not (tmp_path / "d.mcap").exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wait_for: Any) -> None:
     path = tmp_path / "signals.mcap"
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}

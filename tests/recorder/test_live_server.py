@@ -34,7 +34,7 @@ class Cell:
 
     def ask(self, method: str, path: str, body: str | None = None, **headers: str) -> HTTPResponse:
         """An answer; headers by name with _ for -, None for those that a browser sends by itself."""
-        connection = HTTPConnection("127.0.0.1", self.server.port, timeout=30.0)
+        connection = HTTPConnection("127.0.0.1", self.server.port, timeout=60.0)
         named = {name.replace("_", "-"): value for name, value in headers.items()}
         connection.request(method, path, body, named)
         return connection.getresponse()
@@ -166,7 +166,7 @@ def test_browsers_that_never_read_hold_up_nobody_and_too_many_are_refused(cell: 
     next(reader)
     crowd = [socket.create_connection(("127.0.0.1", cell.server.port)) for _ in range(200)]
     for connection in crowd:
-        connection.settimeout(30.0)
+        connection.settimeout(60.0)
         with suppress(ConnectionResetError):  # refused just as well
             assert connection.recv(100).startswith(b"HTTP/1.1 503")
         connection.close()
@@ -195,7 +195,7 @@ def test_words_that_are_no_http_end_their_connection_only(cell: Cell) -> None:
         b"\r\n" * 10,
         b"G" * 70_000 + b"\r\n",
     ):
-        with socket.create_connection(("127.0.0.1", cell.server.port), timeout=30.0) as connection:
+        with socket.create_connection(("127.0.0.1", cell.server.port), timeout=60.0) as connection:
             connection.sendall(words)
             connection.shutdown(socket.SHUT_WR)
             try:

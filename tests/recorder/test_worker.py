@@ -101,7 +101,6 @@ def killed(folder: Path, number: int, wait_for: Any) -> None:
         try:
             wait_for(
                 lambda: struct.unpack("<qq", shown)[1] > 300 + 700 * number or process.poll() is not None,
-                timeout=60.0,
                 what="messages are with the system",
             )
             assert process.poll() is None, "the recording process has ended by itself"

@@ -40,7 +40,7 @@ def test_a_node_that_is_asked_to_end_exits_with_zero(signal_number, moment, ros_
 def test_a_bad_parameter_is_named_and_the_exit_code_is_not_zero(parameter, sentence, monkeypatch):
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     ended = subprocess.run(
-        [*NODE, "--ros-args", "-p", parameter], capture_output=True, text=True, timeout=60.0
+        [*NODE, "--ros-args", "-p", parameter], capture_output=True, text=True, timeout=180.0
     )
     assert ended.returncode == 1
     assert ended.stderr.startswith("ir_program_runner: ")
