@@ -1,15 +1,17 @@
 """Does every planner solve what it is asked, certified? Is an arena that was killed the same afterwards? Do
 layout studies find the best?
 
-    python benchmarks/studies.py [--cell NAME]... [--seeds N] [--planner NAME]... [--coal N] [--quick]
-                                 [--json FILE]
+    python benchmarks/studies.py [--only PART]... [--out FOLDER] [--cell NAME]... [--seeds N]
+                                 [--planner NAME]... [--coal N] [--quick] [--json FILE]
 
 Every planner is asked for every task of the cells, there and back, until it has solved it with one of the
 seeds; Coal looks at its answers every 0.0005 rad, at so many per planner and cell. Then `ir arena` runs the
 cells with one request per run, is killed with SIGKILL once it has made a third, and goes on; its table is
 held against that of an arena which ran through, without the columns of times and without planners that can't
-promise the same bytes. Layout studies of the demonstration: the bounds against an exhaustive grid, at least
-1,000 placements against the given one, and how many programs are planned per second.
+promise the same bytes. Layout studies of the demonstration: the bounds against an exhaustive grid, free and
+in a cycle time; at least 1,000 placements against the given one; and how many programs one, two and four
+processes plan per second. --only runs one of these parts; a layout study that was interrupted goes on where
+it ended when the same --out is given.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from _layout_study import layout_claims
+from _layout_study import LAYOUT_PARTS, layout_claims
 from _regional_ours import asked, planner_of
 from _regional_tasks import Task, tasks_of
 from _results import Claim, at_least, at_most, command_line, finish, line_of
@@ -46,6 +48,7 @@ PLANNERS = (PORTFOLIO, "genetic", "tree", "sbl", "kpiece", "bkpiece", "lbkpiece"
             "aorrtc")  # fmt: skip
 CEILING_S = 60.0  # s of a request: the work ends it, not the clock, also on a machine that others use
 WAIT_S = 600.0
+PARTS = ("planners", "killed", *LAYOUT_PARTS)
 IN_BOTH = ("portfolio", "sbl", "kpiece", "bkpiece", "lbkpiece", "rrt_connect")  # of the arena that is killed
 
 
@@ -65,6 +68,8 @@ def arguments() -> argparse.Namespace:
     parser = command_line(
         __doc__, CELLS, 3, "2 answers per planner that Coal checks, 1 seed and 3 planners of the arena"
     )
+    parser.add_argument("--only", action="append", choices=PARTS, metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("--out", type=Path, help="where layout studies are kept; default: a folder for now")
     parser.add_argument("--planner", action="append", help=f"default: {', '.join(PLANNERS)}")
     parser.add_argument("--coal", type=int, default=24, help="answers per planner and cell that Coal checks")
     given = parser.parse_args()
@@ -180,11 +185,14 @@ def main() -> None:
     """Measure, print, write."""
     given = arguments()
     cells, planners = given.cell or list(CELLS), given.planner or list(PLANNERS)
-    rows = [row for cell in cells for row in answers_of(cell, planners, given)]
-    both = [name for name in planners if name in IN_BOTH][: 3 if given.quick else None] or planners
-    claims = claims_of(rows) if "open" in cells else []
-    claims += killed_and_resumed(cells[:1], both, 1 if given.quick else given.seeds)
-    claims += layout_claims("demo", quick=given.quick)
+    parts, rows, claims = given.only or PARTS, [], []
+    if "planners" in parts:
+        rows = [row for cell in cells for row in answers_of(cell, planners, given)]
+        claims += claims_of(rows) if "open" in cells else []
+    if "killed" in parts:
+        both = [name for name in planners if name in IN_BOTH][: 3 if given.quick else None] or planners
+        claims += killed_and_resumed(cells[:1], both, 1 if given.quick else given.seeds)
+    claims += layout_claims("demo", parts, given.out, quick=given.quick)
     finish(given.json, rows, claims)
 
 
