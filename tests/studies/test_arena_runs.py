@@ -162,6 +162,10 @@ def test_the_database_has_what_planner_arena_asks_for(fought: Fought) -> None:
         assert database.execute("SELECT name, timelimit, runcount FROM experiments").fetchall() == [
             ("open home->p1 synchronous", 0.01, 2)
         ]
+        best = database.execute("SELECT plannerid, avg_solved FROM bestPlannerConfigs").fetchall()
+        assert [(names[planner], solved) for planner, solved in best] == [("sbl", 1.0), ("prm", 0.0)]
+        by_question = "SELECT plannerid, experimentid, avg_solved FROM bestPlannerConfigsPerExperiment"
+        assert len(database.execute(by_question).fetchall()) == 2
         enums = dict(database.execute("SELECT value, description FROM enums WHERE name = 'status'"))
         assert enums == {0: "answered", 1: "died", 2: "cut"}
 

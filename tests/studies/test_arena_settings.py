@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,7 @@ def test_the_example_is_read_and_names_every_key(tmp_path: Path) -> None:
         ("format: ir_cell/1\ncells: [open]\n", "format: ir_arena/1"),
         ("{[", "is no YAML"),
         (HEAD, "cells are missing"),
+        (HEAD + "cells: [open]\nseeds: 2\nseeds: 3\n", "seeds stands twice"),
         (HEAD + "cells: []\n", "cells is empty"),
         (HEAD + "cells: open\n", "cells is 'open': it must be a list of names"),
         (HEAD + "cells: [oven]\n", "oven"),
@@ -86,3 +88,10 @@ def test_a_planner_of_ompl_without_ompl_is_refused_before_anything_runs(
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"nowhere.yaml can't be read: No such file"):
         read_settings(tmp_path / "nowhere.yaml")
+
+
+def test_what_is_no_file_is_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")  # reading it would wait for ever
+    for path in (tmp_path / "pipe.yaml", Path("/dev/zero"), tmp_path):
+        with pytest.raises(SettingsError, match="is no file with settings"):
+            read_settings(path)

@@ -1,4 +1,4 @@
-"""Runs as a database of Planner Arena, in the tables that OMPL's ompl_benchmark_statistics.py writes."""
+"""Runs as a database of Planner Arena: tables and views as OMPL's ompl_benchmark_statistics.py has them."""
 
 from __future__ import annotations
 
@@ -29,6 +29,12 @@ CREATE TABLE runs (id INTEGER PRIMARY KEY AUTOINCREMENT, experimentid INTEGER, p
   FOREIGN KEY (plannerid) REFERENCES plannerConfigs(id) ON DELETE CASCADE);
 CREATE TABLE progress (runid INTEGER, time REAL, best_cost REAL, PRIMARY KEY (runid, time),
   FOREIGN KEY (runid) REFERENCES runs(id) ON DELETE CASCADE);
+CREATE VIEW bestPlannerConfigsPerExperiment AS
+  SELECT plannerid, experimentid, AVG(solved) AS avg_solved, AVG(time) AS avg_total_time
+  FROM runs GROUP BY plannerid, experimentid ORDER BY avg_solved DESC, avg_total_time;
+CREATE VIEW bestPlannerConfigs AS
+  SELECT plannerid, AVG(solved) AS avg_solved, AVG(time) AS avg_total_time
+  FROM runs GROUP BY plannerid ORDER BY avg_solved DESC, avg_total_time;
 """
 _STATUS = ("answered", "died", "cut")
 

@@ -22,6 +22,8 @@ def read_text(path: str | Path) -> str:
     """The text of a settings file. SettingsError where it can't be read."""
     file = Path(path)
     try:
+        if file.exists() and not file.is_file():
+            raise SettingsError(f"{path} is no file with settings")
         if file.stat().st_size > MOST_CHARACTERS:
             raise SettingsError(f"{path} is larger than {MOST_CHARACTERS} bytes: it is no settings file")
         return file.read_text(encoding="utf-8")
@@ -100,10 +102,19 @@ def _within(value: float, low: float, high: float) -> bool:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Without aliases: a few lines of them could stand for gigabytes."""
+    """Without aliases, a few lines of which could stand for gigabytes, and without keys that stand twice."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
             event = self.peek_event()  # type: ignore[no-untyped-call]
             raise yaml.MarkedYAMLError(problem="aliases are not read", problem_mark=event.start_mark)
         return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        keys: list[str] = []
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and key.value in keys:
+                said = f"{key.value:.60} stands twice"
+                raise yaml.MarkedYAMLError(problem=said, problem_mark=key.start_mark)
+            keys.append(str(key.value))
+        return super().construct_mapping(node, deep)
