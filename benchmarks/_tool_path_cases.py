@@ -147,14 +147,14 @@ def _half(
     a, j = (np.concatenate([one, np.zeros(_ASKED)])[:, None] for one in (a, j))
     if at[-1] > length:  # the ramp is longer than the path
         return tuple(np.full((1, spline.c.shape[1]), np.inf) for _ in range(4))  # type: ignore[return-value]
-    sign = -1.0 if back else 1.0  # a motion back in time keeps the same limits
+    sign = -1.0 if back else 1.0  # a stop is a start back in time, with speed and jerk turned round
     q, first, second, third = (spline(length - at if back else at, nu=k) * sign**k for k in range(4))
     v = v[:, None]
     return (
         q,
-        first * v,
+        sign * first * v,
         second * v**2 + first * a,
-        third * v**3 + 3.0 * second * v * a + first * j,
+        sign * (third * v**3 + 3.0 * second * v * a + first * j),
     )
 
 

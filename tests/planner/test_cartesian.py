@@ -30,6 +30,13 @@ def planner() -> Planner:
     return planner
 
 
+@pytest.fixture(scope="module")
+def demo() -> Planner:
+    planner = Planner(time.monotonic)
+    planner.set_cell("", "demo")
+    return planner
+
+
 def pose(x: float, y: float, z: float, rotation: Rotation = DOWN) -> FloatArray:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation.as_matrix(), (x, y, z)
@@ -107,6 +114,31 @@ def test_a_path_that_begins_near_a_singularity_is_driven_slowly_there() -> None:
     found = seen(plan.trajectory, path, planner.scene())
     assert found.error <= plan.tool_error + 1e-6
     assert found.speed <= path.speed_tolerance
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(20008, id="wrist_turns_fast_at_a_slow_start"),
+        pytest.param(20132, id="with_a_free_angle"),
+        pytest.param(20135, id="ramps_as_long_as_the_line"),
+    ],
+)
+def test_what_passes_near_a_singularity_or_needs_long_ramps_is_driven(demo: Planner, seed: int) -> None:
+    path = random_path(np.random.default_rng(seed), demo.scene())
+    plan = demo.plan_cartesian(path, PlanOptions(safety_distance=MARGIN))
+    assert plan.trajectory is not None, plan.status.message
+    found = seen(plan.trajectory, path, demo.scene())
+    assert found.error <= plan.tool_error + 1e-6
+    assert found.speed <= path.speed_tolerance
+
+
+def test_where_no_configuration_leads_on_the_axis_is_named(demo: Planner) -> None:
+    path = random_path(np.random.default_rng(20030), demo.scene())
+    refused = demo.plan_cartesian(path, PlanOptions(safety_distance=MARGIN)).status.message
+    assert "past 0.504 m" in refused
+    assert "joint_a1 reaches its limit of 185 deg" in refused
+    assert "free_angle" in refused
 
 
 @pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 40), marks=pytest.mark.long)], ids=str)

@@ -85,7 +85,12 @@ def _path(text: str, planner: Planner) -> CartesianPath | CellPath:
 
 
 def _kept(plan: CartesianPlan) -> str:
+    notes = [f"\n{stage.note}" for stage in plan.info.stages if stage.name in _SHOWN]
     return (
         f"{plan.lengths[-1]:.3f} m; the tool within {plan.tool_error * 1e3:.3f} mm of its path and within "
         f"{100.0 * plan.speed_deviation:.2f} % of its speed; {plan.configurations} configurations looked at"
+        + "".join(notes)
     )
+
+
+_SHOWN = ("speed", "t1")  # stages whose remarks matter to whoever drives the path

@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.status import StatusCode
+from ir_planner.cartesian.asked import Asked
+from ir_planner.cartesian.chains import Chain
+from ir_planner.cartesian.finer import chains_through
 from ir_planner.cartesian.free_angle import angle_along
 from ir_planner.cartesian.joint_curve import Angle, JointCurve, curve_of
-from ir_planner.cartesian.layers import Chain, Layers, chains
+from ir_planner.cartesian.layers import Layers
 from ir_planner.cartesian.points import SentPath, sent
 from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.speed_law import Span
 from ir_planner.cartesian.timed import timed_stroke
 from ir_planner.cartesian.tool_path import ToolPath
-from ir_planner.checks import FreeSpace
-from ir_planner.request import DURATION_MAX, Context
+from ir_planner.request import DURATION_MAX
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import Movement, within_torque
 
@@ -36,30 +37,14 @@ _LIMITS, _FARTHER = ("velocity", "acceleration", "jerk"), 0.93
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """What a request asks for: the path, as it is drawn, whether its first configuration is given, and T1."""
-
-    path: CartesianPath
-    whole: ToolPath
-    fixed: bool
-    t1: bool
-    context: Context
-
-    @property
-    def space(self) -> FreeSpace:
-        """Where configurations may be."""
-        context = self.context
-        return FreeSpace.of(context.scene, context.safety_distance, context.work, context.station)
-
-
-@dataclass(frozen=True, eq=False)
 class DrivenPath:
-    """A chain as a movement, and what it keeps of the path."""
+    """A chain as a movement, and what it keeps of the path; longer: its ramps reach as far as it takes."""
 
     movement: Movement
     sent: SentPath
     angle: Angle | None
     chain: Chain
+    longer: bool = False
 
 
 def best_along(asked: Asked, layers: Layers) -> DrivenPath:
@@ -73,7 +58,7 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
         asked.context.work.check()
         with journal.stage("search") as notes:
             try:
-                found = chains(layers, asked.path.tool_speed, asked.space, _TRIED)
+                found, layers = chains_through(asked, layers, _TRIED)
             except PathRefusedError as error:
                 raise reason or error from error
             notes.append(f"{len(found)} chains")
@@ -97,7 +82,16 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
 
 
 def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRefusedError | None]:
-    """The first chains that keep the speed, and why the first of the others doesn't."""
+    """The first chains that keep the speed, by longer ramps if none does with short ones, and why the first
+    of the others doesn't.
+    """
+    driven, reason = _driven_with(asked, found, longer=False)
+    return (driven, reason) if driven else (_driven_with(asked, found, longer=True)[0], reason)
+
+
+def _driven_with(
+    asked: Asked, found: list[Chain], *, longer: bool
+) -> tuple[list[DrivenPath], PathRefusedError | None]:
     driven: list[DrivenPath] = []
     reason: PathRefusedError | None = None
     for chain in found:
@@ -106,9 +100,10 @@ def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRef
         if not _worth(chain, driven, asked.context.options.objective):
             continue
         try:
-            driven.append(timed(asked, chain))
+            driven.append(timed(asked, chain, longer=longer))
         except PathRefusedError as error:
-            asked.context.journal.reject(str(error))
+            if not longer:
+                asked.context.journal.reject(str(error))
             reason = reason or error
     return driven, reason
 
@@ -130,7 +125,7 @@ def within_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
     if violation is None or violation.what not in _LIMITS:
         return one
     try:
-        return timed(asked, one.chain, _FARTHER)
+        return timed(asked, one.chain, _FARTHER, longer=one.longer)
     except PathRefusedError:
         return one
 
@@ -159,25 +154,28 @@ def _without(layers: Layers, one: DrivenPath) -> Layers:
     return replace(layers, free=layers.free & ~near)
 
 
-def timed(asked: Asked, chain: Chain, share: float = 1.0) -> DrivenPath:
-    """A chain with its time, within a share of the limits. Raises PathRefusedError."""
+def timed(asked: Asked, chain: Chain, share: float = 1.0, *, longer: bool = False) -> DrivenPath:
+    """A chain with its time, within a share of the limits; longer: ramps reach as far as it takes. Raises
+    PathRefusedError.
+    """
     path, whole, scene = asked.path, asked.whole, asked.context.scene
     angle, chain = angle_along(whole, chain, path.free_angle, asked.space, asked.fixed)
     ends = _strokes(whole)
     curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
     slower = _flange_share(asked, curves) if asked.t1 else 1.0
+    along = [_spans(whole, a, b, slower) for a, b in ends]
     made: list[DrivenPath] = []
 
     def within(limits: MotionLimits) -> Movement:
         limits = limits.scaled(share, share)
         strokes = tuple(
-            timed_stroke(curve, _spans(whole, a, b, slower), path.speed_tolerance, limits, scene)
-            for curve, (a, b) in zip(curves, ends, strict=True)
+            timed_stroke(curve, spans, path.speed_tolerance, limits, scene, longer=longer)
+            for curve, spans in zip(curves, along, strict=True)
         )
         _check_duration(sum(stroke.duration for stroke in strokes), asked)
         points = sent(strokes, limits, scene)
         movement = Movement(chain.q, points.trajectory, asked.context, fixed_time=True)
-        made.append(DrivenPath(movement, points, angle, chain))
+        made.append(DrivenPath(movement, points, angle, chain, longer))
         return movement
 
     within_torque(within, asked.context)

@@ -13,8 +13,9 @@ import numpy as np
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.cartesian import CartesianPath
 from ir_planner.cartesian.best import DrivenPath, best_along, timed, within_limits
+from ir_planner.cartesian.chains import Chain
 from ir_planner.cartesian.drawn import Drawn, drawn
-from ir_planner.cartesian.layers import Chain, chains
+from ir_planner.cartesian.finer import chains_through
 from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import extremes
@@ -80,14 +81,10 @@ def _ends_free(whole: Drawn, after: FreeSpace) -> BoolArray:
 def _different(whole: Drawn) -> list[Chain]:
     """The cheapest chains by their ends and by their starts, each once, cheapest first."""
     asked, layers = whole.asked, whole.layers
-    speed = asked.path.tool_speed
-    found = [
-        chain
-        for by_start in (False, True)
-        for chain in chains(layers, speed, asked.space, _OF_EACH, by_start=by_start)
-    ]
+    by_end, layers = chains_through(asked, layers, _OF_EACH)
+    by_start, _ = chains_through(asked, layers, _OF_EACH, by_start=True)
     kept: list[Chain] = []
-    for chain in sorted(found, key=lambda one: one.joules):
+    for chain in sorted((*by_end, *by_start), key=lambda one: one.joules):
         if all(np.abs(np.sin(0.5 * (chain.q - other.q))).max() > 0.5 * _SAME for other in kept):
             kept.append(chain)
     return kept

@@ -7,7 +7,8 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.status import StatusCode
-from ir_planner.cartesian.best import T1_SPEED, Asked, DrivenPath
+from ir_planner.cartesian.asked import Asked
+from ir_planner.cartesian.best import T1_SPEED, DrivenPath
 from ir_planner.cartesian.corners import Joint, joined
 from ir_planner.cartesian.layers import Layers, layers_of
 from ir_planner.cartesian.parts import parts_of

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from ir_msgs_py.arrays import FloatArray
+from ir_planner.cartesian.chains import Chain
 from ir_planner.cartesian.joint_curve import Angle, followed, tool_poses
-from ir_planner.cartesian.layers import Chain
 from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.checks import FreeSpace

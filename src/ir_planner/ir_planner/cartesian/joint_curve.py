@@ -9,7 +9,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
-from ir_planner.cartesian.layers import JUMP, Chain
+from ir_planner.cartesian.chains import JUMP, Chain
 from ir_planner.cartesian.orientations import Rates, about_tool, rates_of
 from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.tool_path import ToolPath

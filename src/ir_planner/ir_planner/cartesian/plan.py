@@ -6,7 +6,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cartesian.answer import CartesianPlan
-from ir_planner.cartesian.best import best_along
+from ir_planner.cartesian.best import DrivenPath, best_along
 from ir_planner.cartesian.drawn import drawn
 from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.tool_path import HeadingError
@@ -35,6 +35,8 @@ def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: C
     found = best_along(whole.asked, whole.layers)
     with context.journal.stage("tool error"):
         kept = whole.kept(found)
+    if found.longer:
+        context.journal.note("speed", _kept_between(found))
     trajectory = found.movement.trajectory
     info = context.journal.info(trajectory.positions[0], context.joint_names)
     return CartesianPlan(
@@ -48,6 +50,20 @@ def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: C
         whole.lengths,
         len(whole.layers.q),
     )
+
+
+def _kept_between(found: DrivenPath) -> str:
+    """Where the tool keeps its speed, whose ramps are long."""
+    stretches = [
+        (stroke.curve.begin + begin, stroke.curve.begin + end)
+        for stroke in found.sent.strokes
+        for begin, end, even in zip(
+            stroke.law.places[:-1], stroke.law.places[1:], stroke.law.even, strict=True
+        )
+        if even
+    ]
+    where = ", ".join(f"from {begin:.3f} to {end:.3f} m" for begin, end in stretches) or "nowhere"
+    return f"the axes need long ramps: the tool keeps its speed {where}"
 
 
 def heading_status(error: HeadingError) -> Status:

@@ -2,7 +2,7 @@
 follow; within the tolerance slower where they can't, else refused with the place and the axis.
 """
 
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,37 +10,23 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import convolve1d, maximum_filter1d
 
-from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
+from ir_planner.cartesian.driven import Driven, driven, use_of
 from ir_planner.cartesian.joint_curve import JointCurve, singularity
+from ir_planner.cartesian.ramps import ENOUGH, PER_RAMP, USED, ramps_of
 from ir_planner.cartesian.refusal import PathRefusedError
-from ir_planner.cartesian.speed_law import Span, SpeedLaw, TooShortError, law_of, ramp_places
+from ir_planner.cartesian.speed_law import Span, SpeedLaw, TooShortError, law_of
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
-from ir_planner.timing import lasting_longer
 
-_RAMPS = np.geomspace(0.01, 10.0, 13)  # s
-_FINER, _ZOOMS, _PER_RAMP = 8, 3, 13
-_USED = 0.97  # of a limit: the interpolant between points needs a little more than the samples
 _STEP_S, _SAMPLES_MIN, _SAMPLES_MAX = 4e-3, 200, 6000
 _WARP_S, _WARP_MIN, _WARP_MAX = 0.02, 60, 1500  # of the slowness' knots
 _ROUNDS, _AROUND = 25, 4
-_ENOUGH = 1.0 + 1e-4
+_USED_AT_MOST = 0.995  # of a limit, by ramps that are too long for their part otherwise
+_GROWTH, _GROWTHS = 1.2, 30  # of a ramp
 _SLOWER = 0.85
 _SHOWN = 0.95  # of the tolerance: what is shown of the speed is a bound, a little above what it is at samples
 _SLOWEST = 1e-4  # m/s
-
-
-@dataclass(frozen=True, eq=False)
-class Driven:
-    """Motion at M instants: t (M,) s, s (M,) m along the path, speed (M,) m/s; q, qd, qdd, qddd (M, n)."""
-
-    t: FloatArray
-    s: FloatArray
-    speed: FloatArray
-    q: FloatArray
-    qd: FloatArray
-    qdd: FloatArray
-    qddd: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,53 +66,80 @@ class TimedStroke:
         return driven(self.curve, t, self.curve.begin + s, v, a, j)
 
 
-def driven(
-    curve: JointCurve, t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
-) -> Driven:
-    """The axes at s (M,) with speed, acceleration and jerk (M,) along the path."""
-    along = curve.at(np.clip(s, curve.begin, curve.end))
-    return _with_speed(along, t, s, v, a, j)
-
-
-def _with_speed(
-    along: tuple[FloatArray, ...], t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
-) -> Driven:
-    """The same from q and its derivatives by s (M, n)."""
-    q, first, second, third = along
-    v1, a1, j1 = v[:, None], a[:, None], j[:, None]
-    qd = first * v1
-    qdd = second * v1**2 + first * a1
-    qddd = third * v1**3 + 3.0 * second * v1 * a1 + first * j1
-    return Driven(t, s, v, q, qd, qdd, qddd)
-
-
-def use_of(motion: Driven, limits: MotionLimits, scene: PlanningScene) -> FloatArray:
-    """By what factor (M,) a motion would have to last longer; at most 1: within the limits."""
-    torque = torque_use(scene.dynamics, motion.q, motion.qd, motion.qdd)
-    return lasting_longer(limits, np.abs(motion.qd), np.abs(motion.qdd), np.abs(motion.qddd), torque)
-
-
 def timed_stroke(
     curve: JointCurve,
     spans: tuple[Span, ...],
     tolerance: float,
     limits: MotionLimits,
     scene: PlanningScene,
+    *,
+    longer: bool = False,
 ) -> TimedStroke:
-    """The stroke from rest to rest within the limits. Raises PathRefusedError with place and axis."""
-    slow = True
-    while True:
-        ramps = np.array([_ramp(curve, spans, k, limits, scene, slow) for k in range(len(spans) + 1)])
-        try:
-            made = TimedStroke(curve, law_of(spans, ramps))
-            break
-        except TooShortError as error:
-            spans = spans if slow else _slower(spans, error, tolerance, ramps)
-            slow = False
-    tau = _instants(made.law)
-    if use_of(made.at(tau), limits, scene).max() <= _ENOUGH:
+    """The stroke from rest to rest within the limits. Raises PathRefusedError with place and axis.
+
+    longer: where it would be refused, ramps reach as far along the path as it takes.
+    """
+    spans, ramps = _fitting(curve, spans, tolerance, limits, scene)
+    made = TimedStroke(curve, law_of(spans, ramps))
+    if use_of(made.at(_instants(made.law)), limits, scene).max() <= ENOUGH:
         return made
-    return _slowed(made, tolerance, limits, scene)
+    try:
+        return _slowed(made, tolerance, limits, scene)
+    except PathRefusedError:
+        grown = _grown(made, spans, ramps, limits, scene) if longer else None
+        if grown is None:
+            raise
+        return grown
+
+
+def _fitting(
+    curve: JointCurve,
+    spans: tuple[Span, ...],
+    tolerance: float,
+    limits: MotionLimits,
+    scene: PlanningScene,
+) -> tuple[tuple[Span, ...], FloatArray]:
+    """Spans and ramps that fit into them. Raises PathRefusedError."""
+    for slow, used in ((True, USED), (True, _USED_AT_MOST)):
+        ramps = ramps_of(curve, spans, limits, scene, slow=slow, used=used)
+        with suppress(TooShortError):
+            law_of(spans, ramps)
+            return spans, ramps
+    while True:
+        ramps = ramps_of(curve, spans, limits, scene, slow=False)
+        try:
+            law_of(spans, ramps)
+            return spans, ramps
+        except TooShortError as error:
+            spans = _slower(spans, error, tolerance, ramps)
+
+
+def _grown(
+    made: TimedStroke,
+    spans: tuple[Span, ...],
+    ramps: FloatArray,
+    limits: MotionLimits,
+    scene: PlanningScene,
+) -> TimedStroke | None:
+    """The stroke with longer ramps to the ends that are nearest to where it exceeds the limits; None where
+    they don't fit.
+    """
+    ends = np.concatenate([[0.0], np.cumsum([span.length for span in spans])])
+    speeds = np.array([0.0, *(span.speed for span in spans), 0.0])
+    for _ in range(_GROWTHS):
+        motion = made.at(_instants(made.law))
+        use = use_of(motion, limits, scene)
+        if use.max() <= ENOUGH:
+            return made
+        away = np.abs(ends - (motion.s[int(np.argmax(use))] - made.curve.begin))
+        k = int(np.argmin(away))
+        reaching = 2.0 * float(away[k]) / (speeds[k] + speeds[k + 1])
+        ramps = np.where(np.arange(len(ramps)) == k, np.maximum(_GROWTH * ramps, reaching), ramps)
+        try:
+            made = replace(made, law=law_of(spans, ramps))
+        except TooShortError:
+            return None
+    return None
 
 
 def _slower(
@@ -146,75 +159,9 @@ def _slower(
 
 def _instants(law: SpeedLaw) -> FloatArray:
     count = int(np.clip(law.total / _STEP_S, _SAMPLES_MIN, _SAMPLES_MAX))
-    share = np.linspace(0.0, 1.0, _PER_RAMP)
+    share = np.linspace(0.0, 1.0, PER_RAMP)
     inner = (law.times[:-1, None] + share * law.duration[:, None]).ravel()
     return np.unique(np.concatenate([np.linspace(0.0, law.total, count), inner]))
-
-
-def _ramp(
-    curve: JointCurve,
-    spans: tuple[Span, ...],
-    k: int,
-    limits: MotionLimits,
-    scene: PlanningScene,
-    slow: bool,
-) -> float:
-    """The shortest ramp [s] between the speeds at boundary k that needs no more of the limits than the
-    constant speed beside it does. slow: where that is too much, one that keeps them, if there is one; a path
-    that begins near a singularity is driven slowly there.
-    """
-    _, first, last = ramp_places(spans, k, _RAMPS[:1])
-    if first == last:
-        return 0.0
-
-    def use(durations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return _ramps_use(curve, spans, k, durations, limits, scene)
-
-    found = _shortest(lambda durations: np.less_equal(*_beside(*use(durations))))
-    if slow and use(np.array([found]))[0][0] > _ENOUGH:
-        longer = _shortest(lambda durations: use(durations)[0] <= _USED)
-        if use(np.array([longer]))[0][0] <= _ENOUGH:
-            return longer
-    return found
-
-
-def _shortest(fits_of: Callable[[FloatArray], BoolArray]) -> float:
-    """The shortest duration [s] that fits, the longest where none does."""
-    durations = _RAMPS
-    for _ in range(_ZOOMS):
-        fits = fits_of(durations)
-        d = int(np.argmax(fits)) if fits.any() else len(fits) - 1
-        low = durations[max(d - 1, 0)]
-        durations, found = np.linspace(low, durations[d], _FINER), float(durations[d])
-    return found
-
-
-def _beside(ramp: FloatArray, cruise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What ramps (R,) need, and what they may."""
-    return ramp, np.maximum(_USED, cruise)
-
-
-def _ramps_use(
-    curve: JointCurve,
-    spans: tuple[Span, ...],
-    k: int,
-    durations: FloatArray,
-    limits: MotionLimits,
-    scene: PlanningScene,
-) -> tuple[FloatArray, FloatArray]:
-    """What ramps of these durations (R,) s need of the limits (R,), and the constant speed there (R,)."""
-    begin, first, last = ramp_places(spans, k, durations)
-    x, T = np.linspace(0.0, 1.0, _PER_RAMP), durations[:, None]
-    rise = last - first
-    s = curve.begin + begin[:, None] + T * x * (first + rise * x**2 * (1.0 - 0.5 * x))
-    v = np.broadcast_to(first + rise * x**2 * (3.0 - 2.0 * x), s.shape)
-    a, j = rise / T * 6.0 * x * (1.0 - x), rise / T**2 * (6.0 - 12.0 * x)
-    none, places = np.zeros(s.size), s.ravel()
-    even = np.full(s.size, max(first, last))
-    along = curve.at(np.clip(places, curve.begin, curve.end))
-    ramp = use_of(_with_speed(along, none, places, v.ravel(), a.ravel(), j.ravel()), limits, scene)
-    cruise = use_of(_with_speed(along, none, places, even, none, none), limits, scene)
-    return ramp.reshape(s.shape).max(axis=1), cruise.reshape(s.shape).max(axis=1)
 
 
 def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene) -> TimedStroke:
@@ -232,7 +179,7 @@ def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: Pl
     for _ in range(_ROUNDS):
         slowed = replace(made, slowness=make_interp_spline(knots, slowness, k=5))
         use = use_of(slowed.at(tau), limits, scene)
-        if use.max() <= _ENOUGH:
+        if use.max() <= ENOUGH:
             return slowed
         at_knots = np.ones(len(knots))
         np.maximum.at(at_knots, owner, use)
