@@ -115,7 +115,7 @@ def killed(folder: Path, number: int, wait_for: Any) -> None:
 
 
 def test_a_killed_recording_holds_what_was_flushed(tmp_path: Path, wait_for: Any) -> None:
-    for number in range(5):
+    for number in (0, 2, 4):
         killed(tmp_path, number, wait_for)
 
 
