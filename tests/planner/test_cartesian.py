@@ -32,7 +32,7 @@ def planner() -> Planner:
 
 @pytest.fixture(scope="module")
 def demo() -> Planner:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     return planner
 
