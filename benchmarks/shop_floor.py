@@ -4,9 +4,9 @@
 
 Every cell's program, or a random visit of its stations for each seed, is planned, written as KRL, read back,
 driven by the controller's model and certified again: what that costs, how near the ends come, and what Coal
-at 0.0005 rad and limits at 10 kHz say of it. The programs of the tests' corpus make the same trip. Three
-programs of today are held against the planner's. Motions of known energy are sampled with noise and judged
-from positions alone.
+at 0.0005 rad and limits at 10 kHz say of it. The programs of the tests' corpus make the same trip. Four
+programs of today, one of them with a seam, are held against the planner's. Motions of known energy are
+sampled with noise and judged from positions alone.
 """
 
 from __future__ import annotations

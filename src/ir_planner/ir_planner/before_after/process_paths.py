@@ -21,6 +21,7 @@ Lines = Sequence[tuple[int, int]]
 _AS_SLOW_AS_NEEDED = 1.0  # speed tolerance: where an axis can't follow the controller slows the tool as well
 _SAME_PLACE = 2e-3  # m, and of the rotation's entries: as for stations
 _NAMED = 6  # places in a note
+_SAME_CORNER = 0.1  # mm
 
 
 def process_paths(steps: Sequence[DrivenStep], lines: Lines | None) -> tuple[CellPath | None, ...]:
@@ -48,15 +49,34 @@ def process_paths(steps: Sequence[DrivenStep], lines: Lines | None) -> tuple[Cel
 def process_notes(steps: Sequence[DrivenStep], paths: Sequence[CellPath | None]) -> list[str]:
     """Which motions of the tool are kept as paths, and which the planner may replace."""
     driven = dict.fromkeys(path.name for path in paths if path is not None)
-    pairs = zip(steps, paths, strict=True)
+    pairs = list(zip(steps, paths, strict=True))
     free = [lines_of(step.places) for step, path in pairs if path is None and _may_work(step)]
     notes = [f"driven as paths of the tool by every program: {_listed(driven)}"] if driven else []
+    for name in driven:
+        run = [step for step, path in pairs if path is not None and path.name == name]
+        notes += [sentence] if (sentence := _corners(name, run)) else []
     if free:
         notes.append(
             f"motions of the tool taken for positioning, which the planner replaces: {_listed(free)}; "
             "where they are a process, name their lines (--process)"
         )
     return notes
+
+
+def _corners(name: str, run: Sequence[DrivenStep]) -> str:
+    """What is changed at the corners of a path whose motions have different ones; "" where nothing is."""
+    corners = [1e3 * one.corner for one in _drawn(run)[:-1]]
+    if not corners or max(corners) - min(corners) < _SAME_CORNER:
+        return ""
+    kept = "exactly" if min(corners) == 0.0 else f"with {min(corners):.3g} mm"
+    return (
+        f"{name}: its corners are approximated by {min(corners):.3g} to {max(corners):.3g} mm today; a path "
+        f"has one distance for all: the planner's programs drive them {kept}, which takes them longer"
+    )
+
+
+def _drawn(run: Sequence[DrivenStep]) -> list[ToolMotion]:
+    return [one for step in run for one in step.tool if one is not None]
 
 
 def same_poses(first: CartesianPath, second: CartesianPath) -> bool:
@@ -126,7 +146,7 @@ def _check_alone(step: DrivenStep, worked: tuple[Place, ...]) -> None:
 
 def _path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
     """The path through all motions of steps that follow each other."""
-    motions: list[ToolMotion] = [one for step in run for one in step.tool if one is not None]
+    motions = _drawn(run)
     segments = tuple(segment for motion in motions for segment in motion.segments)
     first, last = run[0].places[0].line, run[-1].places[-1].line
     base = f"lines_{first}_to_{last}" if first != last else f"line_{first}"
