@@ -68,6 +68,44 @@ def test_the_table_has_the_years_of_the_costs(compared: BeforeAfter, tmp_path: P
     np.testing.assert_equal(stored.to_pydict(), columns)
 
 
+def test_every_amount_of_the_table_follows_from_the_joules(compared: BeforeAfter) -> None:
+    """By their own arithmetic: shifts, years, money and CO2 with their intervals, and sums over the steps."""
+    costs = Costs(
+        price=0.31, grid=0.12, shift_hours=7.5, shifts_per_day=3, days_per_year=300, availability=0.9
+    )
+    columns = before_after_columns(compared, costs)
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    wholes = [row for row in rows if row["what"] == "cycle"]
+    assert len(wholes) == 4
+    for whole in wholes:
+        cycle_time = 60.0 if whole["program"] == "for the line" else wholes[0]["seconds_s"]
+        cycles = 7.5 * 3600 * 0.9 / cycle_time
+        assert whole["shift_cycles"] == pytest.approx(cycles)
+        for end in ("", "_low", "_high"):
+            kwh = whole[f"energy{end}_j"] / 3.6e6
+            assert whole[f"shift_kwh{end}"] == pytest.approx(kwh * cycles)
+            assert whole[f"year_kwh{end}"] == pytest.approx(kwh * cycles * 900)
+            assert whole[f"year_money{end}"] == pytest.approx(kwh * cycles * 900 * 0.31)
+            assert whole[f"year_co2_kg{end}"] == pytest.approx(kwh * cycles * 900 * 0.12)
+            saved = whole[f"saved{end}_j"] / 3.6e6
+            assert whole[f"year_saved_money{end}"] == pytest.approx(saved * cycles * 900 * 0.31)
+        assert 0.0 < whole["peak_low_w"] <= whole["peak_w"] <= whole["peak_high_w"] < 2.0 * whole["peak_w"]
+        own = [row for row in rows if row["program"] == whole["program"] and row["what"] != "cycle"]
+        steps = [row for row in own if not row["what"].startswith("change")]
+        for name in ("seconds_s", "energy_j"):
+            assert sum(row[name] for row in steps) == pytest.approx(whole[name])
+    changes = [row for row in rows if row["what"].startswith("change")]
+    assert [row["saved_j"] for row in changes] == [change.saving.saved for change in compared.changes]
+
+
+def test_a_program_that_is_too_slow_for_the_cycles_says_so(compared: BeforeAfter, planner: Planner) -> None:
+    assert "fit: it is slower" not in before_after_html(compared, planner.cell)
+    free = compared.sides[1]
+    slow = replace(free, report=replace(free.report, duration=1.5 * compared.today.report.duration))
+    page = before_after_html(replace(compared, sides=(compared.sides[0], slow)), planner.cell)
+    assert "only 324 fit: it is slower" in page
+
+
 def test_the_command_writes_the_page_and_prints_the_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -50,6 +50,12 @@ def test_a_file_says_what_a_joule_costs(tmp_path: Path) -> None:
         ("format: ir_costs/1\ncurrency: 12", "must be a text"),
         ("format: [", "costs.yaml"),
         ("[" * 5000, "costs.yaml"),
+        (
+            "format: ir_costs/1\nshift_hours: 12\nshifts_per_day: 3",
+            "together they must be at most 24 h a day",
+        ),
+        ('format: ir_costs/1\ncurrency: "a\\nb"', "at most 12 characters in one line"),
+        ("format: ir_costs/1\ncurrency: '  '", "at most 12 characters in one line"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_a_sentence(tmp_path: Path, text: str, words: str) -> None:

@@ -34,7 +34,7 @@ class Side:
 
     movements, report, hops: empty where `problem` says why there is none. time (N,) s, watts (N,): power at
     the mains, means over even steps. saving: of today's energy; where the line needs more time than today's
-    program takes, of today's that waits at its end.
+    program takes, of today's that waits at its end. peak: ends of the 90 % interval of its peak power [W].
     """
 
     name: str
@@ -46,6 +46,7 @@ class Side:
     watts: FloatArray = field(default_factory=lambda: np.zeros(0))
     saving: Saving = field(default_factory=Saving)
     problem: str = ""
+    peak: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("time", "watts"):

@@ -40,6 +40,8 @@ COLUMNS: Columns = {
     "saved_low": ("from", number(0)),
     "saved_high": ("to", number(0)),
     "peak_watts": ("peak kW", number(1, 1e-3)),
+    "peak_low": ("from", number(1, 1e-3)),
+    "peak_high": ("to", number(1, 1e-3)),
     "clearance": ("clearance mm", number(1, 1e3)),
     "note": ("", text),
 }
@@ -156,6 +158,8 @@ def row_of(side: Side) -> Row:
         "saved_low": low,
         "saved_high": high,
         "peak_watts": report.peak_power if there else None,
+        "peak_low": side.peak[0] if there else None,
+        "peak_high": side.peak[1] if there else None,
         "clearance": report.min_clearance if there else None,
         "certified": side.certified if there else None,
         "note": side.problem or _note(side),

@@ -9,6 +9,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.before_after import Hop, Side
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.savings import Saving
+from ir_planner.before_after.peaks import peak_interval
 from ir_planner.checks import interval, movement_energy, total_report
 from ir_planner.program import ProgramRequest, Spreads
 from ir_planner.scene import scene_with
@@ -87,7 +88,8 @@ def side_of(name: str, cycle_time: float, program: Costed, request: ProgramReque
         report = replace(report, power_parameters=parameters.name)
     time, watts = _power(steps, request)
     hops = tuple(_hop(hop) for hop in hops_of(program))
-    return Side(name, cycle_time, steps, report, hops, time, watts, saved)
+    peak = peak_interval(steps, request)
+    return Side(name, cycle_time, steps, report, hops, time, watts, saved, "", (peak.low, peak.high))
 
 
 def hops_of(program: Costed) -> list[CostedHop]:

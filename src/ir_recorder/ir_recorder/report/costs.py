@@ -22,7 +22,7 @@ import yaml
 
 from ir_description import DescriptionError
 from ir_description.files import read_regular_file
-from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.errors import InvalidValueError, MsgsError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.settings import Setting, check_settings, describe, setting
 from ir_recorder.errors import CostsError
@@ -31,6 +31,7 @@ FORMAT = "ir_costs/1"
 _BYTES_MAX = 100_000
 _CURRENCY_MAX = 12  # characters
 J_PER_KWH = 3.6e6
+_DAY = 24.0  # h
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,11 @@ class Costs:
 
     def __post_init__(self) -> None:
         check_settings(self)
+        if self.shift_hours * self.shifts_per_day > _DAY:
+            raise InvalidValueError(
+                f"shift_hours is {self.shift_hours:g} h and shifts_per_day {self.shifts_per_day:g}: "
+                f"together they must be at most {_DAY:g} h a day"
+            )
 
     def money(self, energy: float) -> float:
         """Price of so many joules."""
@@ -107,8 +113,12 @@ def _checked(where: str, key: str, value: object) -> float | str:
     if key not in NAMES:
         raise CostsError(f"{where} is unknown, known are {', '.join(NAMES)}")
     if key in _WORDS:
-        if not isinstance(value, str) or not 0 < len(value) <= _CURRENCY_MAX:
-            raise CostsError(f"{where} must be a text of at most {_CURRENCY_MAX} characters")
+        if (
+            not isinstance(value, str)
+            or not 0 < len(value.strip()) <= _CURRENCY_MAX
+            or not value.isprintable()
+        ):
+            raise CostsError(f"{where} must be a text of at most {_CURRENCY_MAX} characters in one line")
         return value
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise CostsError(f"{where} is {str(value)[:40]!r}, it must be a number")

@@ -29,11 +29,12 @@ class Amount:
 @dataclass(frozen=True)
 class Year:
     """A program in production: its cycles, the energy [J] of a shift and of a year, and what it saves a year
-    [J].
+    [J]. fit_a_shift: cycles that it can make; fewer where it takes longer than those that are counted.
     """
 
     cycles_a_shift: float
     cycles_a_year: float
+    fit_a_shift: float
     shift: Amount
     energy: Amount
     saved: Amount
@@ -47,4 +48,5 @@ def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
     report, saving = side.report, side.saving
     cycle = Amount(report.energy, report.energy_low, report.energy_high)
     saved = Amount(saving.saved, saving.saved_low, saving.saved_high)
-    return Year(shift, year, cycle.times(shift), cycle.times(year), saved.times(year))
+    fit = costs.cycles_per_shift(max(report.duration, 1e-9))
+    return Year(shift, year, fit, cycle.times(shift), cycle.times(year), saved.times(year))

@@ -13,6 +13,7 @@ from ir_recorder.report.words import DASH, joules, kilowatt_hours, millimetres, 
 
 WORK = {1: "a power mode", 2: "other times on the same path", 3: "another path"}
 Show = Callable[[float], str]
+_FIT = 0.999  # of the cycles: fewer are said
 OPEN = "zero lies in it: it is open whether anything is saved"
 
 
@@ -27,7 +28,12 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
         ("saved a year", money(costs.money(year.value), costs.currency), _money(year, costs)),
         ("CO2 saved a year", number(costs.co2(year.value), "kg"), f"{kilowatt_hours(year.value)} less"),
         ("cycle time", seconds(report.duration), f"today {seconds(today.duration)}", side.name),
-        ("peak power", watts(report.peak_power), f"today {watts(today.peak_power)}"),
+        (
+            "peak power",
+            watts(report.peak_power),
+            _between(*side.peak, watts),
+            f"today {watts(today.peak_power)}",
+        ),
     )
     return "".join(
         f'<div class="tile"><span>{text(name)}</span>{_cell(value, *lines)}</div>'
@@ -50,7 +56,10 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
         ("costs a year", *(_cost(year.energy if year else None, costs) for year in years)),
         ("saved a year", *(_cost(year.saved if year and k else None, costs) for k, year in enumerate(years))),
         ("CO2 a year", *(_co2(year, costs) for year in years)),
-        ("peak power", *(_of(side, watts(side.report.peak_power)) for side in sides)),
+        (
+            "peak power",
+            *(_of(side, watts(side.report.peak_power), _between(*side.peak, watts)) for side in sides),
+        ),
         ("least clearance", *(_of(side, millimetres(side.report.min_clearance)) for side in sides)),
         ("clearance and limits", *(_proof(side) for side in sides)),
     ]
@@ -115,7 +124,8 @@ def assumptions(found: BeforeAfter, costs: Costs) -> str:
         f"of the power parameters ({parameters}). What is saved has an interval of its own: the same drawn "
         "robots drive both programs. Intervals by the data sheet lie mostly above their values: losses that "
         "it puts at zero can only add. A year has as many cycles for every program as today's can make, in "
-        "the column for the line as many as the line asks for; what is left of a shift counts nothing."
+        "the column for the line as many as the line asks for, and there today's program waits at its end as "
+        "well; what is left of a shift counts nothing."
     )
     return f'<p class="hint">{text(said)}</p><p class="hint">{text(", ".join(items))}.</p>'
 
@@ -124,8 +134,8 @@ def _cell(value: str, *smaller: str) -> str:
     return f"<b>{text(value)}</b>" + "".join(f"<small>{text(line)}</small>" for line in smaller if line)
 
 
-def _of(side: Side, shown: str) -> str:
-    return _cell(shown) if side.found else DASH
+def _of(side: Side, shown: str, *smaller: str) -> str:
+    return _cell(shown, *smaller) if side.found else DASH
 
 
 def _energy(side: Side, show: Show) -> str:
@@ -143,7 +153,16 @@ def _saved(side: Side, own: bool) -> str:
 
 
 def _cycles(year: Year | None) -> str:
-    return DASH if year is None else text(f"{year.cycles_a_shift:,.0f}".replace(",", " "))
+    if year is None:
+        return DASH
+    few = year.fit_a_shift < _FIT * year.cycles_a_shift
+    return _cell(
+        _count(year.cycles_a_shift), f"only {_count(year.fit_a_shift)} fit: it is slower" if few else ""
+    )
+
+
+def _count(cycles: float) -> str:
+    return f"{cycles:,.0f}".replace(",", " ")
 
 
 def _amount(amount: Amount | None, show: Show) -> str:
