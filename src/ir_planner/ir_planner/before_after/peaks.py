@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ir_msgs_py.report import PlannedMovement
-from ir_planner.checks import Interval, movement_energy
-from ir_planner.checks.intervals import LEVELS, robots
+from ir_planner.checks import LEVELS, Interval, movement_energy, robots
 from ir_planner.program import ProgramRequest
 from ir_planner.scene import PlanningScene, scene_with
 

@@ -6,7 +6,7 @@ from ir_planner.checks.energy import MovementEnergy, carried, holding_watts, mov
 from ir_planner.checks.energy_slopes import energy_and_slope, holding_slope, standing_slope
 from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
 from ir_planner.checks.free_space import FreeSpace
-from ir_planner.checks.intervals import ROBOTS, Interval, interval, movement_spread, spread
+from ir_planner.checks.intervals import LEVELS, ROBOTS, Interval, interval, movement_spread, robots, spread
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.peak_power import peak_power
 from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
@@ -23,6 +23,7 @@ from ir_planner.checks.verification import TorqueProof, Verification, torque_pro
 __all__ = [
     "AT_REST",
     "CLOSEST",
+    "LEVELS",
     "PATH",
     "ROBOTS",
     "SLACK",
@@ -55,6 +56,7 @@ __all__ = [
     "nearest_pairs",
     "pair_value",
     "peak_power",
+    "robots",
     "spread",
     "standing_slope",
     "state_check",
