@@ -44,10 +44,12 @@ def test_a_worker_that_hangs_ends_with_a_study_that_was_killed(tmp_path: Path, w
     mark, worker = tmp_path / "pid", tmp_path / "hangs.py"
     worker.write_text(HANGS.format(path=sys.path, mark=str(mark)))
     study = subprocess.Popen([sys.executable, "-c", STARTS.format(path=sys.path, worker=str(worker))])
-    pid = wait_for(lambda: mark.exists() and mark.read_text(), what="the worker hangs")
-    assert Path(f"/proc/{pid}/stat").exists()
-    study.send_signal(signal.SIGKILL)
-    study.wait()
+    try:
+        pid = wait_for(lambda: mark.exists() and mark.read_text(), what="the worker hangs")
+        assert Path(f"/proc/{pid}/stat").exists()
+    finally:
+        study.send_signal(signal.SIGKILL)
+        study.wait()
 
     def gone() -> bool:
         try:

@@ -34,11 +34,14 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """`ir up`, as the README starts it."""
     logs = tmp_path_factory.mktemp("log")
     process = subprocess.Popen([*IR, "up", "--logs", str(logs)], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    assert READY in process.stdout.readline()
-    yield
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(60) == 130
+    try:
+        assert process.stdout is not None
+        assert READY in process.stdout.readline()
+        yield
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 130
+    finally:
+        process.kill()
 
 
 def shell(line: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
