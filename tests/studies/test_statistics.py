@@ -66,6 +66,18 @@ def test_the_interval_agrees_with_a_bootstrap() -> None:
     assert energy.mean.high == pytest.approx(drawn.confidence_interval.high, abs=near)
 
 
+def test_two_movements_of_a_pair_count_as_one_where_energies_are_compared() -> None:
+    share = np.random.default_rng(6).normal(0.0, 0.1, 40)
+    rows = [
+        {timing: movement(2.0, 100.0 * (1.0 + x), timing) for timing in ("synchronous", "asynchronous")}
+        for x in share.tolist()
+    ]
+    agreed = findings_of(rows).agreements[0]
+    by_pair = ttest_1samp(100.0 * (1.0 / (1.0 + share) - 1.0), 0.0).confidence_interval(0.90)
+    assert agreed.count == 80
+    assert (agreed.mean.low, agreed.mean.high) == pytest.approx((by_pair.low, by_pair.high), abs=1e-9)
+
+
 def test_answers_that_are_the_synchronous_one_are_counted_apart() -> None:
     rows = [pair(-0.1), pair(-0.2), pair(0.0, "synchronous"), {"synchronous": {"solved": False}}]
     found = findings_of(rows)

@@ -28,7 +28,7 @@ NATURAL = (
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Relative differences of pairs in percent: their mean with its 90 % interval by Student's t, median,
+    """Relative differences in percent: their mean over pairs with its 90 % interval by Student's t, median,
     and standard deviation; effect: mean over standard deviation (Cohen's d of paired samples); less: share of
     the pairs in which the first is smaller.
     """
@@ -73,8 +73,9 @@ def findings_of(rows: Sequence[Row]) -> Findings:
     """All comparisons over the rows of pairs."""
     both = [row for row in rows if solved(row, SYNCHRONOUS) and solved(row, ASYNCHRONOUS)]
     own = [row for row in both if row[ASYNCHRONOUS].get("timing") == ASYNCHRONOUS]
-    every = [row[timing] for row in rows for timing in distinct(row)]
-    driven = [one for one in every if math.isfinite(number(one, "direct_j"))]
+    every = [(k, row[timing]) for k, row in enumerate(rows) for timing in distinct(row)]
+    measured = [(k, one) for k, one in every if math.isfinite(number(one, "direct_j"))]
+    own_pair, driven = [k for k, _ in measured], [one for _, one in measured]
     return Findings(
         len(rows),
         len(both),
@@ -84,8 +85,8 @@ def findings_of(rows: Sequence[Row]) -> Findings:
             for name, column in NATURAL
         ),
         (
-            compared("predicted against direct", driven, _field("predicted_j"), _field("direct_j")),
-            compared("indirect against direct", driven, _field("indirect_j"), _field("direct_j")),
+            compared("predicted against direct", driven, _field("predicted_j"), _field("direct_j"), own_pair),
+            compared("indirect against direct", driven, _field("indirect_j"), _field("direct_j"), own_pair),
         ),
         _covered(driven),
         len(driven),
@@ -111,17 +112,29 @@ def number(one: Row, name: str) -> float:
 
 
 def compared(
-    name: str, rows: Sequence[Row], first: Callable[[Row], float], second: Callable[[Row], float]
+    name: str,
+    rows: Sequence[Row],
+    first: Callable[[Row], float],
+    second: Callable[[Row], float],
+    own_pair: Sequence[int] | None = None,
 ) -> Comparison:
-    """first / second - 1 in percent over the rows that have both, pair by pair."""
-    pairs = np.array([(first(row), second(row)) for row in rows]).reshape(-1, 2)
-    kept = pairs[np.isfinite(pairs).all(axis=1) & (pairs[:, 1] != 0.0)]
-    values = 100.0 * (kept[:, 0] / kept[:, 1] - 1.0)
+    """first / second - 1 in percent over the rows that have both.
+
+    own_pair: the pair of each row where a pair has several; its movements go between the same places, so that
+    the mean and its interval are those over pairs.
+    """
+    figures = np.array([(first(row), second(row)) for row in rows]).reshape(-1, 2)
+    kept = np.isfinite(figures).all(axis=1) & (figures[:, 1] != 0.0)
+    values = 100.0 * (figures[kept, 0] / figures[kept, 1] - 1.0)
+    by_pair = values
+    if own_pair is not None:
+        of = np.asarray(own_pair, dtype=int)[kept]
+        by_pair = np.array([values[of == pair].mean() for pair in dict.fromkeys(of.tolist())])
     spread = float(values.std(ddof=1)) if len(values) > 1 else math.nan
     return Comparison(
         name,
         values,
-        mean_of(values),
+        mean_of(by_pair),
         float(np.median(values)) if len(values) else math.nan,
         spread,
         float(values.mean()) / spread if spread > 0.0 else math.nan,

@@ -47,6 +47,10 @@ def _limits(found: Findings) -> Iterator[str]:
     own = found.solved - found.same
     if 0 < own < FEW:
         yield f"With {own} pairs these means say little: ask for more pairs."
+    elif own:
+        yield (
+            f"Of {len(found.comparisons)} comparisons at 90 % one in ten shows a difference by chance alone."
+        )
     yield (
         "It holds for movements between these places, drawn alike, of this simulated robot; nothing follows "
         "for other cells, nor for a real robot, whose power no meter has read here."
