@@ -17,6 +17,7 @@ from ir_description import Cell, PowerData
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner import Planner
+from ir_planner.checks import Consumption
 from ir_planner.errors import RequestError
 from ir_planner.program.bounds import Rates
 from ir_planner.program.cycle_time import Task, shared_out
@@ -39,8 +40,11 @@ class Invented:
 
     def __init__(self, seconds: float, joules: float) -> None:
         self.seconds, self.joules = seconds, joules
-        self.trajectory = self.evaluation = self.report = self
-        self.duration, self.energy, self.base_energy = seconds, joules + BASE * seconds, BASE * seconds
+        base = BASE * seconds
+        self.trajectory = self
+        self.duration = seconds
+        self.energy = SimpleNamespace(total=joules + base, base=base)
+        self.consumption = Consumption(seconds, 0.0, joules + base, base)
 
 
 def invented(seconds: float, joules: float) -> Movement:
@@ -90,7 +94,7 @@ def test_no_choice_of_points_with_a_wait_costs_less(
     assert found is not None
     used = sum(cast(Any, movement).seconds for movement in found.movements.values())
     assert used + found.wait == pytest.approx(seconds)
-    energy = sum(cast(Any, movement).energy for movement in found.movements.values())
+    energy = sum(movement.energy.total for movement in found.movements.values())
     assert found.energy == pytest.approx(energy + watts * found.wait)
     for choice in itertools.product(*fronts):
         total = sum(t for t, _ in choice)

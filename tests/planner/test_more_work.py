@@ -60,6 +60,34 @@ def keeps_its_answers(cell: str, longer: float) -> None:
     assert longer or np.isfinite(least)  # a cycle hardly longer than the shortest may use all the work
 
 
+@pytest.mark.parametrize(("cell", "seed"), [("deep_box", 84), ("cnc_door", 3)])
+def test_no_budget_is_exceeded_and_none_refuses_what_a_smaller_one_planned(cell: str, seed: int) -> None:
+    keeps_its_budgets(cell, seed, 5)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cell", ["cnc_door", "deep_box", "demo", "open", "table_columns"])
+@pytest.mark.parametrize("seed", range(4))
+def test_no_budget_is_exceeded_in_any_cell(cell: str, seed: int) -> None:
+    keeps_its_budgets(cell, seed, 16)
+
+
+def keeps_its_budgets(cell: str, seed: int, count: int) -> None:
+    """Budgets are drawn, from hardly any work to enough, for stations that are drawn too."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", cell)
+    rng = np.random.default_rng([seed, *cell.encode()])
+    names = [station.name for station in planner.cell.stations]
+    stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
+    found = False
+    for most in np.sort(np.exp(rng.uniform(np.log(20.0), np.log(3_000.0), count))).astype(int).tolist():
+        options = PlanOptions(max_iterations=most, planning_time=1000.0, seed=seed)
+        plan = planner.plan_program(stops, 0.0, options, np.array(planner.cell.park))
+        assert plan.info.iterations <= most * len(stops)
+        assert plan.status.ok or not found, f"{most}: {plan.status.message}"
+        found |= plan.status.ok
+
+
 def planned(
     planner: Planner, stops: tuple[str, ...], cycle: float, options: PlanOptions
 ) -> ProgramPlan | str:

@@ -225,6 +225,16 @@ def toppra_seconds(path: JointTrajectory, scene: PlanningScene) -> float:
     return float((2.0 * np.diff(grid) / (speed[1:] + speed[:-1])).sum())
 
 
+def test_a_path_is_made_of_a_motion_that_passes_none_of_its_points(scene: PlanningScene) -> None:
+    """Also where it has fewer points itself: a line in which clearance asked for a motion beside it."""
+    for few in (2, 3, 5, 12):
+        given = by_rules(waved(scene, few, 0.2), scene)
+        path = FixedPath(given, waved(scene, 12))
+        at = path.knots_at_points(path.places(40))
+        assert np.isfinite(at).all()
+        assert (np.diff(at) >= 0.0).all()
+
+
 def test_the_derivatives_are_those_of_differences(scene: PlanningScene) -> None:
     points = waved(scene, 5)
     rules = by_rules(points, scene)

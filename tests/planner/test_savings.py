@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, replace
+from dataclasses import asdict, astuple, replace
 from typing import cast
 
 import numpy as np
@@ -63,6 +63,22 @@ def planned(request_: ProgramRequest) -> Callable[[float], ProgramPlan]:
         return plan_program(replace(request_, cycle_time=cycle_time, savings=True), work)
 
     return plan
+
+
+def test_what_programs_are_compared_by_is_what_they_are_reported_with(common: CommonProgram) -> None:
+    """Durations and energies, carried charge included, are known without the rest of a report."""
+    for until in (0.0, 120.0):
+        full, brief = (
+            each(common.found, until=until) for each in (common.choice.steps, common.choice.energies)
+        )
+        costs = [
+            [(step.duration, step.report.energy, step.report.base_energy, step.power_mode) for step in steps]
+            for steps in (full, brief)
+        ]
+        assert costs[0] == costs[1]
+    for movement in common.found.values():
+        for name, value in asdict(movement.consumption).items():
+            assert getattr(movement.report, name) == value
 
 
 def test_the_common_program_goes_to_the_nearest_configuration_every_time(movements: Movements) -> None:

@@ -269,10 +269,10 @@ class Planner:
         cycle = bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s")
         data, settings = self._current.power(cell), replace(self.settings, transitions=self.heard.transitions)
         asked = stations, start, options, cycle, settings, savings, front_points, self.heard.doors(cell)
-        request = ProgramRequest(cell, data, *asked)
+        spreads = Spreads(request := ProgramRequest(cell, data, *asked))
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
-        plan = plan_program(request, self._work(options, cancelled, stops), progress)
-        plan = program_in(plan, self._current.hash_of(cell), self.heard.source, Spreads(request))
+        plan = plan_program(request, self._work(options, cancelled, stops), progress, spreads)
+        plan = program_in(plan, self._current.hash_of(cell), self.heard.source, spreads)
         for program in (*plan.front, plan.compared, plan):
             if program is not None and program.status.ok:
                 self._remember(program)

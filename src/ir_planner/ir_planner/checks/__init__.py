@@ -4,7 +4,13 @@ from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
 from ir_planner.checks.clearance_checks import clearance_violation
 from ir_planner.checks.energy import MovementEnergy, carried, holding_watts, movement_energy
 from ir_planner.checks.energy_slopes import energy_and_slope, holding_slope, standing_slope
-from ir_planner.checks.evaluation import Evaluation, evaluate_trajectory, measured, total_report
+from ir_planner.checks.evaluation import (
+    Consumption,
+    Evaluation,
+    evaluate_trajectory,
+    measured,
+    total_report,
+)
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.intervals import LEVELS, ROBOTS, Interval, interval, movement_spread, robots, spread
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
@@ -29,6 +35,7 @@ __all__ = [
     "SLACK",
     "ZONES",
     "Colour",
+    "Consumption",
     "Evaluation",
     "FreeSpace",
     "Interval",

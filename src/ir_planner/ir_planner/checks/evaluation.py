@@ -17,6 +17,16 @@ from ir_planner.checks.verification import Verification, verify
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 
+@dataclass(frozen=True)
+class Consumption:
+    """What objectives count of a movement, named as in its report; known before distances and peaks are."""
+
+    duration: float
+    movement_cost: float
+    energy: float
+    base_energy: float
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """Everything that is known about a trajectory. advice: where a violation may come from, else ""."""
@@ -41,7 +51,8 @@ def evaluate_trajectory(
 ) -> Evaluation:
     """Verify and measure a trajectory with the loads of the scene."""
     verification = verify(trajectory, scene, safety_distance, station)
-    return measured(trajectory, scene, safety_distance, station, verification)
+    energy = movement_energy(trajectory, scene)
+    return measured(trajectory, scene, safety_distance, station, verification, energy)
 
 
 def measured(
@@ -50,9 +61,9 @@ def measured(
     safety_distance: float,
     station: str,
     verification: Verification,
+    energy: MovementEnergy,
 ) -> Evaluation:
-    """The evaluation of a trajectory that has been verified."""
-    energy = movement_energy(trajectory, scene)
+    """The evaluation of a trajectory that has been verified, and whose energy is known."""
     clearance = clearance_profile(trajectory, scene, station)
     report = TrajectoryReport(
         duration=trajectory.duration,

@@ -48,6 +48,13 @@ class FreeSpace:
         self.work.spend(len(q0))
         return self.scene.collision.certify_edges(q0, q1, self.threshold)
 
+    def straight_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
+        """Which of the straight movements (N, n) to (N, n) are proved free, whatever work is left: the look
+        at them that every request has is not counted.
+        """
+        self.work.check()
+        return np.asarray(self.scene.collision.certify_edges(q0, q1, self.threshold).verdict == FREE)
+
     def edges_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
         """Which of the straight movements (N, n) to (N, n) are proved free; those are not for which no work
         is left.

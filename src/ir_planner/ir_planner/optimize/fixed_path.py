@@ -89,14 +89,15 @@ class FixedPath:
         """
         q = spline.samples(_NEAREST)[0]
         around = np.concatenate([[0.0, 0.0], np.maximum.accumulate(np.clip(s, 0.0, 1.0)), [1.0, 1.0]])
-        worst = 0.0
-        for k in range(len(around) - 1):
-            near = self.at(
-                np.linspace(around[max(k - 1, 0)], around[min(k + 2, len(around) - 1)], 16 * _NEAREST)
-            )
-            mine = q[k * _NEAREST : (k + 1) * _NEAREST]
-            worst = max(worst, float(np.abs(mine[:, None] - near[None]).max(axis=2).min(axis=1).max()))
-        return worst
+        k = np.arange(len(around) - 1)
+        first, last = around[np.maximum(k - 1, 0)], around[np.minimum(k + 2, len(around) - 1)]
+        near = self.at(np.linspace(first, last, 16 * _NEAREST, axis=1).ravel())
+        near = near.reshape(len(k), 1, 16 * _NEAREST, -1)
+        mine = q[: len(k) * _NEAREST].reshape(len(k), _NEAREST, 1, -1)
+        away = np.zeros(1)
+        for joint in range(q.shape[1]):  # the largest of all joints, without an array of all of them
+            away = np.maximum(away, np.abs(mine[..., joint] - near[..., joint]))
+        return float(away.min(axis=2).max())
 
 
 def from_knots(right: FloatArray) -> FloatArray:
@@ -130,10 +131,13 @@ def _knot_factor(count: int) -> FloatArray:
 
 
 def _in_order(positions: FloatArray, points: FloatArray) -> NDArray[np.int64]:
-    """Indices (M,) at which `points` (M, n) are among `positions` (N, n), each after the one before."""
+    """Indices (M,) at which `points` (M, n) are among `positions` (N, n), each after the one before; of a
+    point that isn't among them that of the nearest one, which leaves some for the points after it.
+    """
     found = [0]
-    for point in points[1:-1]:
-        away = np.abs(positions[found[-1] + 1 :] - point).max(axis=1)
-        here = np.flatnonzero(away < _SAME)
-        found.append(found[-1] + 1 + int(here[0] if len(here) else np.argmin(away)))
+    for k, point in enumerate(points[1:-1], start=1):
+        first = min(found[-1] + 1, len(positions) - 1)
+        away = np.abs(positions[first : max(len(positions) - len(points) + 1 + k, first + 1)] - point)
+        here = np.flatnonzero(away.max(axis=1) < _SAME)
+        found.append(first + int(here[0] if len(here) else np.argmin(away.max(axis=1))))
     return np.array([*found, len(positions) - 1])

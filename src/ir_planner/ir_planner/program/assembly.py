@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.report import MovementKind, PlannedMovement
+from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner.program.charge import Charge
 from ir_planner.program.pauses import Pause
 from ir_planner.program.reliance import Reliance
@@ -42,6 +43,37 @@ Legs = dict[int, Leg]  # by the step they belong to
 MakePause = Callable[[Pause], PlannedMovement]
 
 
+class Complete(Protocol):
+    """Adds to a step what is said about its movement in a scene, at a station, after what left `charge`."""
+
+    def __call__(
+        self, step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
+    ) -> PlannedMovement:
+        """The step with its report."""
+
+
+def in_full(reliance: Reliance) -> Complete:
+    """As an answer needs it: everything that is known, and the states of machines that it relies on."""
+
+    def complete(
+        step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
+    ) -> PlannedMovement:
+        states = reliance.of(movement.trajectory, leg.scene, station)
+        step = replace(step, report=movement.report, states=states)
+        return charge.moved(step, movement.energy, movement.context.scene)
+
+    return complete
+
+
+def energies_only(
+    step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
+) -> PlannedMovement:
+    """As programs are compared: duration and energies, the same as in full."""
+    energy = charge.taken(movement.energy, movement.context.scene)
+    report = TrajectoryReport(duration=step.duration, energy=energy.total, base_energy=energy.base)
+    return replace(step, report=report)
+
+
 def legs_of(route: Route, hops: list[list[Part]], movements: Mapping[Part, Movement]) -> Legs:
     """The legs of a route from the movements of its parts, hop by hop."""
     return {
@@ -67,11 +99,11 @@ def assembled(  # long: what a step does, in its order
     start: FloatArray,
     pause: MakePause,
     charge: Charge,
-    reliance: Reliance,
+    complete: Complete,
 ) -> tuple[PlannedMovement, ...]:
     """Movements and pauses in order, from start (n,). `legs`: by the step they belong to. pause: how pauses
-    are spent. charge: what the capacitor holds at first; carried from step to step. reliance: the states of
-    machines that each movement relies on.
+    are spent. charge: what the capacitor holds at first; carried from step to step. complete: adds
+    to each movement what is said about it.
 
     A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
     """
@@ -82,7 +114,7 @@ def assembled(  # long: what a step does, in its order
         waiting = tuple(signal_text(signal) for signal in step.wait_for)
         setting = tuple(signal_text(signal) for signal in step.set_signals)
         leg = legs.get(k)
-        moves = [] if leg is None else _moves(leg, charge, reliance)
+        moves = [] if leg is None else _moves(leg, charge, complete)
         if leg is not None:
             here = leg.to_name
             q = leg.movements[-1][1].trajectory.positions[-1] if leg.movements else q
@@ -108,7 +140,7 @@ def assembled(  # long: what a step does, in its order
     return tuple(result)
 
 
-def _moves(leg: Leg, charge: Charge, reliance: Reliance) -> list[PlannedMovement]:
+def _moves(leg: Leg, charge: Charge, complete: Complete) -> list[PlannedMovement]:
     moves = []
     for kind, movement in leg.movements:
         station = leg.station_of(kind)
@@ -118,10 +150,8 @@ def _moves(leg: Leg, charge: Charge, reliance: Reliance) -> list[PlannedMovement
             to_station=station or leg.to_name,
             trajectory_id=movement.trajectory.trajectory_id,
             trajectory=movement.trajectory,
-            report=movement.report,
             duration=movement.trajectory.duration,
             load=leg.scene.load_text,
-            states=reliance.of(movement.trajectory, leg.scene, station),
         )
-        moves.append(charge.moved(step, movement.evaluation.energy, movement.context.scene))
+        moves.append(complete(step, movement, leg, station, charge))
     return moves

@@ -25,14 +25,18 @@ class Charge:
         an empty capacitor.
         """
         assert step.trajectory is not None  # it moves
-        charge = self.stored
-        energy = carried(alone, charge, scene)
-        self.stored = energy.capacitor
+        charge, energy = self.stored, self.taken(alone, scene)
         report = step.report
         if energy is not alone:
             peak = peak_power(step.trajectory, scene, charge)
             report = replace(report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=peak)
         return replace(step, report=report)
+
+    def taken(self, alone: MovementEnergy, scene: PlanningScene) -> MovementEnergy:
+        """What a movement takes from the mains now; alone: the same with an empty capacitor."""
+        energy = carried(alone, self.stored, scene)
+        self.stored = energy.capacitor
+        return energy
 
     def stood(self, step: PlannedMovement, pause: Pause) -> PlannedMovement:
         """The step of a pause, whose holding torque takes the charge first."""

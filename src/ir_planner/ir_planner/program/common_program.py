@@ -6,8 +6,9 @@ as fast as they can; the same pauses, left to the controller's own timers. Where
 movement runs along the planner's path in straight steps with blended corners; `around` counts these.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,10 +16,14 @@ from ir_planner.errors import TimingError
 from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.ladder import FASTEST
 from ir_planner.program.movements import Failure, Movements
+from ir_planner.program.parallel import mapped
 from ir_planner.program.request import StageError
 from ir_planner.program.station_graph import ACROSS, Chain, Part
 from ir_planner.scene import movement_cost
 from ir_planner.timing import Movement, baseline, straight_steps
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +51,19 @@ def common_program(choice: Choice) -> CommonProgram:
 
     Raises StageError where it has a movement that isn't found.
     """
-    fastest = choice.ladder.at(FASTEST)
+    fastest, improvement = choice.ladder.at(FASTEST), choice.ladder.improvement
     nearest = choice.along(nearest_chain(fastest))
-    chosen: dict[Part, Movement] = {}
-    around = 0
     parts = nearest.parts
-    fastest.plan([part for part in parts if part.kind != ACROSS], choice.ladder.improvement)  # side by side
-    for part in parts:
-        plain = _plain(part, fastest)
-        if plain is None:
-            plain, by_path = _planned(part, fastest), part.kind == ACROSS
-            around += by_path
-        chosen[part] = plain
-    return CommonProgram(nearest, chosen, around)
+    across = [part for part in parts if part.kind == ACROSS]
+    lines = [part for part in parts if part.kind != ACROSS]
+    chosen = dict(zip(lines, _all_found(lines, fastest, improvement), strict=True))
+    plain = dict(zip(across, _side_by_side(lambda part: _plain(part, fastest), across, fastest), strict=True))
+    around = [part for part, movement in plain.items() if movement is None]
+    chosen |= {part: movement for part, movement in plain.items() if movement is not None}
+    own = Movements(fastest.route, fastest.layers, fastest.context, fastest.searches)
+    paths = _all_found(around, own, 0)
+    chosen |= zip(around, _side_by_side(_in_straight_steps, paths, fastest), strict=True)
+    return CommonProgram(nearest, {part: chosen[part] for part in parts}, len(around))
 
 
 def nearest_chain(movements: Movements) -> Chain:
@@ -76,19 +81,23 @@ def nearest_chain(movements: Movements) -> Chain:
 
 def _plain(part: Part, movements: Movements) -> Movement | None:
     """The baseline movement of a part across, None where it isn't certified."""
-    if part.kind != ACROSS:
-        return None
     first, second = movements.ends(part)
     found = baseline(first, second, movements.context.inside(movements.route.arriving(part.hop)))
     return found if found is not None and found.certified else None
 
 
-def _planned(part: Part, movements: Movements) -> Movement:
-    """The service movement of a part, or the movement along the planner's path."""
-    if part.kind != ACROSS:
-        return _found(part, movements)
-    own = Movements(movements.route, movements.layers, movements.context, movements.searches)
-    found = _found(part, own)
+def _all_found(parts: list[Part], movements: Movements, improvement: int) -> list[Movement]:
+    """The movements of parts. Raises StageError for the first that isn't found."""
+    found = list[Movement]()
+    for each in movements.plan(parts, improvement):
+        if isinstance(each, Failure):
+            raise StageError(each.status)
+        found.append(each)
+    return found
+
+
+def _in_straight_steps(found: Movement) -> Movement:
+    """The movement along the planner's path; that itself where the other isn't certified."""
     try:
         along = straight_steps(found.path, found.context)
     except TimingError:
@@ -96,8 +105,8 @@ def _planned(part: Part, movements: Movements) -> Movement:
     return along if along.certified else found
 
 
-def _found(part: Part, movements: Movements) -> Movement:
-    found = movements.plan([part], 0)[0]
-    if isinstance(found, Failure):
-        raise StageError(found.status)
-    return found
+def _side_by_side(
+    task: Callable[[Item], Result], items: Sequence[Item], movements: Movements
+) -> list[Result]:
+    """What a task that needs no work makes of every item."""
+    return mapped(lambda item, _: task(item), items, movements.context, 0, [0] * len(items))

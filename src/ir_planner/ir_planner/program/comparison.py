@@ -29,7 +29,7 @@ class Comparison:
 
 
 def held_against_common(
-    choice: Choice, own: Steps, cycle_time: float, standing: float, progress: Progress
+    choice: Choice, own: Steps, cycle_time: float, standing: float, spreads: Spreads, progress: Progress
 ) -> Comparison | str:
     """The comparison of a program; own: its steps in a cycle time (0: free), of which `standing` s are
     pauses. Where there is none, the sentence why.
@@ -40,7 +40,6 @@ def held_against_common(
         if context.work.exhausted:
             notes.append("none")
             return f"no savings: {_ENDED}"
-        added = Spreads(choice.request).of
         try:
             common = common_program(choice)
             plain = common.steps()
@@ -50,7 +49,7 @@ def held_against_common(
                 words = f"both in the cycle time of {cycle_time:g} s"
                 if len(waiting) > len(plain):
                     words += f", of which the common program waits {waiting[-1].duration:.2f} s at its end"
-                savings = savings_of(waiting, own, _pauses(plain), common, added)
+                savings = savings_of(waiting, own, _pauses(plain), common, spreads.of)
                 return Comparison(savings, own, words, waiting)
             if context.work.exhausted:
                 notes.append("none")
@@ -61,7 +60,7 @@ def held_against_common(
             return f"no savings: {error}"
         words = f"both in the common program's {seconds:.2f} s"
         words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
-        return Comparison(savings_of(plain, steps, _pauses(plain), common, added), steps, words, plain)
+        return Comparison(savings_of(plain, steps, _pauses(plain), common, spreads.of), steps, words, plain)
 
 
 def _pauses(steps: Steps) -> int:

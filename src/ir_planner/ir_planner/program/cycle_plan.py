@@ -43,8 +43,18 @@ class TimedChoice:
     @property
     def steps(self) -> Steps:
         """The steps of the program, with the wait that fills its cycle."""
-        until = self.cycle_time if self.timed.wait > 0.0 else 0.0
-        return self.choice.steps(self.timed.movements, until=until)
+        return self.choice.steps(self.timed.movements, until=self._until)
+
+    @property
+    def energy(self) -> float:
+        """Joules of all steps at the mains, carried charge included."""
+        return sum(
+            step.report.energy for step in self.choice.energies(self.timed.movements, until=self._until)
+        )
+
+    @property
+    def _until(self) -> float:
+        return self.cycle_time if self.timed.wait > 0.0 else 0.0
 
 
 def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: Progress) -> TimedChoice:
@@ -143,7 +153,7 @@ def task_of(choice: Choice, seconds: float, standing: float) -> Task:
     """What is to be shared out over a chain's movements and the wait; standing [s]: of pauses besides."""
 
     def spent(timed: Timed) -> float:
-        return sum(step.report.energy for step in TimedChoice(choice, timed, seconds + standing).steps)
+        return TimedChoice(choice, timed, seconds + standing).energy
 
     return Task(seconds, choice.waiting, _slower, spent)
 

@@ -72,7 +72,7 @@ def _to_slow(point: Point) -> tuple[bool, float]:
 def _filled(chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task) -> list[Timed]:
     """Programs of these points: one that waits at the end, and one in which a part takes the time left."""
     movements = {part: point.movement for part, point in chosen.items()}
-    energy = sum(movement.report.energy for movement in movements.values())
+    energy = sum(movement.energy.total for movement in movements.values())
     found = [Timed(movements, left, energy + task.waiting(left))] if left >= SHORTEST_WAIT else []
     last = bool(open_steps) and left <= open_steps[0].seconds
     if not (last or not open_steps or left < SHORTEST_WAIT):
@@ -81,6 +81,6 @@ def _filled(chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], 
     before = movements[part]
     after = task.slower(before, before.trajectory.duration + left)
     if after is not None:
-        more = after.report.energy - before.report.energy
+        more = after.energy.total - before.energy.total
         found.append(Timed({**movements, part: after}, 0.0, energy + more))
     return found

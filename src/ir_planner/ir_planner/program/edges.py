@@ -7,7 +7,6 @@ exact where that is free; else the path found.
 
 import numpy as np
 
-from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.program.bounds import least_cost
@@ -72,7 +71,7 @@ class CostEdges:
 
     def _hurried(self, parts: list[Part]) -> list[Settled]:
         """Where time or work have ended: a straight segment that isn't free is none; the others are planned
-        when all are free. Looking whether they are free needs no work left.
+        when all are free. Looking whether they are free is not counted.
         """
         route, context = self.movements.route, self.movements.context
         blocked: list[Part] = []
@@ -80,7 +79,7 @@ class CostEdges:
             if part.kind == ACROSS:
                 first, second = self.movements.ends(part)
                 space = FreeSpace.of(route.arriving(part.hop), context.safety_distance, context.work)
-                blocked += [] if space.certificates(first[None], second[None]).verdict[0] == FREE else [part]
+                blocked += [] if space.straight_free(first[None], second[None])[0] else [part]
         if not blocked:
             return self._planned(parts)
         self.movements.plan(blocked[:1], self.improvement)  # says what it is that time was too short for
@@ -97,7 +96,9 @@ class CostEdges:
         turned = [self._turned(part) for part in parts]
         new = {key: part for key, part in zip(turned, parts, strict=True) if key not in self._costs}
         for key, found in zip(new, self.movements.plan(list(new.values()), self.improvement), strict=True):
-            self._costs[key] = np.inf if isinstance(found, Failure) else cost_of(found.report, self.rates)
+            self._costs[key] = (
+                np.inf if isinstance(found, Failure) else cost_of(found.consumption, self.rates)
+            )
         return [Settled(self._costs[key], exact=True) for key in turned]
 
     def _turned(self, part: Part) -> Turned:
@@ -156,7 +157,9 @@ class TravelEdges:
     def _planned(self, parts: list[Part]) -> list[Settled]:
         """W of the movements as they are sent: a path that was found is shortened by its descent."""
         planned = self.movements.plan(parts, self.improvement)
-        costs = [np.inf if isinstance(found, Failure) else found.report.movement_cost for found in planned]
+        costs = [
+            np.inf if isinstance(found, Failure) else found.consumption.movement_cost for found in planned
+        ]
         return [Settled(cost, exact=True) for cost in costs]
 
 

@@ -19,7 +19,7 @@ def free_gap(choice: Choice, found: Found, steps: Steps) -> float:
     rates = rates_of(context)
     if rates.joule == 0.0 or context.options.objective == "movement_cost" or not found:
         return 100.0 * chain.gap
-    alone = sum(movement.report.energy for movement in found.values())
+    alone = sum(movement.energy.total for movement in found.values())
     received = alone - sum(step.report.energy for step in steps if not step.is_pause)
     return _above(chain.cost - received, chain.bound - could_be_carried(choice, len(found)))
 

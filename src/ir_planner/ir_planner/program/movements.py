@@ -10,6 +10,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.status import Status, StatusCode
+from ir_planner.checks import Consumption
 from ir_planner.errors import TimingError
 from ir_planner.program.bounds import Rates
 from ir_planner.program.near import optimised_near, slowed_near
@@ -34,7 +35,7 @@ def rates_of(context: Context) -> Rates:
     return Rates(1.0, 0.0 if options.objective == "energy" else options.time_value)
 
 
-def cost_of(report: TrajectoryReport, rates: Rates) -> float:
+def cost_of(report: TrajectoryReport | Consumption, rates: Rates) -> float:
     """What a movement costs."""
     return rates.joule * (report.energy - report.base_energy) + rates.second * report.duration
 
@@ -111,15 +112,17 @@ class Movements:
     def _shared(self, parts: list[Part], improvement: int) -> list[Movement | Failure]:
         """Movements of parts that share the work left: all the same, but those along service lines, which are
         known without any, no more than if the whole program was still to plan. What isn't found with its
-        share gets the work that the others left.
+        share gets the work that the others left: at least half of their shares, which isn't for improvement.
         """
         left = self.context.work.left
         of_one, of_line = left // max(len(parts), 1), left // (_PARTS * max(len(self.route), 1))
         most = [of_one if part.kind == ACROSS else min(of_one, of_line) for part in parts]
-        planned = mapped(self._planned, parts, self.context, improvement, most)
-        for k, part in enumerate(parts):
-            if isinstance(planned[k], Failure) and most[k] < (left := self.context.work.left):
-                planned[k] = mapped(self._planned, [part], self.context, improvement, [left])[0]
+        planned = mapped(self._planned, parts, self.context, min(improvement, of_one // 2), most)
+        failed = [k for k, found in enumerate(planned) if isinstance(found, Failure)]
+        for later, k in enumerate(failed, start=1 - len(failed)):
+            if most[k] < (left := self.context.work.left):
+                improving = min(improvement, left // (2 - 2 * later))
+                planned[k] = mapped(self._planned, [parts[k]], self.context, improving, [left])[0]
         return planned
 
     def movement(self, part: Part) -> Movement | None:
@@ -141,7 +144,7 @@ class Movements:
             if (
                 isinstance(before, Failure)
                 or isinstance(again, Failure)
-                or cost_of(before.report, rates) <= cost_of(again.report, rates)
+                or cost_of(before.consumption, rates) <= cost_of(again.consumption, rates)
             ):
                 self._found[key] = before
 

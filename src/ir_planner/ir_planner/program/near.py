@@ -22,11 +22,13 @@ def slowed_near(known: Sequence[Movement], context: Context) -> Movement | None:
     """The cheapest of known movements between the same ends, each slowed down evenly as far as that pays;
     None where none is certified.
     """
-    slower = [
-        Movement(
-            one.path, stretched(one.trajectory, best_stretch(one.trajectory, context)), context, one.note
-        )
-        for one in known
-    ]
+    slower = [_slowed(one, best_stretch(one.trajectory, context), context) for one in known]
     cheapest = sorted(slower, key=lambda movement: movement.coarse_cost)
     return next((movement for movement in cheapest if movement.certified), None)
+
+
+def _slowed(one: Movement, factor: float, context: Context) -> Movement:
+    """A movement slowed down for another request; what is known of it as it is stays known."""
+    if factor == 1.0:
+        return one.asked_by(context)
+    return Movement(one.path, stretched(one.trajectory, factor), context, one.note)

@@ -26,6 +26,7 @@ from ir_planner.program.more_work import best_answer
 from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
 from ir_planner.program.route import Route
 from ir_planner.program.savings import named
+from ir_planner.program.spreads import Spreads
 from ir_planner.program.steps import Scenes, placed_steps, steps_of
 from ir_planner.request import Context, Journal, Work, noted
 from ir_planner.timing import at_the_mains
@@ -38,12 +39,17 @@ _SLOW = (
 )
 
 
-def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobody) -> ProgramPlan:
-    """Plan a program. Raises RequestError for a request that makes no sense, CancelledError when stopped."""
+def plan_program(
+    request: ProgramRequest, work: Work, progress: Progress = nobody, spreads: Spreads | None = None
+) -> ProgramPlan:
+    """Plan a program; spreads: those of the request, which keep what they are asked.
+
+    Raises RequestError for a request that makes no sense, CancelledError when stopped.
+    """
     journal = Journal(work, request.options.seed)
     route, context = prepared(request, journal)
     try:
-        answer = _answered(request, route, context, progress)
+        answer = _answered(request, route, context, progress, spreads or Spreads(request))
     except StageError as failed:
         status = _with_reason(_advised(failed.status, route), work)
         return ProgramPlan(status, _info(request, context))
@@ -51,7 +57,9 @@ def plan_program(request: ProgramRequest, work: Work, progress: Progress = nobod
     return replace(answer, info=_info(request, context))
 
 
-def _answered(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> ProgramPlan:
+def _answered(
+    request: ProgramRequest, route: Route, context: Context, progress: Progress, spreads: Spreads
+) -> ProgramPlan:
     """The program, what it saves, and its front, as they were asked for. Raises StageError where a stage
     finds nothing.
     """
@@ -71,7 +79,7 @@ def _answered(request: ProgramRequest, route: Route, context: Context, progress:
         moving = plan.report.duration - standing
         plan = replace(plan, status=Status.success(_SLOW.format(moving)))
     if request.savings:
-        comparison = held_against_common(choice, steps, cycle, standing, progress)
+        comparison = held_against_common(choice, steps, cycle, standing, spreads, progress)
         if isinstance(comparison, str):
             plan = replace(plan, savings=ProgramSavings(sentence=comparison))
         else:

@@ -8,8 +8,10 @@ controller closes its brakes after `timer` s. These conventions of the power dat
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations
+
+import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import REST_MODES
@@ -155,6 +157,12 @@ def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
 
 def rests_at(q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Rests:
     """The modes of a robot that stands at q (n,)."""
+    return _rests_at(tuple(q.tolist()), scene, times)
+
+
+@lru_cache(maxsize=64)  # a program is compared with many of the same pauses
+def _rests_at(posture: tuple[float, ...], scene: PlanningScene, times: TransitionTimes) -> Rests:
+    q = np.array(posture)
     return Rests(
         mode_watts(MOTORS, q, scene),
         scene.power.motors_to_brakes_in_program,

@@ -26,6 +26,7 @@ class Spreads:
         self._request = request
         self._scenes: dict[str, PlanningScene] = {}
         self._movements: dict[tuple[str, str], FloatArray] = {}
+        self._pauses: dict[tuple[str, bytes, str, float], FloatArray] = {}
 
     def of(self, steps: Sequence[PlannedMovement]) -> list[FloatArray]:
         """What the drawn robots add (ROBOTS,) J to the energy of each step."""
@@ -57,6 +58,12 @@ class Spreads:
         return self._movements[key]
 
     def _paused(self, step: PlannedMovement, q: FloatArray) -> FloatArray:
+        key = (step.load, q.tobytes(), step.power_mode, step.duration)
+        if key not in self._pauses:
+            self._pauses[key] = self._rested(step, q)
+        return self._pauses[key]
+
+    def _rested(self, step: PlannedMovement, q: FloatArray) -> FloatArray:
         scene = self._scene(step.load)
         rests = rests_at(q, scene, self._request.settings.transitions)
         names = [mode.name for mode in modes_of(step.power_mode)]

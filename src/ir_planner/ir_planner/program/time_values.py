@@ -34,8 +34,8 @@ class Point:
     @staticmethod
     def of(movement: Movement) -> "Point":
         """The point of a movement."""
-        report = movement.report
-        return Point(movement, movement.trajectory.duration, cost_of(report, Rates(1.0, 0.0)))
+        joules = cost_of(movement.consumption, Rates(1.0, 0.0))
+        return Point(movement, movement.trajectory.duration, joules)
 
     def cost(self, rates: Rates) -> float:
         """What it costs by other rates."""

@@ -77,7 +77,9 @@ def _exit_paths(
         if here.work.exhausted or not inside.states_free(q[None])[0]:
             return []
         problem, other = Exit.of(q, here), Exit.of(q, there)
-        for seed in (*range(_SEARCHES), here.journal.seed, *range(_SEARCHES, _SEARCHES + more)):
+        for seed in dict.fromkeys(
+            (*range(_SEARCHES), here.journal.seed, *range(_SEARCHES, _SEARCHES + more))
+        ):
             paths: list[ExitPath] = []
             inner = Journal(here.work, seed)
             for path in withdrawal(problem, _WANTED, method, searches, inner).paths:

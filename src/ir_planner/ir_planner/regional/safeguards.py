@@ -171,7 +171,7 @@ def _as_asked(found: Answer | None, context: Context) -> tuple[Answer | None, fl
         return None, np.inf
     method, other = found
     own, requested = other.trajectory.duration, context.options.duration
-    movement = Movement(other.path, other.trajectory, context, other.note)
+    movement = other.asked_by(context)
     if requested > 0.0:
         if own > requested * (1.0 + DURATION_SLACK):
             return None, own

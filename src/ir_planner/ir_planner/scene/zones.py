@@ -9,6 +9,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.curves import motion_at
 from ir_planner.scene.planning_scene import PlanningScene
 
 _SAMPLES = 400
@@ -36,7 +37,7 @@ def spans_outside(
     """
 
     def inside(times: FloatArray) -> BoolArray:
-        return tcp_inside(trajectory.sample(times).q, scene, station, margin)
+        return tcp_inside(motion_at(trajectory, times).q, scene, station, margin)
 
     times = np.linspace(trajectory.times[0], trajectory.times[-1], _SAMPLES)
     flags = inside(times)

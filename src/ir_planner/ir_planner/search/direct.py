@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_kernels.collision import FREE
 from ir_msgs_py.settings import check_settings, setting
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
@@ -21,9 +20,9 @@ class Direct:
         check_settings(self)
 
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
-        """Certify the straight movement to every goal, also where no work is left: what is free at once is
-        found with any work.
+        """Certify the straight movement to every goal, which is not counted: what is free at once is found
+        with any work.
         """
         starts = np.repeat(ends.start[None], len(ends.goals), axis=0)
-        free = np.flatnonzero(space.certificates(starts, ends.goals).verdict == FREE)[: self.paths]
+        free = np.flatnonzero(space.straight_free(starts, ends.goals))[: self.paths]
         return Found([np.stack([ends.start, goal]) for goal in ends.goals[free]])

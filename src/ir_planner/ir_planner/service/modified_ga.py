@@ -239,7 +239,7 @@ class _Walker:
                 ranked.append(k)
             if len(ranked) == self.settings.population:
                 break
-        rows = np.array(ranked, dtype=np.int64)
+        rows = np.array(ranked[: self.inside.work.left], dtype=np.int64)
         if len(rows) == 0:
             return rows
         self.walk.rejected["outranked: D smaller"] += len(q) - len(rows)

@@ -11,12 +11,15 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import (
+    Consumption,
     Evaluation,
+    MovementEnergy,
     TorqueProof,
     Verification,
     Violation,
     clearance_violation,
     measured,
+    movement_energy,
     torque_proof,
     verified,
 )
@@ -67,12 +70,21 @@ class Movement:
         return self.verification.certified
 
     @cached_property
+    def energy(self) -> MovementEnergy:
+        """What it takes from the mains, begun with an empty capacitor."""
+        return movement_energy(self.trajectory, self.context.scene)
+
+    @property
+    def consumption(self) -> Consumption:
+        """What objectives count of it: a fraction of the work of a report."""
+        cost = float(self.verification.travel @ self.context.scene.weights)
+        return Consumption(self.trajectory.duration, cost, self.energy.total, self.energy.base)
+
+    @cached_property
     def evaluation(self) -> Evaluation:
         """Everything that is known about it."""
-        context = self.context
-        return measured(
-            self.trajectory, context.scene, context.safety_distance, context.station, self.verification
-        )
+        context, known = self.context, (self.verification, self.energy)
+        return measured(self.trajectory, context.scene, context.safety_distance, context.station, *known)
 
     @property
     def report(self) -> TrajectoryReport:
@@ -82,7 +94,7 @@ class Movement:
     @property
     def cost(self) -> float:
         """What the request minimises."""
-        return request_cost(self.report, self.context.options)
+        return request_cost(self.consumption, self.context.options)
 
     @cached_property
     def coarse_cost(self) -> float:
@@ -103,7 +115,7 @@ class Movement:
     def asked_by(self, context: Context) -> "Movement":
         """The same for a request with another objective in the same scene; proofs and report stay known."""
         other = replace(self, context=context.at(self.context.station))
-        known = ("clearance", "torque", "verification", "evaluation")
+        known = ("clearance", "torque", "verification", "energy", "evaluation")
         other.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
         return other
 

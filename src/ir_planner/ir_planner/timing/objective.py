@@ -14,7 +14,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import movement_energy
+from ir_planner.checks import Consumption, movement_energy
 from ir_planner.curves import motion_at
 from ir_planner.request import Context
 from ir_planner.scene import PlanningScene, path_cost
@@ -32,13 +32,15 @@ _DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it mov
 _TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
 _BESIDE = 5e-3  # weight of what breaks ties
 
+Consumed = TrajectoryReport | Consumption
 
-def drive_energy(report: TrajectoryReport) -> float:
+
+def drive_energy(report: Consumed) -> float:
     """E_drive [J]: at the mains, without what controller and tool always draw."""
     return report.energy - report.base_energy
 
 
-def objective_value(report: TrajectoryReport, objective: str, time_value: float) -> float:
+def objective_value(report: Consumed, objective: str, time_value: float) -> float:
     """What is minimised; ties between equal W are broken by time."""
     values = {
         "movement_cost": report.movement_cost * (1.0 + 1e-6 * report.duration),
@@ -57,7 +59,7 @@ def at_the_mains(context: Context) -> Context:
     return replace(context, options=options)
 
 
-def request_cost(report: TrajectoryReport, options: PlanOptions) -> float:
+def request_cost(report: Consumed, options: PlanOptions) -> float:
     """What a request minimises: its objective, or E_drive where it asks for a duration."""
     if options.duration > 0.0:
         return drive_energy(report)

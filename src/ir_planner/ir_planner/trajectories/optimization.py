@@ -198,7 +198,7 @@ class _Optimization:
 
     def _cost(self, movement: Movement) -> float:
         """What the request minimises; the front's movements were made for other objectives."""
-        return request_cost(movement.report, self.options)
+        return request_cost(movement.consumption, self.options)
 
     def _standing(self) -> OptimizationPlan:
         """The end points are the same."""
