@@ -49,10 +49,10 @@ class FreeSpace:
         return self.scene.collision.certify_edges(q0, q1, self.threshold)
 
     def straight_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
-        """Which of the straight movements (N, n) to (N, n) are proved free, whatever work is left: the look
-        at them that every request has is not counted.
+        """Which of the straight movements (N, n) to (N, n) are proved free, also where no work is left: they
+        take what there is of it.
         """
-        self.work.check()
+        self.work.spend(min(len(q0), self.work.left))
         return np.asarray(self.scene.collision.certify_edges(q0, q1, self.threshold).verdict == FREE)
 
     def edges_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:

@@ -71,7 +71,7 @@ class CostEdges:
 
     def _hurried(self, parts: list[Part]) -> list[Settled]:
         """Where time or work have ended: a straight segment that isn't free is none; the others are planned
-        when all are free. Looking whether they are free is not counted.
+        when all are free. Looking whether they are free needs no work left.
         """
         route, context = self.movements.route, self.movements.context
         blocked: list[Part] = []

@@ -20,8 +20,8 @@ class Direct:
         check_settings(self)
 
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
-        """Certify the straight movement to every goal, which is not counted: what is free at once is found
-        with any work.
+        """Certify the straight movement to every goal, also where no work is left: what is free at once is
+        found with any work.
         """
         starts = np.repeat(ends.start[None], len(ends.goals), axis=0)
         free = np.flatnonzero(space.straight_free(starts, ends.goals))[: self.paths]
