@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import ctypes
 import json
+import os
 import re
 import shutil
 import signal
@@ -58,7 +59,12 @@ class Browser:
         self._profile = tempfile.TemporaryDirectory(prefix="chromium_", ignore_cleanup_errors=True)
         command = [path, f"--user-data-dir={self._profile.name}", *FLAGS]
         self._process = subprocess.Popen(
-            command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_end_with_parent
+            command,
+            env={**os.environ, "TMPDIR": self._profile.name},  # it leaves what it puts there
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            preexec_fn=_end_with_parent,
         )
         self._socket = connect(
             self._address(),

@@ -68,5 +68,6 @@ def test_two_seconds_without_a_processor_lose_nothing(
             listener.send_signal(signal.SIGCONT)
             assert len(published) > before
             assert listener.stdout.readline() == "0\n"
+            assert listener.wait(60.0) == 0
         finally:
             listener.kill()

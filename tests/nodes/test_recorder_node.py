@@ -383,7 +383,7 @@ def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wai
 def test_ir_record_ends_with_1_when_the_disk_is_full(
     tmp_path: Path, ros_domain_id: int, wait_for: Any
 ) -> None:
-    """A limit on the size of files stands for the full disk."""
+    """A limit on the size of files stands for the full disk; what the middleware shares is smaller."""
     path = tmp_path / "full.mcap"
     environment = {
         **os.environ,
@@ -408,7 +408,7 @@ def test_ir_record_ends_with_1_when_the_disk_is_full(
         command,
         env=environment,
         stderr=subprocess.PIPE,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)),
     )
     text = "".join(chr(33 + int(k)) for k in np.random.default_rng(0).integers(0, 90, 400_000))
     try:
