@@ -18,7 +18,7 @@ from _paper_page import Chapter, bound, number, page
 from _paper_result import CALIBRATED, FAILS, HOLDS, MEASURED, OPEN, Experiment, Row, Statement, judged
 
 ROOT = Path(__file__).parents[2]
-CHEAP = ("spline", "modes")  # seconds of processor time
+CHEAP = ("spline", "modes", "withdrawal")  # two seconds of processor time
 
 
 def statement(value: float, low: float, high: float, **more: object) -> Statement:
