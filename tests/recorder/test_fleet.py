@@ -12,9 +12,17 @@ import pytest
 from pyarrow import parquet
 
 from ir_cli.main import main
+from ir_msgs_py.file_roots import FileRoots
 from ir_recorder import Analysis
 from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import Member, fleet_columns, fleet_html, member_of, write_fleet_table
+from ir_recorder.report.fleet import (
+    Member,
+    fleet_columns,
+    fleet_html,
+    member_of,
+    read_members,
+    write_fleet_table,
+)
 from ir_recorder.report.fleet.totals import by_measure, by_mode, by_movement, robots_of, yearly_of
 
 
@@ -77,6 +85,61 @@ def test_the_command_sums_folders_up_and_names_what_it_leaves_out(
     with table.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["what"] == "cycle"]
     assert [row["robot"] for row in rows] == ["left", "right"]
+
+
+def fleet(tmp_path: Path, *paths: Path) -> tuple[dict[str, int], list[str]]:
+    """Recordings by robot, and what is said."""
+    said: list[str] = []
+    members = read_members(paths, FileRoots.of([tmp_path]), said.append)
+    robots = [member.robot for member in members]
+    return {name: robots.count(name) for name in robots}, said
+
+
+def test_robots_of_one_name_in_two_halls_are_two(demo_file: Path, tmp_path: Path) -> None:
+    """They were averaged, and half of their energy was gone."""
+    for place in ("north/r1", "north/r2", "south/r1"):
+        (tmp_path / place).mkdir(parents=True)
+        shutil.copy(demo_file, tmp_path / place / "monday.mcap")
+    found, said = fleet(tmp_path, tmp_path / "north", tmp_path / "south")
+    assert found == {"north/r1": 1, "r2": 1, "south/r1": 1}
+    assert sum("is a copy of" in one and "another robot's" in one for one in said) == 2
+    direct = [tmp_path / place / "monday.mcap" for place in ("north/r1", "south/r1")]
+    assert len(fleet(tmp_path, *direct)[0]) == 2
+
+
+def test_copies_and_empty_folders_are_named(demo_file: Path, tmp_path: Path) -> None:
+    for place in ("a", "none"):
+        (tmp_path / "all" / place).mkdir(parents=True)
+    for name in ("monday", "monday (1)"):
+        shutil.copy(demo_file, tmp_path / "all" / "a" / f"{name}.mcap")
+    paths = (tmp_path / "all", tmp_path / "all" / "none", tmp_path / "all" / "a" / "monday.mcap")
+    found, said = fleet(tmp_path, *paths)
+    assert found == {"a": 1}
+    for words in ("none: holds no recordings", "left out: it is a copy of", "monday.mcap: named twice"):
+        assert sum(words in one for one in said) == 1, words
+
+
+def test_a_program_that_was_not_driven_to_the_end_is_no_cycle(demo_file: Path, tmp_path: Path) -> None:
+    """A recording cut after eight of 27 steps was a cycle of 10 s, with more kWh a year than the whole."""
+    whole = demo_file.read_bytes()
+    shutil.copy(demo_file, tmp_path / "whole.mcap")
+    (tmp_path / "cut.mcap").write_bytes(whole[: 6 * len(whole) // 10])
+    found, said = fleet(tmp_path, tmp_path)
+    assert found == {"whole": 1}
+    assert any("cut.mcap: left out: its program was not driven to the end" in one for one in said), said
+
+
+def test_several_cycles_of_a_recording_are_one_on_average(analysis: Analysis) -> None:
+    once = member_of(analysis, "r")
+    twice = member_of(replace(analysis, steps=(*analysis.steps, *analysis.steps)), "r")
+    assert once is not None
+    assert twice is not None
+    assert twice.joules == pytest.approx(0.5 * once.joules)
+    assert twice.seconds == pytest.approx(0.5 * once.seconds)
+    said: list[str] = []
+    more = member_of(replace(analysis, steps=(*analysis.steps, analysis.steps[0])), "r", said.append)
+    assert more is not None
+    assert any("its last cycle was not driven to the end" in one for one in said)
 
 
 def test_the_table_as_parquet_has_the_same_columns(member: Member, tmp_path: Path) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from ir_msgs_py.errors import MsgsError
@@ -16,10 +17,11 @@ from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.parts import is_further_part
 from ir_recorder.read.reader import read_recording
+from ir_recorder.report.fleet.files import Said, recordings_below
 
 MOST = 200  # recordings of a fleet
 PLANNED = "its program as planned"  # a measure beside the levers
-Said = Callable[[str], None]
+ENDED = "ended"  # outcome of a step
 
 
 @dataclass(frozen=True)
@@ -50,51 +52,39 @@ def read_members(
     left.
     """
     members = []
-    files = list(_files(paths, roots, left_out))
+    files = recordings_below(paths, roots, left_out)
     if len(files) > MOST:
         raise ReadError(f"{len(files)} recordings are too many for a page: at most {MOST}")
-    for path, top in files:
-        shown(str(path))
+    for file in files:
+        shown(str(file.path))
         try:
-            recording = read_recording(path, roots)
-            if is_further_part(path, recording.fact(contents.PART)):
+            recording = read_recording(file.path, roots)
+            if is_further_part(file.path, recording.fact(contents.PART)):
                 continue
-            found = member_of(analyse(recording), _robot(path, top))
+            found = member_of(analyse(recording), file.robot, partial(_say, left_out, file.path))
         except (RecorderError, MsgsError, OSError) as error:
-            left_out(f"{path}: left out: {error}")
+            left_out(f"{file.path}: left out: {error}")
             continue
-        if found is None:
-            left_out(
-                f"{path}: left out: it holds neither a program that was driven nor a plan with its savings"
-            )
-        else:
+        if found is not None:
             members.append(found)
     if not members:
         raise ReadError(f"no recording could be used of {', '.join(map(str, paths))[:300]}")
     return members
 
 
-def member_of(analysis: Analysis, robot: str) -> Member | None:
-    """The totals of a recording; None where it has none."""
-    recording, program, savings = analysis.recording, analysis.program, analysis.savings
+def _say(said: Said, path: Path, sentence: str) -> None:
+    said(f"{path}: {sentence}")
+
+
+def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Member | None:
+    """The totals of a recording; None where it has none, and `said` hears why, and what limits them."""
+    recording, savings = analysis.recording, analysis.savings
     cell = analysis.cell.name if analysis.cell is not None else ""
     measures = {lever.name: lever.joules for lever in levers(analysis, most=20)}
-    if program is not None and math.isfinite(program.whole.energy):
-        movements = _by_name((r.step.label, r.seconds, r.energy) for r in analysis.steps)
-        modes = {share.name: share for share in analysis.modes}
-        whole = program.whole
-        return Member(
-            robot,
-            recording.path.name,
-            cell,
-            recording.origin,
-            whole.seconds,
-            whole.energy,
-            modes,
-            movements,
-            measures,
-        )
+    if analysis.program is not None and math.isfinite(analysis.program.whole.energy):
+        return _driven(analysis, robot, cell, measures, said)
     if savings is None:
+        said("left out: it holds neither a program that was driven nor a plan with its savings")
         return None
     total = savings.total
     parts = {"movements": savings.movements, "pauses": savings.pauses}
@@ -107,6 +97,40 @@ def member_of(analysis: Analysis, robot: str) -> Member | None:
     )
 
 
+def _driven(
+    analysis: Analysis, robot: str, cell: str, measures: Mapping[str, float], said: Said
+) -> Member | None:
+    """The mean cycle of a program that was driven; None where no cycle was driven to its end."""
+    recording, program = analysis.recording, analysis.program
+    assert program is not None  # asked before
+    cycles, ended = _cycles(analysis)
+    if cycles < 1.0:
+        said(f"left out: its program was not driven to the end: {ended}")
+        return None
+    if cycles != round(cycles):
+        said(f"its last cycle was not driven to the end ({ended}): it counts as {cycles % 1.0:.2f} of one")
+    if program.unshortened is not None:
+        said("the pauses of the run are shortened: its year is one of such cycles")
+    return Member(
+        robot,
+        recording.path.name,
+        cell,
+        recording.origin,
+        program.whole.seconds / cycles,
+        program.whole.energy / cycles,
+        {share.name: share for share in analysis.modes},
+        _by_name((r.step.label, r.seconds / cycles, r.energy / cycles) for r in analysis.steps),
+        {name: joules / cycles for name, joules in measures.items()},
+    )
+
+
+def _cycles(analysis: Analysis) -> tuple[float, str]:
+    """How many cycles of its program a recording holds, and of the steps which ended, in words."""
+    steps = [result.step for result in analysis.steps]
+    ended, total = sum(step.outcome == ENDED for step in steps), steps[0].total
+    return ended / max(total, 1), f"{ended % total or total} of {total} steps ended"
+
+
 def _by_name(rows: Iterator[tuple[str, float, float]]) -> dict[str, Share]:
     found: dict[str, Share] = {}
     for name, seconds, joules in rows:
@@ -115,26 +139,3 @@ def _by_name(rows: Iterator[tuple[str, float, float]]) -> dict[str, Share]:
             name, before.seconds + seconds, before.energy + (joules if math.isfinite(joules) else 0.0)
         )
     return found
-
-
-def _files(
-    paths: Sequence[str | Path], roots: FileRoots, left_out: Said
-) -> Iterator[tuple[Path, Path | None]]:
-    """Recordings, each with the folder that it was found below."""
-    for path in map(Path, paths):
-        try:
-            inside = roots.inside(path)
-        except MsgsError as error:
-            left_out(f"{path}: left out: {error}")
-            continue
-        if inside.is_dir():
-            yield from ((file, inside) for file in sorted(inside.rglob("*.mcap")))
-        else:
-            yield inside, None
-
-
-def _robot(path: Path, top: Path | None) -> str:
-    """The first folder below the one that was named, else the name of the file."""
-    if top is None or path.parent == top:
-        return path.stem
-    return path.relative_to(top).parts[0]

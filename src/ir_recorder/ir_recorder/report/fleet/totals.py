@@ -32,7 +32,8 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
         )
         yearly = sum(yearly_of(member, costs) for member in own) / len(own)
         origins = tuple(dict.fromkeys(member.origin for member in own))
-        found.append(Robot(name, own[0].cell, origins, len(own), seconds, joules, yearly))
+        cells = ", ".join(dict.fromkeys(member.cell for member in own if member.cell))
+        found.append(Robot(name, cells, origins, len(own), seconds, joules, yearly))
     return sorted(found, key=lambda robot: -robot.yearly)
 
 
