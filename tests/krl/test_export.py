@@ -12,11 +12,13 @@ import pytest
 
 from ir_cli.main import main
 from ir_description import CellPath
-from ir_krl import follow, parse
+from ir_krl import SetOutput, WrittenSignals, check_name, follow, parse, written
+from ir_krl.names import SignalNames
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, RequestError, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl import DEVIATION_MAX
+from ir_planner.krl.export import attached
 from ir_planner.krl.passing import passing_times, resting_spline
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
@@ -141,11 +143,47 @@ def test_asynchronous_movements_are_refused(planned) -> None:
         export_krl(planner, plan.movements, "visit", PlanOptions(timing="asynchronous"))
 
 
-@pytest.mark.parametrize("name", ["", "1st", "has space", "x" * 25, "semi;colon", "línea"])
+@pytest.mark.parametrize("name", ["", "1st", "has space", "x" * 25, "semi;colon", "línea", "Spline"])
 def test_names_that_a_controller_does_not_take(planned, name: str) -> None:
     planner, plan = planned
     with pytest.raises(RequestError, match="the program's name is"):
         export_krl(planner, plan.movements, name)
+
+
+def test_signals_get_names_that_a_controller_takes() -> None:
+    names = SignalNames("MAIN")
+    cell = [
+        "gripper_open",
+        "Door-Open",
+        "wait",
+        "1st",
+        "XHOME",
+        "main",
+        "xm1_2",
+        "a" * 30,
+        "a" * 31,
+        "a b",
+        "a_b",
+    ]
+    found = [names.of(signal) for signal in cell]
+    assert found[:5] == ["GRIPPER_OPEN", "DOOR_OPEN", "S_WAIT", "S_1ST", "S_XHOME"]
+    assert len(set(found)) == len(found)
+    assert "MAIN" not in found
+    for name in found:
+        check_name(name)
+    assert [names.of(signal.upper()) for signal in cell] == found
+
+
+def test_written_signals_are_read_back(planner: Planner) -> None:
+    tool = attached(planner.scene("none"))
+    signals = WrittenSignals((("part there", True),), (("wait", True), ("Door-Open", False)))
+    source, data = written("SPEAKS", planner.cell.machine_home, [signals], tool, [])
+    program = follow(
+        [parse(source, "speaks.src"), parse(data, "speaks.dat")], planner.cell.machine_home, np.eye(4)
+    )
+    assert [one.value for one in program.commands if isinstance(one, SetOutput)] == [True, False]
+    assert "WAIT FOR PART_THERE" in source
+    assert "SIGNAL S_WAIT $OUT[1]" in data
 
 
 def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

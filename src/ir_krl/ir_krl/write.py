@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
-from ir_krl.errors import KrlError
+from ir_krl.names import SignalNames, check_name
 from ir_krl.run.frames import AXIS_NAMES, frame
 from ir_msgs_py.arrays import FloatArray
-
-NAME_MAX = 24
-_NAME = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{NAME_MAX - 1}}}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +71,6 @@ AWAKE = "AWAKE"
 """The signal by which the PLC says that the controller is back."""
 
 
-def check_name(name: str) -> None:
-    """Raise KrlError for a name that the controller doesn't take."""
-    if not _NAME.fullmatch(name):
-        raise KrlError(
-            f"the program's name is {name[:40]!r}: a letter, then letters, digits and _, "
-            f"at most {NAME_MAX} characters"
-        )
-
-
 def written(
     name: str,
     start: FloatArray,
@@ -99,7 +86,7 @@ def written(
     the controller's own tools stay as they are. Raises KrlError for a name that the controller doesn't take.
     """
     check_name(name)
-    body, first = _Body(), "XHOME" if from_home else "XSTART"
+    body, first = _Body(name), "XHOME" if from_home else "XSTART"
     for part in parts:
         body.add(part)
     src = [
@@ -111,6 +98,8 @@ def written(
         "GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM( )",
         "INTERRUPT ON 3",
         "BAS(#INITMOV,0)",
+        "BAS(#VEL_PTP,100)",
+        "BAS(#ACC_PTP,100)",
         "$BASE=$NULLFRAME",
         "$TOOL=IR_TOOL",
         "$LOAD=IR_LOAD",
@@ -137,7 +126,8 @@ def written(
 class _Body:
     """Lines of the routine, and what the data list must hold for them."""
 
-    def __init__(self) -> None:
+    def __init__(self, program: str) -> None:
+        self._names = SignalNames(program)
         self.lines: list[str] = []
         self.points: list[str] = []
         self._outputs: dict[str, int] = {}
@@ -197,12 +187,14 @@ class _Body:
             self.lines += [f"{self._output(part.ask)}=FALSE", f"WAIT FOR {self._input(AWAKE)}"]
 
     def _output(self, name: str) -> str:
-        self._outputs.setdefault(name.upper(), len(self._outputs) + 1)
-        return name.upper()
+        called = self._names.of(name)
+        self._outputs.setdefault(called, len(self._outputs) + 1)
+        return called
 
     def _input(self, name: str) -> str:
-        self._inputs.setdefault(name.upper(), len(self._inputs) + 1)
-        return name.upper()
+        called = self._names.of(name)
+        self._inputs.setdefault(called, len(self._inputs) + 1)
+        return called
 
 
 def _truth(on: bool) -> str:
