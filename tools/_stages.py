@@ -22,7 +22,9 @@ PYTHON = VENV / "bin" / "python"
 LOGS = ROOT / "out" / "setup"
 INTERFACES = ROOT / "ros_ws" / "src" / "ir_msgs"
 KERNELS = ROOT / "src" / "ir_kernels"
-BUILD, RUN, TESTS = (ROOT / "requirements" / f"{name}.txt" for name in ("build", "run", "dev"))
+TOOLS, BUILD, RUN, TESTS = (
+    ROOT / "requirements" / f"{name}.txt" for name in ("tools", "build", "run", "dev")
+)
 LOCAL = ("--no-deps", "--no-build-isolation", "--use-pep517")
 WHEELS = ROOT / "out" / "setup" / "wheels"
 PIP = ("-m", "pip", "--disable-pip-version-check", "--no-input")
@@ -32,13 +34,15 @@ PIP = ("-m", "pip", "--disable-pip-version-check", "--no-input")
 class Stage:
     """One step: what it says, what it depends on, what of its result is missing, and the commands.
 
-    Builds run side by side with everything; installs one after another, for they write into one environment.
+    after: names of the steps whose results it needs. Builds run side by side with everything, and give way to
+    installs; these run one after another, for they write into one environment.
     """
 
     name: str
     says: str
     fingerprint: str
     missing: Callable[[], list[str]]
+    after: tuple[str, ...] = ()
     builds: tuple[str, ...] = ()
     installs: tuple[str, ...] = ()
     requirements: Path | None = None
@@ -86,33 +90,45 @@ def metadata_files() -> list[Path]:
 
 
 class Stages:
-    """The steps, in the waves in which they can run side by side."""
+    """The steps, each after those that it needs."""
 
     def __init__(self, python_version: str) -> None:
         self.version = python_version
         self.site = site_packages(python_version)
         self.pip = (str(PYTHON), *PIP)
 
-    def waves(self, tests: bool) -> list[list[Stage]]:
-        """Return the stages; those of a wave need nothing of each other."""
-        tools = self.wheels(BUILD, "ROS 2 Jazzy and what builds on it (300 MB)")
-        wheels, cores = [self.wheels(RUN, "wheels of the nodes")], [self.core("native", "this processor")]
+    def all(self, tests: bool, portable: bool) -> list[Stage]:
+        """Return the steps; with those for tests, and with the core for any x86-64."""
+        stages = [
+            self.wheels(TOOLS, "tools that compile"),
+            self.wheels(BUILD, "ROS 2 Jazzy and what builds on it (300 MB)", TOOLS),
+            self.core("native", "this processor"),
+            self.interfaces(),
+            self.wheels(RUN, "wheels of the nodes", BUILD),
+            self.editable(),
+        ]
         if tests:
-            wheels.append(self.wheels(TESTS, "wheels of tests and checks"))
-            cores.append(self.core("baseline", "any x86-64"))
-        return [[tools], [*wheels, *cores, self.interfaces()], [self.editable()]]
+            stages.append(self.wheels(TESTS, "wheels of tests and checks", RUN))
+        if portable:
+            stages.append(self.core("baseline", "any x86-64"))
+        return stages
 
-    def wheels(self, requirements: Path, says: str) -> Stage:
-        """Return the stage that installs a file of requirements."""
+    def wheels(self, requirements: Path, says: str, after: Path | None = None) -> Stage:
+        """Return the stage that installs a file of requirements.
+
+        Those of tests are compiled to bytecode when they are imported: most of it never is.
+        """
         source = ""
         if requirements == RUN and self.version != "3.11" and "pybullet" in wanted(RUN):
             source = f"; on {self.version} PyBullet is built from source, 3 minutes more"
+        lazily = ("--no-compile",) if requirements == TESTS else ()
         return Stage(
             requirements.stem,
             f"{says}{source}",
             fingerprint([CONSTRAINTS, requirements], self.version),
             lambda: missing_wheels(self.site, requirements),
-            installs=(*self.pip, "install", "-r", str(requirements)),
+            after=() if after is None else (after.stem,),
+            installs=(*self.pip, "install", *lazily, "-r", str(requirements)),
             requirements=requirements,
         )
 
@@ -125,6 +141,7 @@ class Stages:
             "messages, services and actions for Python",
             fingerprint(interface_files(), self.version, *built_with),
             lambda: [] if (self.site / "ir_msgs").is_dir() else ["ir_msgs"],
+            after=(BUILD.stem,),
             builds=(*self.pip, "wheel", *LOCAL, "--wheel-dir", str(WHEELS), str(INTERFACES)),
             installs=(
                 *self.pip,
@@ -145,6 +162,7 @@ class Stages:
             f"compiled core for {runs_on}",
             fingerprint(kernel_files(), self.version),
             lambda: [] if any((KERNELS / "ir_kernels").glob(f"_{variant}*.so")) else [f"_{variant}*.so"],
+            after=(TOOLS.stem,),
             builds=(str(PYTHON), "setup.py", "-q", "build_ext", "--inplace"),
             folder=KERNELS,
             environment={"IR_KERNELS_VARIANTS": variant},
@@ -159,6 +177,7 @@ class Stages:
             "the Python packages, editable",
             fingerprint(metadata_files(), self.version),
             lambda: missing_editable(self.site, folders),
+            after=(TOOLS.stem,),
             installs=(*self.pip, "install", *LOCAL, *words),
             environment={"IR_KERNELS_VARIANTS": ""},  # built already
         )

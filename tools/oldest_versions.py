@@ -102,7 +102,7 @@ def requirements(versions: dict[str, str]) -> dict[str, str]:
     folder, names = ROOT / "requirements", {canonical(name) for name in LEFT_OUT}
     files = {
         f"requirements/{name}.txt": without((folder / f"{name}.txt").read_text(encoding="utf-8"), names)
-        for name in ("build", "run", "dev")
+        for name in ("tools", "build", "run", "dev")
     }
     constraints = (folder / "constraints.txt").read_text(encoding="utf-8")
     return {**files, "requirements/constraints.txt": with_versions(constraints, versions)}
@@ -139,7 +139,7 @@ def main() -> int:
     if found.returncode:
         return found.returncode
     made = subprocess.run(
-        [found.stdout.strip(), "tools/set_up.py", "--tests"], cwd=copy, env=environment
+        [found.stdout.strip(), "tools/set_up.py", "--tests", "--portable"], cwd=copy, env=environment
     ).returncode
     if made:
         return made

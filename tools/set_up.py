@@ -1,11 +1,12 @@
 """Make or complete the virtual environment .venv, doing only what has changed since the last call.
 
-    python tools/set_up.py [--tests]
+    python tools/set_up.py [--tests] [--portable]
 
 Standard library only: it runs before anything is installed. Every stage has a fingerprint of what it depends
 on; a stage whose fingerprint lies in .venv/.setup is skipped. Downloads and builds run side by side. What
 pip and the compilers say goes to out/setup/STAGE.log, whose end is shown when a stage fails. What somebody
-has uninstalled since is installed again. --tests: also what checks, tests and benchmarks need.
+has uninstalled since is installed again. --tests: also what checks, tests and benchmarks need. --portable:
+also the compiled core for any x86-64, which runs where .venv is taken to another processor.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from _distributions import ROOT, STAMPS, VENV, installed, note_what_came, said, site_packages
@@ -85,8 +86,9 @@ def run(command: tuple[str, ...], log: Path, folder: Path = ROOT, **variables: s
         raise SetupError("\n".join([*useful[-40:], f"{' '.join(command)} failed; all of it is in {log}"]))
 
 
-def set_up(tests: bool) -> None:
+def set_up(tests: bool, portable: bool) -> None:
     """Do what is missing."""
+    start = time.monotonic()
     check_machine()
     make_venv()
     asked = subprocess.run(
@@ -101,15 +103,15 @@ def set_up(tests: bool) -> None:
         raise SetupError(
             f".venv is of Python {own}, asked for is {called}. To change it: rm -rf .venv, then again."
         )
-    waves = [[s for s in wave if needed(s)] for wave in Stages(own).waves(tests)]
-    left = [stage.says for wave in waves for stage in wave]
-    for wave in waves:
-        for stage, seconds in side_by_side(wave, site_packages(own)):
-            left.remove(stage.says)
-            print(
-                f"  {stage.says}: {seconds:.0f} s" + (f"; left: {', '.join(left)}" if left else ""),
-                flush=True,
-            )
+    stages = [stage for stage in Stages(own).all(tests, portable) if needed(stage)]
+    left = [stage.says for stage in stages]
+    for stage, seconds in side_by_side(stages, site_packages(own)):
+        left.remove(stage.says)
+        print(
+            f"  {time.monotonic() - start:3.0f} s: {stage.says}, {seconds:.0f} s"
+            + (f"; left: {', '.join(left)}" if left else ""),
+            flush=True,
+        )
 
 
 def needed(stage: Stage) -> bool:
@@ -121,48 +123,64 @@ def needed(stage: Stage) -> bool:
     return not unchanged or bool(missing)
 
 
-def side_by_side(wave: list[Stage], site: Path) -> Iterator[tuple[Stage, float]]:
-    """Complete the stages, and yield each with its seconds as soon as it is done.
+def side_by_side(stages: list[Stage], site: Path) -> Iterator[tuple[Stage, float]]:
+    """Complete the stages, each after those that it needs, and yield each with its seconds once it is done.
 
-    All of them end before the first one's failure is raised.
+    All that can end does before the first failure is raised.
     """
-    with ThreadPoolExecutor(max(len(wave), 1)) as pool:
-        running = {pool.submit(complete, stage, site): stage for stage in wave}
-        for done in as_completed(running):
+    running: dict[str, Future[float]] = {}
+    with ThreadPoolExecutor(max(len(stages), 1)) as pool:
+        for stage in stages:
+            before = [running[name] for name in stage.after if name in running]
+            running[stage.name] = pool.submit(complete_after, before, stage, site)
+        of = {running[stage.name]: stage for stage in stages}
+        for done in as_completed(of):
             if done.exception() is None:
-                yield running[done], done.result()
-    for done in running:
+                yield of[done], done.result()
+    for done in running.values():
         done.result()
 
 
+def complete_after(before: list[Future[float]], stage: Stage, site: Path) -> float:
+    """Do a stage when others are done; seconds that it took. Their failure is its own."""
+    for other in before:
+        other.result()
+    return complete(stage, site)
+
+
 def complete(stage: Stage, site: Path) -> float:
-    """Do a stage; seconds that it took."""
+    """Do a stage; seconds that it took, without waiting for other installs."""
     stage.stamp.unlink(missing_ok=True)
     start = time.monotonic()
     if stage.builds:
-        run(stage.builds, stage.log, stage.folder, **stage.environment)
+        run(("nice", *stage.builds), stage.log, stage.folder, **stage.environment)
+    seconds = time.monotonic() - start
     if stage.installs:
         with ONE_INSTALLS:
+            start = time.monotonic()
             before = installed(site)
             run(stage.installs, stage.log, stage.folder, **stage.environment)
             if stage.requirements is not None:
                 note_what_came(site, stage.requirements, before)
+            seconds += time.monotonic() - start
     stage.stamp.write_text(stage.fingerprint)
     if missing := stage.missing():
         sentence = f"  {stage.name}: not all of it is there{said(missing)}; see {stage.log.relative_to(ROOT)}"
         print(sentence, file=sys.stderr, flush=True)
-    return time.monotonic() - start
+    return seconds
 
 
 def main() -> int:
     """Set up under a lock: two calls at a time would install into each other."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tests", action="store_true", help="also what checks, tests and benchmarks need")
+    parser.add_argument("--portable", action="store_true", help="also the compiled core for any x86-64")
+    arguments = parser.parse_args()
     LOGS.mkdir(parents=True, exist_ok=True)
     with (LOGS / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         try:
-            set_up(parser.parse_args().tests)
+            set_up(arguments.tests, arguments.portable)
         except SetupError as error:
             print(error, file=sys.stderr)
             return 1

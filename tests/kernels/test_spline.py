@@ -223,16 +223,14 @@ def test_compiled_cores_agree_with_the_reference(compiled_core: Any, bodies: tup
     np.testing.assert_allclose(found.gradient, expected.gradient, atol=1e-9 * np.abs(expected.gradient).max())
 
 
-def test_native_agrees_with_baseline() -> None:
-    if compiled.NAME != "native":
-        pytest.skip("no native build here")
+def test_native_agrees_with_baseline(baseline: Any) -> None:
     control = motion(8, 40, around=WORKING)
-    native, baseline = (
-        kr210_cost(compiled.load(name)[1]).value(control, 0.1) for name in ("native", "baseline")
+    native, portable = (
+        kr210_cost(each).value(control, 0.1) for each in (compiled.load("native")[1], baseline)
     )
-    assert native.value == pytest.approx(baseline.value, rel=1e-13)
+    assert native.value == pytest.approx(portable.value, rel=1e-13)
     np.testing.assert_allclose(
-        native.gradient, baseline.gradient, atol=1e-11 * np.abs(baseline.gradient).max()
+        native.gradient, portable.gradient, atol=1e-11 * np.abs(portable.gradient).max()
     )
 
 

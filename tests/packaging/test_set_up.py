@@ -173,7 +173,7 @@ def test_a_package_that_is_not_installed_from_here_is_noticed(
     assert distributions.said(["ir_away", "ir_gone"]) == " (missing: ir_away, ir_gone)"
 
 
-def test_stages_of_a_wave_run_side_by_side_and_install_one_after_another(
+def test_stages_run_side_by_side_and_install_one_after_another(
     set_up: ModuleType, stages: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stages, "LOGS", tmp_path)
@@ -181,16 +181,16 @@ def test_stages_of_a_wave_run_side_by_side_and_install_one_after_another(
     os.mkfifo(tmp_path / "meet")  # opening it waits for who opens the other end
     meets = "import os, signal\nsignal.alarm(60)\nos.open('meet', os.{0})\n"
     alone = "import pathlib\nme = pathlib.Path('lock')\nme.touch(exist_ok=False)\nme.unlink()\n"
-    wave = [
+    both = [
         stages.Stage(
             name, name, "now", list, builds=(sys.executable, "-c", meets.format(end)),
             installs=(sys.executable, "-c", alone), folder=tmp_path,
         )
         for name, end in (("a", "O_RDONLY"), ("b", "O_WRONLY"))
     ]  # fmt: skip
-    done = {stage.name for stage, _ in set_up.side_by_side(wave, tmp_path)}
+    done = {stage.name for stage, _ in set_up.side_by_side(both, tmp_path)}
     assert done == {"a", "b"}
-    assert not any(set_up.needed(stage) for stage in wave)
+    assert not any(set_up.needed(stage) for stage in both)
 
 
 def test_a_stage_that_fails_says_why_after_the_others_have_ended(
@@ -208,13 +208,42 @@ def test_a_stage_that_fails_says_why_after_the_others_have_ended(
     assert not set_up.needed(good)
 
 
+def test_a_stage_begins_when_those_that_it_needs_are_done(
+    set_up: ModuleType, stages: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stages, "LOGS", tmp_path)
+    monkeypatch.setattr(stages, "STAMPS", tmp_path)
+
+    def stage(name: str, code: str, *after: str) -> object:
+        command = (sys.executable, "-c", f"from pathlib import Path; {code}")
+        return stages.Stage(name, name, "now", list, after=after, builds=command, folder=tmp_path)
+
+    first = stage("first", "Path('made').touch(exist_ok=False)", "done before")
+    second = stage("second", "Path('made').unlink()", "first")
+    assert [done.name for done, _ in set_up.side_by_side([first, second], tmp_path)] == ["first", "second"]
+    bad = stage("bad", "raise SystemExit('no compiler')")
+    needs_it = stage("needs it", "Path('ran').touch()", "bad")
+    with pytest.raises(set_up.SetupError, match="no compiler"):
+        list(set_up.side_by_side([bad, needs_it], tmp_path))
+    assert not (tmp_path / "ran").exists()
+    assert set_up.needed(needs_it)
+
+
+def test_every_stage_stands_after_those_that_it_needs(stages: ModuleType) -> None:
+    known: set[str] = set()
+    for stage in stages.Stages("3.11").all(tests=True, portable=True):
+        assert set(stage.after) <= known
+        known.add(stage.name)
+    assert "core_baseline" not in {stage.name for stage in stages.Stages("3.11").all(True, False)}
+
+
 def test_what_is_installed_here_is_complete(
     distributions: ModuleType, stages: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every wheel that this interpreter was given is there in its pinned version."""
     site = Path(pytest.__file__).parents[1]
     monkeypatch.setattr(distributions, "STAMPS", site.parents[2] / ".setup")
-    for requirements in (stages.BUILD, stages.RUN, stages.TESTS):
+    for requirements in (stages.TOOLS, stages.BUILD, stages.RUN, stages.TESTS):
         assert distributions.missing_wheels(site, requirements) == []
 
 
@@ -232,7 +261,7 @@ def test_every_requirement_is_pinned_in_one_version() -> None:
     assert [pin for pin in pins if not re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][0-9A-Za-z.]*", pin)] == []
     pinned = names("constraints.txt")
     assert len(pinned) == len(set(pinned))
-    assert {*names("build.txt"), *names("run.txt"), *names("dev.txt")} <= set(pinned)
+    assert {*names("tools.txt"), *names("build.txt"), *names("run.txt"), *names("dev.txt")} <= set(pinned)
 
 
 def test_the_interface_package_names_the_pinned_versions() -> None:
