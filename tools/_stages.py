@@ -177,7 +177,7 @@ class Stages:
             "the Python packages, editable",
             fingerprint(metadata_files(), self.version),
             lambda: missing_editable(self.site, folders),
-            after=(TOOLS.stem,),
+            after=(RUN.stem,),  # ROS first: the interfaces wait for it
             installs=(*self.pip, "install", *LOCAL, *words),
             environment={"IR_KERNELS_VARIANTS": ""},  # built already
         )

@@ -87,3 +87,23 @@ def test_a_movement_that_no_state_shows_lasts_as_planned_however_late_its_events
         )
         (step,) = executed_steps(replace(recording, events=events))
         assert step.end - step.start == pytest.approx(lasts)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.03])
+def test_a_movement_that_no_state_shows_ends_when_the_next_one_begins(
+    analysis: Analysis, late: float
+) -> None:
+    """However late its events are: the power of the next one is none of its own."""
+    recording = analysis.recording
+    (first, *_) = executed_steps(recording)
+    started, ended = recording.events[0], recording.events[1]
+    report = replace(started.movement.report, duration=0.004)
+    movement = replace(started.movement, trajectory_id="unseen", report=report)
+    own = [
+        replace(event, movement=movement, program_id="before", time=first.start + late)
+        for event in (started, ended)
+    ]
+    unseen, moved = executed_steps(replace(recording, events=(*own, *recording.events)))[:2]
+    assert (moved.start, moved.end) == (first.start, first.end)
+    assert unseen.end == pytest.approx(moved.start)
+    assert unseen.seconds == pytest.approx(0.0 if late == 0.0 else 0.004, abs=0.004)

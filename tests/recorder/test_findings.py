@@ -78,6 +78,20 @@ def test_a_movement_may_differ_by_one_percent_or_ten_joules(
             assert check.ok == ok, check
 
 
+@pytest.mark.parametrize(("held", "ok"), [(0.0, False), (float("nan"), False), (35.0, True)])
+def test_what_the_next_movement_drew_in_a_shared_reading_is_no_fault_of_a_step(
+    analysis: Analysis, held: float, ok: bool
+) -> None:
+    """A first step that stands still for 4 ms shares its reading with the next one's acceleration."""
+    moved = analysis.movements[0]
+    report = replace(moved.step.movement.report, energy=3.0, duration=0.004)
+    step = replace(moved.step, movement=replace(moved.step.movement, report=report))
+    result = replace(moved, step=step, energy=33.0, straddling_energy=held, stored_energy=0.0)
+    (check,) = named(findings(replace(analysis, steps=(result,))), "energy of 1 home → table")[:1]
+    assert check.ok == ok
+    assert f"1 % or {held if ok else 10:g} J" in check.reason
+
+
 def test_what_the_capacitors_held_may_be_missing_but_not_more(analysis: Analysis) -> None:
     moved = analysis.movements[0]
     planned = moved.step.movement.report.energy

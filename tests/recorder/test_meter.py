@@ -26,6 +26,23 @@ def test_the_meter_integrates_a_constant_power_exactly(new_run: Callable[[], Any
     assert meter.peak(0.2, 0.7) == pytest.approx(205.0)
 
 
+def test_what_readings_at_the_ends_hold_may_belong_to_another_step(
+    new_run: Callable[[], Any], tmp_path: Path
+) -> None:
+    run = new_run()
+    run.rest(1.0, Mode.BUS_POWER_OFF, HOME, "gripper")
+    meter = Meter(read_recording(run.record(tmp_path / "a.mcap")).power)
+    length = float(np.diff(meter.time).max())
+    first, second = meter.time[20:22]
+    middle, reading = 0.5 * (first + second), 205.0 * length
+    assert meter.straddling(first, second) == pytest.approx(0.0, abs=1e-6)
+    assert meter.straddling(middle, middle + 10.0 * length) == pytest.approx(
+        reading
+    )  # half of one at each end
+    assert meter.straddling(middle, middle + 0.1 * length) == pytest.approx(0.9 * reading)
+    assert meter.straddling(meter.time[-1] + 1.0, meter.time[-1] + 2.0) == pytest.approx(0.0, abs=1e-6)
+
+
 def test_the_rectifiers_loss_is_counted_and_the_capacitors_by_the_plants_own_mains(demo_file: Path) -> None:
     """A plant of 540 V holds nothing at 540 V, and what it holds at 560 V is no error of the movement."""
     recording = read_recording(demo_file)

@@ -162,6 +162,7 @@ class _Analyser:
         return StepResult(
             step=step,
             energy=meter.energy(start, end) if meter else NAN,
+            straddling_energy=meter.straddling(start, end) if meter else NAN,
             joint_energy=meter.joints(start, end) if meter else np.full(len(JOINT_NAMES), NAN),
             base_energy=meter.base(start, end) if meter else NAN,
             dissipated_energy=meter.dissipated(start, end) if meter else NAN,

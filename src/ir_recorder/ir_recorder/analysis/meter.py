@@ -31,6 +31,18 @@ class Meter:
         """J at the mains."""
         return self._between(self._energy, start, end)
 
+    def straddling(self, start: float, end: float) -> float:
+        """J by which `energy` may be wrong, as the readings at both ends lie partly outside.
+
+        A reading doesn't say when its energy was drawn: of a step shorter than one, nothing is known.
+        """
+        after = np.searchsorted(self.time, [start, end], "left").clip(0, len(self.time) - 1)
+        before = (np.searchsorted(self.time, [start, end], "right") - 1).clip(0)
+        least = max(float(self._energy[before[1]] - self._energy[after[0]]), 0.0)
+        most = float(self._energy[after[1]] - self._energy[before[0]])
+        read = self.energy(start, end)
+        return max(most - read, read - least)
+
     def base(self, start: float, end: float) -> float:
         """J of controller, drives and tool."""
         return self._between(self._base, start, end)

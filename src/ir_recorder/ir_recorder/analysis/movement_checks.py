@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from ir_msgs_py.report import PlannedMovement
 from ir_recorder.analysis.finding import Finding, at_least, at_most, near, unchecked
 from ir_recorder.analysis.results import StepResult
@@ -34,8 +36,9 @@ def step_checks(result: StepResult, safety_distance: float, bounds: Tolerances) 
 
 def _from_joint_states(name: str, result: StepResult, bounds: Tolerances) -> Finding:
     """What positions say by the data of the robot, against the meter."""
-    below = above = max(bounds.indirect_relative * abs(result.energy), bounds.energy_absolute)
-    why = _share(bounds.indirect_relative, bounds.energy_absolute)
+    least = _least(result, bounds)
+    below = above = max(bounds.indirect_relative * abs(result.energy), least)
+    why = _share(bounds.indirect_relative, least)
     report = result.step.movement.report
     if bounds.within_interval and report.energy_high > report.energy_low:
         below = max(below, 2.0 * (report.energy_high - report.energy))
@@ -68,11 +71,11 @@ def _expected(result: StepResult, share: float, bounds: Tolerances) -> tuple[flo
     A plant that is not the model is held against the plan's interval: what drives draw that the data put at
     zero is a large part of a small robot's power at rest, as of its movements.
     """
-    report, least = result.step.movement.report, bounds.energy_absolute
+    report, least = result.step.movement.report, _least(result, bounds)
     planned = share * report.energy
     if bounds.within_interval and report.energy_high > report.energy_low:
         low, high = (2.0 * share * end - planned for end in (report.energy_low, report.energy_high))
-        why = f"the plant is not the model: twice the plan's 90 % interval and {least:g} J"
+        why = f"the plant is not the model: twice the plan's 90 % interval and {least:.3g} J"
         return low - least, high + least, why
     bound = max(bounds.energy_relative * planned, least)
     return planned - bound, planned + bound, _share(bounds.energy_relative, least)
@@ -103,7 +106,7 @@ def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findin
 def _resting(result: StepResult, bounds: Tolerances) -> tuple[float, float, str]:
     """Least and largest energy [J] of a pause in a resting mode, and the reason."""
     later = bounds.pause_duration * result.motors_power
-    planned, least = result.step.movement.report.energy, bounds.energy_absolute
+    planned, least = result.step.movement.report.energy, _least(result, bounds)
     low, high, why = planned - least, planned + least, ""
     if bounds.within_interval:
         low, high, why = _expected(result, 1.0, bounds)
@@ -148,12 +151,17 @@ def _rests(movement: PlannedMovement) -> bool:
     return movement.power_mode not in ("", "STAND_ON_MOTORS")
 
 
+def _least(result: StepResult, bounds: Tolerances) -> float:
+    """J that any step may differ by: more where a reading at an end holds more, as if the next one moves."""
+    return max(bounds.energy_absolute, np.nan_to_num(result.straddling_energy))
+
+
 def _stored(result: StepResult) -> float:
     return 0.0 if math.isnan(result.stored_energy) else result.stored_energy
 
 
 def _share(relative: float, absolute: float) -> str:
-    return f"{relative * 100.0:g} % or {absolute:g} J"
+    return f"{relative * 100.0:g} % or {absolute:.3g} J"
 
 
 def _between(name: str, measured: float, low: float, high: float, expected: float, reason: str) -> Finding:

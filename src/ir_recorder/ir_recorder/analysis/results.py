@@ -22,7 +22,8 @@ NAN = float("nan")
 class StepResult:
     """A step with what it took, measured at the mains meter.
 
-    energy, base_energy, dissipated_energy, rectifier_energy [J]; joint_energy (n,) [J] at the DC bus;
+    energy, base_energy, dissipated_energy, rectifier_energy [J]; straddling_energy [J]: by which energy may
+    be wrong, as readings at its ends belong to other steps as well; joint_energy (n,) [J] at the DC bus;
     peak_power [W];
     indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and torque;
     second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
@@ -33,6 +34,7 @@ class StepResult:
 
     step: ExecutedStep
     energy: float
+    straddling_energy: float
     joint_energy: FloatArray
     base_energy: float
     dissipated_energy: float

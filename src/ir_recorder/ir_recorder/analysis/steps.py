@@ -67,7 +67,8 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
     """All steps that started, in the order of time.
 
     The runner's events come later than the robot's stamps where the machine is busy. A pause is moved back by
-    what the end of the movement before it came late, and ends at the latest when the robot moves again.
+    what the end of the movement before it came late, and ends at the latest when the robot moves again, as
+    does a movement that is too short to be seen.
     """
     steps: list[ExecutedStep] = []
     runs, late = _Runs(recording.controller), 0.0
@@ -79,13 +80,10 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
         ran = runs.next_of(event.movement)
         if ran is not None:
             late = max(0.0, last - ran[1]) if end else 0.0
-            if steps and steps[-1].movement.is_pause:
-                pause = steps[-1]
-                steps[-1] = replace(pause, end=max(pause.start, min(pause.end, ran[0])))
+            steps[-1:] = [_ended_at(step, ran[0]) for step in steps[-1:]]
         start, stop = ran or (event.time - late, last - late)
-        planned = event.movement.report.duration
-        if ran is None and 0.0 < planned < UNSEEN:  # its events are as far apart as the nodes' answers
-            stop = min(stop, start + planned)
+        if ran is None and _unseen(event.movement):  # its events are as far apart as the nodes' answers
+            stop = min(stop, start + event.movement.report.duration)
         steps.append(
             ExecutedStep(
                 event.index,
@@ -98,6 +96,20 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
             )
         )
     return tuple(steps)
+
+
+def _unseen(movement: PlannedMovement) -> bool:
+    return not movement.is_pause and 0.0 < movement.report.duration < UNSEEN
+
+
+def _ended_at(step: ExecutedStep, moves: float) -> ExecutedStep:
+    """The step before the robot moves at a time [s]: a pause ends by then, an unseen movement was before."""
+    late = max(0.0, step.end - moves)
+    if step.movement.is_pause:
+        return replace(step, end=max(step.start, step.end - late))
+    if _unseen(step.movement):
+        return replace(step, start=step.start - late, end=step.end - late)
+    return step
 
 
 def _end_of(start: ProgramEvent, later: tuple[ProgramEvent, ...]) -> ProgramEvent | None:
