@@ -153,7 +153,7 @@ def complete(stage: Stage, site: Path) -> float:
     stage.stamp.unlink(missing_ok=True)
     start = time.monotonic()
     if stage.builds:
-        run(("nice", *stage.builds), stage.log, stage.folder, **stage.environment)
+        run(("nice", "-n", "5", *stage.builds), stage.log, stage.folder, **stage.environment)
     seconds = time.monotonic() - start
     if stage.installs:
         with ONE_INSTALLS:

@@ -153,7 +153,7 @@ def _rests(movement: PlannedMovement) -> bool:
 
 def _least(result: StepResult, bounds: Tolerances) -> float:
     """J that any step may differ by: more where a reading at an end holds more, as if the next one moves."""
-    return max(bounds.energy_absolute, np.nan_to_num(result.straddling_energy))
+    return max(bounds.energy_absolute, float(np.nan_to_num(result.straddling_energy)))
 
 
 def _stored(result: StepResult) -> float:
