@@ -103,3 +103,28 @@ def test_a_mesh_that_cannot_be_read_makes_no_other_key_unknown(tmp_path: Path) -
     assert len(found) == len(places), found
     for place in places:
         assert any(f"equipment[0].bodies{place}" in sentence for sentence in found), place
+
+
+@pytest.mark.parametrize(
+    ("written", "typed", "word"),
+    [
+        ("attach: gear", "atach: gear", "unknown key 'atach'"),
+        ("attach: gear", "attach: geer", "part 'geer' is unknown"),
+        ("states:\n      door_open: [lathe_door_up]\n      door_closed: [lathe_door_down]", "states: [up]",
+         "equipment[1].states must be a mapping"),
+        ("follows: lathe_open_door", "follow: lathe_open_door", "unknown key 'follow'"),
+    ],
+)  # fmt: skip
+def test_what_follows_from_a_mistake_is_not_reported(
+    written: str, typed: str, word: str, tmp_path: Path
+) -> None:
+    assert written in DEMO
+    found = read(tmp_path, DEMO.replace(written, typed, 1))
+    assert [word in error.sentence for error in found] == [True], [error.sentence for error in found]
+
+
+def test_a_part_that_nobody_holds_is_reported_where_the_program_is_whole(tmp_path: Path) -> None:
+    text = DEMO.replace("infeed_pick, attach: gear", "infeed_pick", 1)
+    size, hands = read(tmp_path, text.replace("size: [0.8,", "size: [-0.8,", 1))
+    assert "must be in (0, 1000] m" in size.sentence
+    assert "no part is held" in hands.sentence

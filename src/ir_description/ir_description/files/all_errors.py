@@ -21,7 +21,8 @@ ERRORS_MAX = 100
 _PLACE = re.compile(r"[A-Za-z_]\w*(?:\[\d+\]|\.[A-Za-z_][\w-]*)*")
 _STEP = re.compile(r"\[(\d+)\]|([A-Za-z_][\w-]*)")
 _UNKNOWN_KEY = re.compile(r"has the unknown key '([^']*)'")
-_MISSING = re.compile(r"has no (\w+)|must have exactly one of")
+_MISSING = re.compile(r"has no (\w+)|must have exactly one of| belongs to a |known are none$")
+_HANDS = re.compile(r"can't be (attached|detached)")
 
 Step = str | int
 Error = TypeVar("Error", bound=DescriptionFileError)
@@ -56,6 +57,7 @@ class _Document:
         self.root = root
         self._names: set[str] = set()  # that stood in what was left out
         self._thinned: dict[int, Node] = {}  # by id: what misses something now, and what that is a part of
+        self._step_gone = False  # of the program, or a part of one
         self._known: dict[int, Node] = {}  # by id: mappings of which a known key is missing now
         self._numbers: dict[int, list[int]] = {}  # of the entries that a list still has
 
@@ -79,6 +81,8 @@ class _Document:
         """
         if _UNKNOWN_KEY.search(sentence) is not None:
             return id(self._at(place[:-1]).content) in self._known
+        if _HANDS.search(sentence) is not None:
+            return self._step_gone
         missing = _MISSING.search(sentence) is not None
         thinned = any(id(node) in self._thinned for node in self._along(place))
         return (missing and thinned) or any(f"'{name}' is unknown" in sentence for name in self._names)
@@ -98,6 +102,7 @@ class _Document:
         if gone is None:
             return False
         self._names.update(_names_in(gone))
+        self._step_gone |= place[0] == "program"
         self._thinned.update((id(node), node) for node in self._along(tuple(above)))
         if isinstance(parent.content, list):
             assert isinstance(last, int)  # place_of gives a list numbers
