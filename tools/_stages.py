@@ -34,7 +34,7 @@ PIP = ("-m", "pip", "--disable-pip-version-check", "--no-input")
 class Stage:
     """One step: what it says, what it depends on, what of its result is missing, and the commands.
 
-    after: names of the steps whose results it needs. Builds run side by side with everything, and give way to
+    after: names of the steps whose results it needs. Builds run side by side with everything, and yield to
     installs; these run one after another, for they write into one environment.
     """
 
