@@ -6,13 +6,14 @@ import itertools
 
 import numpy as np
 from _drives import Drives
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline, PchipInterpolator, make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_planner.cartesian.corners import joined
 from ir_planner.cartesian.parts import parts_of
+from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.scene import PlanningScene
 
 MARGIN = 0.02  # m
@@ -20,6 +21,9 @@ _LENGTHS, _SPEEDS = (0.15, 0.9), (0.05, 0.4)  # m, m/s
 _TURN = np.radians(30.0)
 _DRAWS = 40  # of the oracle
 _STEP, _JUMP = 5e-3, 0.2  # m between its samples, rad between two of them
+_FINE_STEP, _FINE_DRAWS = 6e-4, 8  # m, where axes jump, and in how many draws
+_BEND = 0.3  # rad
+_SLOWER = 0.9  # of the tolerance of the speed
 _ERROR, _TURNED = 1e-4, 1e-2  # m that the tool may be off the path, and rad
 _SHORTEST, _RAMPS = 0.02, 9  # s of a ramp, and how many are tried at each end
 _ASKED = 100  # configurations at which torque is asked for
@@ -75,32 +79,55 @@ def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
 
 
 def oracle(path: CartesianPath, scene: PlanningScene, rng: np.random.Generator) -> bool:
-    """Whether some configuration, followed from the start with an angle that changes evenly, keeps to the
-    path, axis limits, distances, speeds, accelerations and torque at the speed asked for, from rest to rest.
+    """Whether some configuration, followed from the start with an angle that is constant, changes evenly or
+    bends, keeps to the path, axis limits, distances, speeds, accelerations and torque from rest to rest, at
+    the speed asked for or as much slower as its tolerance allows. Where axes jump, samples are closer.
 
     It keeps the reserve of torque that the planner leaves to the feedback in every movement.
     """
     whole, _ = joined(path, parts_of(path))
-    s = np.linspace(0.0, whole.length, max(int(whole.length / _STEP), 20))
-    poses = whole.poses(s)
-    for _ in range(_DRAWS if path.free_angle > 0.0 else 1):
-        ends = rng.uniform(-path.free_angle, path.free_angle, 2) if path.free_angle > 0.0 else (0.0, 0.0)
-        turned = np.array(poses)
-        angles = np.linspace(*ends, len(s))
-        turned[:, :3, :3] = poses[:, :3, :3] @ Rotation.from_euler("x", angles[:, None]).as_matrix()
-        found = scene.inverse_kinematics.solve(turned)
-        sets = [found.of_pose(k) for k in range(len(s))]
-        middle = 0.5 * (s[1:] + s[:-1])
-        between = whole.poses(middle)
-        about = Rotation.from_euler("x", np.interp(middle, s, angles)[:, None]).as_matrix()
-        between[:, :3, :3] = between[:, :3, :3] @ about
-        for q in sets[0]:
-            chain = _followed(q, sets)
-            if chain is None or not _on_path(make_interp_spline(s, chain, k=5)(middle), between, scene):
-                continue
-            if _drivable(chain, s, path.tool_speed, scene):
-                return True
+    draws = _DRAWS if path.free_angle > 0.0 else 1
+    for draw in range(draws):
+        values = _angles(path.free_angle, draw, rng)
+        steps = (_STEP, _FINE_STEP) if draw < _FINE_DRAWS else (_STEP,)
+        if any(_driven(path, whole, values, step, scene) for step in steps):
+            return True
     return False
+
+
+def _angles(free_angle: float, draw: int, rng: np.random.Generator) -> FloatArray:
+    """Angles (4,) rad at even places: one, an even change, or a bend, in turn."""
+    first, last = rng.uniform(-free_angle, free_angle, 2)
+    even = np.linspace(first, first if draw % 3 == 0 else last, 4)
+    bend = rng.uniform(-_BEND, _BEND, 4) if draw % 3 == 2 else 0.0
+    return np.clip(even + bend, -free_angle, free_angle)
+
+
+def _driven(
+    path: CartesianPath, whole: ToolPath, values: FloatArray, step: float, scene: PlanningScene
+) -> bool:
+    """Whether the path is driven with an angle through values (4,) rad, asked every `step` m."""
+    s = np.linspace(0.0, whole.length, max(int(whole.length / step), 20))
+    angle = PchipInterpolator(np.linspace(0.0, whole.length, len(values)), values)
+    middle = 0.5 * (s[1:] + s[:-1])
+    poses, between = _turned(whole, s, angle), _turned(whole, middle, angle)
+    found = scene.inverse_kinematics.solve(poses)
+    sets = [found.of_pose(k) for k in range(len(s))]
+    slowest = path.tool_speed * (1.0 - _SLOWER * path.speed_tolerance)
+    for q in sets[0]:
+        chain = _followed(q, sets)
+        if chain is None or not _on_path(make_interp_spline(s, chain, k=5)(middle), between, scene):
+            continue
+        if any(_drivable(chain, s, speed, scene) for speed in (path.tool_speed, slowest)):
+            return True
+    return False
+
+
+def _turned(whole: ToolPath, s: FloatArray, angle: PchipInterpolator) -> FloatArray:
+    """Poses (M, 4, 4) at s (M,) m, turned about the tool's axis."""
+    poses = whole.poses(s)
+    poses[:, :3, :3] = poses[:, :3, :3] @ Rotation.from_euler("x", angle(s)[:, None]).as_matrix()
+    return poses
 
 
 def _on_path(q: FloatArray, poses: FloatArray, scene: PlanningScene) -> bool:
