@@ -81,12 +81,27 @@ REFUSED = {
     "turned": (asked(LINE, free_angle=3.2), "free_angle is 3.2 rad"),
     "path": (PlanCartesianMovement.Request(path="saem"), "known are seam"),
     "both": (asked(LINE, path="seam"), "both are"),
+    "too fast": (asked(LINE, tool_speed=5.0), "from 0.000 to 0.600 m"),
+    "axis too fast": (asked(LINE, tool_speed=5.0), "with shorter ramps joint_a"),
+    "there and back again": (
+        asked(LINE, part("line", pose(1.8, -0.3, 1.2)), blending_radius=0.05),
+        "m/s: speed_tolerance 1",
+    ),
+    "beyond": (
+        asked(LINE, start=JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=[7.0] * 6)),
+        "joint_a2 of start is 401.07 deg: it must be in [-140, -5] deg",
+    ),
     "corner": (asked(*TWO), "at 0.300 m the path has a corner of 90.0 deg"),
     "turning corner": (asked(*TWO, orientation="tangent", speed_tolerance=1.0), "can't follow it"),
     "along the axis": (asked(part("line", pose(1.8, -0.3, 1.0)), orientation="tangent"), "at 0.000 m"),
     "tiny approach": (asked(LINE, approach=1e-9), "approach is 1e-09 m"),
     "start": (
-        asked(LINE, start=JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=[0.0] * 6)),
+        asked(
+            LINE,
+            start=JointState(
+                name=[f"joint_a{k}" for k in range(1, 7)], position=[0.0, -1.5, 1.5, 0.0, 0.5, 0.0]
+            ),
+        ),
         "from where the path begins",
     ),
 }
@@ -118,6 +133,9 @@ def test_a_path_of_the_cell_keeps_its_settings_but_for_those_of_the_request(requ
 def test_t1_keeps_250_mm_per_second(requests: Requests) -> None:
     response = answer(requests, asked(LINE, tool_speed=2.0, t1=True))
     assert response.status.code == StatusCode.SUCCESS
+    assert [stage.note for stage in response.info.stages if stage.name == "t1"] == [
+        "0.2497 m/s, so that the flange keeps 250 mm/s"
+    ]
     assert response.report.duration > 0.6 / 0.25
 
 

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner import CartesianPlan, Planner
@@ -182,6 +183,21 @@ def test_a_free_angle_serves_and_stays_within_its_bound(planner: Planner) -> Non
     assert np.abs(np.arctan2(turned[:, 2, 1], turned[:, 1, 1])).max() <= 0.4 + 1e-3
     assert free.report.energy <= fixed.report.energy * 1.001
     assert free.configurations > fixed.configurations
+
+
+def test_a_line_too_short_for_its_speed_says_how_fast_it_is(planner: Planner) -> None:
+    line_of_600_mm = line(pose(1.8, 0.3, 1.2))
+    plan = planned(planner, CartesianPath(pose(1.8, -0.3, 1.2), line_of_600_mm, 10.0, speed_tolerance=1.0))
+    assert plan.status.ok
+    notes = [stage.note for stage in plan.info.stages if stage.name == "speed"]
+    assert len(notes) == 1
+    assert "too short for 10 m/s" in notes[0]
+
+
+def test_poses_that_are_none_are_refused_at_the_door() -> None:
+    for wrong in (np.diag([1.0, 1.0, -1.0, 1.0]), np.diag([2.0, 2.0, 2.0, 1.0]), np.ones((4, 4))):
+        with pytest.raises(InvalidValueError, match="start is no rotation with a place"):
+            CartesianPath(wrong, line(pose(1.8, 0.3, 1.2)))
 
 
 def test_the_same_path_gives_the_same_bytes(planner: Planner) -> None:

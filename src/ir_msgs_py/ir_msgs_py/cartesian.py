@@ -7,6 +7,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.checks import finite, one_of, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
@@ -18,6 +20,7 @@ ORIENTATIONS = (GIVEN, CONSTANT, TANGENT)
 POSES_MAX = 2000  # of a path
 SPEED_MIN, SPEED_MAX = 1e-4, 10.0  # m/s
 LENGTH_MAX = 10.0  # m: of an approach, a retract and a blending radius
+_RIGID = 1e-6  # of a rotation
 _POSES = {LINE: (1, 1), CIRCLE: (2, 2), SPLINE: (1, POSES_MAX)}
 
 
@@ -27,6 +30,19 @@ def _within(value: float, low: float, high: float, name: str, unit: str = "") ->
         suffix = f" {unit}" if unit else ""
         raise InvalidValueError(f"{name} is {number:g}{suffix}: it must be in [{low:g}, {high:g}]{suffix}")
     return number
+
+
+def _rigid(value: FloatArray, name: str) -> FloatArray:
+    """A pose (4, 4), read-only: a rotation and a place."""
+    pose = read_only(value, name, (4, 4))
+    rotation, last = pose[:3, :3], pose[3] - (0.0, 0.0, 0.0, 1.0)
+    off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    if max(off, float(np.abs(last).max())) > _RIGID or np.linalg.det(rotation) < 0.0:
+        raise InvalidValueError(
+            f"{name} is no rotation with a place: R R^T deviates from 1 by {off:.2g}, it must be at most "
+            f"{_RIGID:g}, det R is {np.linalg.det(rotation):.3g}, it must be 1, or the last row isn't 0 0 0 1"
+        )
+    return pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +63,7 @@ class CartesianSegment:
         if not fewest <= len(self.poses) <= most:
             wanted = f"{fewest}" if fewest == most else f"{fewest} to {most}"
             raise InvalidValueError(f"a {self.kind} has {len(self.poses)} poses: it must have {wanted}")
-        set_field(self, "poses", tuple(read_only(pose, "pose", (4, 4)) for pose in self.poses))
+        set_field(self, "poses", tuple(_rigid(pose, f"poses[{k}]") for k, pose in enumerate(self.poses)))
         if self.tool_speed != 0.0:
             set_field(self, "tool_speed", _within(self.tool_speed, SPEED_MIN, SPEED_MAX, "tool_speed", "m/s"))
 
@@ -74,7 +90,7 @@ class CartesianPath:
     retract: float = 0.0
 
     def __post_init__(self) -> None:
-        set_field(self, "start", read_only(self.start, "start", (4, 4)))
+        set_field(self, "start", _rigid(self.start, "start"))
         set_field(self, "segments", tuple(self.segments))
         poses = sum(len(segment.poses) for segment in self.segments)
         if not 1 <= poses <= POSES_MAX:

@@ -38,12 +38,15 @@ _LIMITS, _FARTHER = ("velocity", "acceleration", "jerk"), 0.93
 
 @dataclass(frozen=True, eq=False)
 class DrivenPath:
-    """A chain as a movement, and what it keeps of the path; longer: its ramps reach as far as it takes."""
+    """A chain as a movement, and what it keeps of the path; slower: the share of its speed that T1 leaves;
+    longer: its ramps reach as far as it takes.
+    """
 
     movement: Movement
     sent: SentPath
     angle: Angle | None
     chain: Chain
+    slower: float = 1.0
     longer: bool = False
 
 
@@ -175,7 +178,7 @@ def timed(asked: Asked, chain: Chain, share: float = 1.0, *, longer: bool = Fals
         _check_duration(sum(stroke.duration for stroke in strokes), asked)
         points = sent(strokes, limits, scene)
         movement = Movement(chain.q, points.trajectory, asked.context, fixed_time=True)
-        made.append(DrivenPath(movement, points, angle, chain, longer))
+        made.append(DrivenPath(movement, points, angle, chain, slower, longer))
         return movement
 
     within_torque(within, asked.context)
@@ -218,10 +221,7 @@ def _flange_share(asked: Asked, curves: list[JointCurve]) -> float:
         here, ahead = (context.scene.chain.link_poses(at)[:, -1, :3, 3] for at in (q, q + _STEP * first))
         fastest = max(fastest, float(np.linalg.norm(ahead - here, axis=1).max()) / _STEP)
     top = max([path.tool_speed, *(one.tool_speed for one in path.segments)])
-    share = min(1.0, _SHRUNK * T1_SPEED / max(fastest * top, 1e-12))
-    if share < 1.0:
-        context.journal.note("t1", f"{share * path.tool_speed:.4g} m/s, so that the flange keeps 250 mm/s")
-    return share
+    return min(1.0, _SHRUNK * T1_SPEED / max(fastest * top, 1e-12))
 
 
 _FLANGE_SAMPLES, _STEP = 400, 1e-6  # of a stroke; m of a difference quotient along the path

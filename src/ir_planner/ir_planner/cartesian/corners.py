@@ -16,7 +16,7 @@ SMOOTHING_TURN = 5e-4  # rad
 SHORTEST_JOINT = 1e-3  # m: a smaller radius is a corner
 _LONGEST_JOINT = 0.05  # m
 _TANGENT = np.radians(2.0)  # parts that meet at less are smoothed, whatever the radius asked for
-_REVERSAL = np.radians(175.0)  # beyond, a rounded corner would come to a stand
+REVERSAL = np.radians(175.0)  # beyond, a rounded corner would come to a stand
 _SHRINK = 0.8
 _SAMPLES = 129
 
@@ -50,7 +50,7 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
     first = before.places.tangent(np.array([before.length]))[0]
     second = after.places.tangent(np.array([0.0]))[0]
     angle = float(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second))
-    if angle > _REVERSAL:
+    if angle > REVERSAL:
         return Joint(0.0, angle)
     if asked > 0.0 and angle > _TANGENT:
         return Joint(min(asked, half), angle, rounded=True)

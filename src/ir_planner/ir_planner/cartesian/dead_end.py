@@ -75,8 +75,9 @@ def _jump(here: FloatArray, ahead: FloatArray, away: FloatArray, scene: Planning
 
 
 def _help(asked: Asked) -> str:
-    wider = "" if asked.path.free_angle >= np.pi - 1e-6 else ", or a wider free_angle,"
-    if asked.path.free_angle == 0.0:
-        wider = ", or a free_angle,"
-    fixed = ", or leaving start open" if asked.fixed else ""
-    return f"another orientation there{wider}{fixed} may help"
+    angle, helping = asked.path.free_angle, ["another orientation there"]
+    if angle < np.pi - 1e-6:
+        helping.append("a wider free_angle" if angle > 0.0 else "a free_angle")
+    if asked.fixed:
+        helping.append("no given start")
+    return f"{' or '.join(helping)} may help"

@@ -9,7 +9,7 @@ from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.asked import Asked
 from ir_planner.cartesian.best import T1_SPEED, DrivenPath
-from ir_planner.cartesian.corners import Joint, joined
+from ir_planner.cartesian.corners import REVERSAL, Joint, joined
 from ir_planner.cartesian.layers import Layers, layers_of
 from ir_planner.cartesian.parts import parts_of
 from ir_planner.cartesian.refusal import PathRefusedError
@@ -91,8 +91,9 @@ def _check_corners(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ..
                 StatusCode.INVALID_MOTION_PLAN,
             )
         if path.speed_tolerance < 1.0:
+            rounding = "" if joint.angle > REVERSAL else "give a blending_radius, or "
             raise PathRefusedError(
-                f"{corner}, where the tool can't keep {before.speed:g} m/s: give a blending_radius, or "
+                f"{corner}, where the tool can't keep {before.speed:g} m/s: {rounding}"
                 f"speed_tolerance 1 to stop there (it is {path.speed_tolerance:g})",
                 StatusCode.INVALID_MOTION_PLAN,
             )

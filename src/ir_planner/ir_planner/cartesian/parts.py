@@ -14,6 +14,7 @@ from ir_planner.errors import RequestError
 
 SHORTEST = 1e-4  # m: of a part, and between the points of a spline
 FARTHEST = 100.0  # m: of any coordinate, and the longest path
+_ROUNDED = 1.0 - 1e-6  # what differences of places round
 _OPPOSITE = np.radians(179.0)  # beyond, the shortest turn isn't known
 
 
@@ -108,7 +109,7 @@ def _check_place(pose: FloatArray, name: str) -> None:
 def _check_steps(places: FloatArray, name: str) -> None:
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     k = int(np.argmin(steps))
-    if steps[k] < SHORTEST:
+    if steps[k] < SHORTEST * _ROUNDED:
         raise _refused(
             f"{name}.poses[{k}] is {steps[k]:g} m from the pose before it: it must be at least {SHORTEST:g} m"
         )

@@ -1,14 +1,17 @@
 """A path of the tool as a certified movement: the chain of configurations of least J that keeps the speed."""
 
+import numpy as np
+
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cartesian.answer import CartesianPlan
-from ir_planner.cartesian.best import DrivenPath, best_along
+from ir_planner.cartesian.best import best_along
 from ir_planner.cartesian.drawn import drawn
 from ir_planner.cartesian.refusal import PathRefusedError
+from ir_planner.cartesian.remarks import remarks
 from ir_planner.cartesian.tool_path import HeadingError
 from ir_planner.errors import RequestError
 from ir_planner.request import Context, checked_options, chosen
@@ -31,12 +34,14 @@ def plan_path(path: CartesianPath, start: FloatArray | None, t1: bool, context: 
 
 
 def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> CartesianPlan:
+    if start is not None:
+        start = _checked_start(start, context)
     whole = drawn(path, start, t1, context)
     found = best_along(whole.asked, whole.layers)
     with context.journal.stage("tool error"):
         kept = whole.kept(found)
-    if found.longer:
-        context.journal.note("speed", _kept_between(found))
+    for name, text in remarks(whole.asked.path, found):
+        context.journal.note(name, text)
     trajectory = found.movement.trajectory
     info = context.journal.info(trajectory.positions[0], context.joint_names)
     return CartesianPlan(
@@ -52,18 +57,27 @@ def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: C
     )
 
 
-def _kept_between(found: DrivenPath) -> str:
-    """Where the tool keeps its speed, whose ramps are long."""
-    stretches = [
-        (stroke.curve.begin + begin, stroke.curve.begin + end)
-        for stroke in found.sent.strokes
-        for begin, end, even in zip(
-            stroke.law.places[:-1], stroke.law.places[1:], stroke.law.even, strict=True
+def _checked_start(start: FloatArray, context: Context) -> FloatArray:
+    """The configuration (n,) that is given, within the axis limits. Raises RequestError."""
+    robot, q = context.scene.cell.robot, np.asarray(start, dtype=float)
+    if q.shape != (robot.n,) or not np.isfinite(q).all():
+        raise RequestError(
+            StatusCode.START_STATE_INVALID,
+            f"start has shape {q.shape}: it must be {robot.n} finite angles in rad",
         )
-        if even
-    ]
-    where = ", ".join(f"from {begin:.3f} to {end:.3f} m" for begin, end in stretches) or "nowhere"
-    return f"the axes need long ramps: the tool keeps its speed {where}"
+    over = np.maximum(q - robot.position_max, robot.position_min - q)
+    if over.max() > _ROUNDED:
+        j = int(np.argmax(over))
+        low, high = np.degrees([robot.position_min[j], robot.position_max[j]])
+        raise RequestError(
+            StatusCode.START_STATE_INVALID,
+            f"{robot.joint_names[j]} of start is {np.degrees(q[j]):.2f} deg: "
+            f"it must be in [{low:g}, {high:g}] deg",
+        )
+    return q
+
+
+_ROUNDED = 1e-9  # rad
 
 
 def heading_status(error: HeadingError) -> Status:

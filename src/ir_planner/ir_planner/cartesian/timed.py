@@ -25,6 +25,7 @@ _ROUNDS, _AROUND = 25, 4
 _USED_AT_MOST = 0.995  # of a limit, by ramps that are too long for their part otherwise
 _GROWTH, _GROWTHS = 1.2, 30  # of a ramp
 _SLOWER = 0.85
+_SHORTER = 0.999  # of ramps that would just fit
 _SHOWN = 0.95  # of the tolerance: what is shown of the speed is a bound, a little above what it is at samples
 _SLOWEST = 1e-4  # m/s
 
@@ -111,7 +112,10 @@ def _fitting(
             law_of(spans, ramps)
             return spans, ramps
         except TooShortError as error:
-            spans = _slower(spans, error, tolerance, ramps)
+            slower = _slower(spans, error, tolerance)
+            if slower is None:
+                raise _too_short(curve, spans, ramps, error, limits, scene) from error
+            spans = slower
 
 
 def _grown(
@@ -142,19 +146,40 @@ def _grown(
     return None
 
 
-def _slower(
-    spans: tuple[Span, ...], error: TooShortError, tolerance: float, ramps: FloatArray
-) -> tuple[Span, ...]:
-    """The spans with a lower speed where one is too short for it, if it may be lower."""
+def _slower(spans: tuple[Span, ...], error: TooShortError, tolerance: float) -> tuple[Span, ...] | None:
+    """The spans with a lower speed where one is too short for it; None where it may not be lower."""
     k = error.index
     span = spans[k]
     if (span.kept and tolerance < 1.0) or span.speed < _SLOWEST:
-        raise PathRefusedError(
-            f"a part of the path is {span.length:.4g} m long: reaching {span.speed:g} m/s and braking take "
-            f"{span.length + error.missing:.4g} m; a lower tool_speed, or speed_tolerance 1, may help",
-            StatusCode.INVALID_MOTION_PLAN,
-        )
+        return None
     return (*spans[:k], replace(span, speed=span.speed * _SLOWER), *spans[k + 1 :])
+
+
+def _too_short(
+    curve: JointCurve,
+    spans: tuple[Span, ...],
+    ramps: FloatArray,
+    error: TooShortError,
+    limits: MotionLimits,
+    scene: PlanningScene,
+) -> PathRefusedError:
+    """Why a span can't be driven at its speed: where it lies, and the axis that lacks something."""
+    k, span = error.index, spans[error.index]
+    begin = curve.begin + sum(one.length for one in spans[:k])
+    fits = span.length / (span.length + error.missing)
+    axis = ""
+    with suppress(TooShortError):  # elsewhere: then no axis is named
+        law = law_of(spans, ramps * fits * _SHORTER)
+        motion = TimedStroke(curve, law).at(_instants(law))
+        at = int(np.argmax(use_of(motion, limits, scene)))
+        worst = _worst(motion, at, limits, scene)
+        axis = f"; with shorter ramps {worst} at {motion.s[at]:.3f} m"
+    return PathRefusedError(
+        f"a part of the path, from {begin:.3f} to {begin + span.length:.3f} m, is {span.length:.4g} m long: "
+        f"reaching {span.speed:g} m/s and braking take {span.length + error.missing:.4g} m{axis}; "
+        f"a tool_speed of about {span.speed * fits ** (2.0 / 3.0):.2g} m/s, or speed_tolerance 1, may help",
+        StatusCode.INVALID_MOTION_PLAN,
+    )
 
 
 def _instants(law: SpeedLaw) -> FloatArray:
@@ -175,7 +200,7 @@ def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: Pl
     owner = np.clip(np.searchsorted(knots, tau), 0, len(knots) - 1)
     begun = made.at(tau)
     if use_of(begun, limits, scene).max() > most * 1.5:
-        raise _refused(made, begun, limits, scene, tolerance)
+        raise _refused(begun, limits, scene, tolerance)
     for _ in range(_ROUNDS):
         slowed = replace(made, slowness=make_interp_spline(knots, slowness, k=5))
         use = use_of(slowed.at(tau), limits, scene)
@@ -187,15 +212,26 @@ def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: Pl
         slowness = slowness * (1.0 + convolve1d(widest, window / window.sum(), mode="nearest"))
         if slowness.max() > most:
             break
-    raise _refused(made, begun, limits, scene, tolerance)
+    raise _refused(begun, limits, scene, tolerance)
 
 
 def _refused(
-    made: TimedStroke, motion: Driven, limits: MotionLimits, scene: PlanningScene, tolerance: float
+    motion: Driven, limits: MotionLimits, scene: PlanningScene, tolerance: float
 ) -> PathRefusedError:
     """Why the speed can't be kept: the worst place, its axis and what it lacks."""
     factor = use_of(motion, limits, scene)
     k = int(np.argmax(factor))
+    speed = motion.speed[k]
+    slowest = f"; there it could do about {speed / factor[k]:.3g} m/s" if speed > 0.0 else ""
+    return PathRefusedError(
+        f"{_worst(motion, k, limits, scene)} at {motion.s[k]:.3f} m, where the tool moves at {speed:.3g} m/s"
+        f"{singularity(motion.q[k], scene)}{slowest}; speed_tolerance is {tolerance:g}",
+        StatusCode.INVALID_MOTION_PLAN,
+    )
+
+
+def _worst(motion: Driven, k: int, limits: MotionLimits, scene: PlanningScene) -> str:
+    """The axis that lacks most at instant k of a motion, and what it lacks."""
     torque = torque_use(scene.dynamics, motion.q[k : k + 1], motion.qd[k : k + 1], motion.qdd[k : k + 1])[0]
     shares = {
         "velocity": np.abs(motion.qd[k]) / limits.velocity,
@@ -206,11 +242,4 @@ def _refused(
     powers = {"velocity": 1.0, "acceleration": 0.5, "jerk": 1.0 / 3.0, "torque": 0.5}
     what = max(shares, key=lambda name: float(shares[name].max() ** powers[name]))
     j = int(np.argmax(shares[what]))
-    speed = motion.speed[k]
-    slowest = f"; there it could do about {speed / factor[k]:.3g} m/s" if speed > 0.0 else ""
-    return PathRefusedError(
-        f"{scene.cell.robot.joint_names[j]} needs {shares[what][j]:.2f} times its {what} limit at "
-        f"{motion.s[k]:.3f} m, where the tool moves at {speed:.3g} m/s"
-        f"{singularity(motion.q[k], scene)}{slowest}; speed_tolerance is {tolerance:g}",
-        StatusCode.INVALID_MOTION_PLAN,
-    )
+    return f"{scene.cell.robot.joint_names[j]} needs {shares[what][j]:.2f} times its {what} limit"
