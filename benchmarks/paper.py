@@ -1,7 +1,7 @@
 """Which of the paper's claims hold?
 
-    python benchmarks/paper.py [--only NAME]... [--seeds N] [--first-seed N] [--again] [--write]
-                               [--out FOLDER] [--page FILE] [--quick] [--json FILE]
+    python benchmarks/paper.py [--only NAME]... [--workers N] [--seeds N] [--first-seed N] [--again]
+                               [--write] [--out FOLDER] [--page FILE] [--quick] [--json FILE]
 
 Every claim is an experiment of its own (`_paper_<claim>.py`). What one has found is stored as JSON and CSV in
 --out; the next run goes on with those that are missing, --only measures the named ones anew, --again all.
@@ -13,10 +13,13 @@ from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import json
+import multiprocessing
 import resource
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -38,6 +41,7 @@ def arguments() -> argparse.Namespace:
     )
     names = ", ".join(EXPERIMENTS)
     parser.add_argument("--only", action="append", choices=list(EXPERIMENTS), metavar="NAME", help=names)
+    parser.add_argument("--workers", type=int, default=1, help="claims that are measured side by side")
     parser.add_argument("--seeds", type=int, default=SEEDS, help=f"independent repetitions; default: {SEEDS}")
     parser.add_argument("--first-seed", type=int, default=FIRST, help=f"the first of them; default: {FIRST}")
     parser.add_argument("--again", action="store_true", help="measure also what is stored")
@@ -63,8 +67,22 @@ def processor_seconds() -> float:
     return mine.ru_utime + mine.ru_stime + others.ru_utime + others.ru_stime
 
 
-def run(experiment: Experiment, given: argparse.Namespace) -> None:
+def run_all(names: Sequence[str], given: argparse.Namespace) -> None:
+    """Measure claims, each in a process of its own where several are measured side by side."""
+    if given.workers < 2:
+        for name in names:
+            run(name, given)
+        return
+    spawned = multiprocessing.get_context("spawn")  # a claim's processor time has no part of another's
+    with ProcessPoolExecutor(given.workers, spawned, max_tasks_per_child=1) as pool:
+        for _ in pool.map(run, names, itertools.repeat(given)):
+            pass
+
+
+def run(name: str, given: argparse.Namespace) -> None:
     """Measure a claim and store its rows."""
+    experiment = EXPERIMENTS[name]
+    print(f"{name}: measured", flush=True)
     begin, wall = processor_seconds(), time.perf_counter()
     rows = [
         {"seed": seed, **row}
@@ -90,6 +108,13 @@ def stored(experiment: Experiment, given: argparse.Namespace) -> dict[str, Any] 
     return found if found is not None and found["seeds"] == seeds_of(given) else None
 
 
+def is_asked(name: str, given: argparse.Namespace) -> bool:
+    """Whether a claim is measured: the named ones are, else those that are missing."""
+    if given.only:
+        return name in given.only
+    return given.again or stored(EXPERIMENTS[name], given) is None
+
+
 def chapter(experiment: Experiment, found: dict[str, Any], images: Path, folder: Path) -> Chapter:
     """Judge what was stored, and draw it."""
     rows: list[Row] = found["rows"]
@@ -113,12 +138,11 @@ def claims_of(statements: Sequence[Statement]) -> list[Claim]:
 def main() -> None:
     """Measure what is missing, write the page, print the claims."""
     given = arguments()
-    for experiment in [] if given.write else EXPERIMENTS.values():
-        missing = stored(experiment, given) is None
-        asked = experiment.name in given.only if given.only else given.again or missing
-        print(f"{experiment.name}: {'measured' if asked else 'as it is stored'}", flush=True)
-        if asked:
-            run(experiment, given)
+    asked = [] if given.write else [name for name in EXPERIMENTS if is_asked(name, given)]
+    for name in EXPERIMENTS:
+        if name not in asked:
+            print(f"{name}: as it is stored", flush=True)
+    run_all(asked, given)
     there = {name: found for name, one in EXPERIMENTS.items() if (found := stored(one, given)) is not None}
     folder = given.page.parent
     chapters = [chapter(EXPERIMENTS[name], found, folder / "images", folder) for name, found in there.items()]

@@ -185,7 +185,7 @@ def test_a_claim_is_measured_stored_and_kept(
 
 @pytest.mark.long
 def test_every_claim_has_a_short_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run(monkeypatch, tmp_path)
+    run(monkeypatch, tmp_path, "--workers", "2")
     text = (tmp_path / "quick" / "reproduction.md").read_text()
     assert "Not run" not in text
     for one in _paper_claims.EXPERIMENTS.values():
