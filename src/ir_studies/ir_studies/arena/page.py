@@ -38,7 +38,7 @@ from ir_studies.page import BUTTON, page
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
 _HEADS = (
     "planner", ">solved", ">first answer", ">best answer", ">J above the best", ">W above the least",
-    ">duration", ">energy", ">clearance", ">cut or dead",
+    ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
 _TIE = 5e-5  # of J: less is not shown
 _ABOVE = 300.0  # percent: what a curve of costs shows where nothing, or something dearer, is known
