@@ -7,7 +7,16 @@ import pytest
 
 from ir_msgs_py.before_after import BeforeAfter
 from ir_msgs_py.options import PlanOptions
-from ir_planner import Planner, RequestError, Stretch, Today, before_after, before_after_common
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner import (
+    Planner,
+    RequestError,
+    Stretch,
+    Today,
+    before_after,
+    before_after_common,
+    parse_goal,
+)
 
 
 def test_all_programs_make_the_same_stops_and_pauses(compared: BeforeAfter) -> None:
@@ -96,6 +105,23 @@ def test_the_planners_own_program_as_todays_saves_next_to_nothing(planner: Plann
     found = before_after(planner, Today("own", "trace", planner.cell.machine_home, stretches))
     assert found.today.report.energy == pytest.approx(plan.report.energy, rel=1e-6)
     assert abs(found.planned.saving.share) < 0.01
+
+
+def test_a_motion_that_is_faster_than_the_limits_is_compared_with_the_free_program(
+    planner: Planner,
+) -> None:
+    """A trace a little faster than the limits ended in "the shortest is ..." and no comparison."""
+    home, plan = planner.cell.machine_home, planner.plan_regional
+    found = plan(home, parse_goal("p1", planner.cell), PlanOptions(objective="time")).trajectory
+    assert found is not None
+    fast = JointTrajectory.from_seconds(found.joint_names, 0.9 * found.times, found.positions)
+    stretch = Stretch(fast, fast.positions[-1], fast.duration, label="0.00 s")
+    compared = before_after(planner, Today("fast.csv", "trace", home, (stretch,), ()))
+    same, free = compared.sides
+    assert not same.found
+    assert "the shortest is" in same.problem
+    assert free.found
+    assert compared.towards == free.name
 
 
 def test_a_program_that_goes_nowhere_is_a_sentence(planner: Planner) -> None:

@@ -138,8 +138,14 @@ class _Asking:
         return costed(steps, self._spreads)
 
     def planned(self, name: str, cycle_time: float, against: Costed) -> Side:
-        """The side of a program that is planned now."""
-        return self.side(name, cycle_time, self.plan(cycle_time), against)
+        """The side of a program that is planned now, or why it can't be asked for: today's motion may be
+        faster than the limits allow.
+        """
+        try:
+            plan = self.plan(cycle_time)
+        except RequestError as error:
+            return Side(name, cycle_time, problem=str(error))
+        return self.side(name, cycle_time, plan, against)
 
     def side(self, name: str, cycle_time: float, plan: ProgramPlan, against: Costed) -> Side:
         """The side of a plan, or why there is none."""
