@@ -194,6 +194,14 @@ def test_few_rows_are_a_sentence() -> None:
         measured(JOINT_NAMES, np.arange(3.0), np.zeros((3, 6)), lambda _: 1.0)
 
 
+def test_a_movement_lasts_as_long_as_it_did(movement: JointTrajectory) -> None:
+    """Below a threshold of speed 12 ms were cut off at each end: a fast movement seemed to break limits."""
+    found = measured(JOINT_NAMES, *sampled(movement, 500.0, 1e-5), lambda _: 1.0, 22.0)
+    ((stretch,), lost) = stretches_of(found.trajectory)
+    assert stretch.seconds == pytest.approx(movement.duration, abs=0.016)
+    assert stretch.seconds + lost == pytest.approx(found.trajectory.duration, abs=1e-6)
+
+
 def test_pauses_of_a_trace_are_standstills_of_half_a_second(movement: JointTrajectory) -> None:
     """There, 0.7 s of rest, and back: two movements and a pause."""
     times = np.arange(0.0, 2.0 * movement.duration + 0.7, 0.004)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, Stretch, Today
 from ir_planner.program import Doors
@@ -22,6 +23,7 @@ _STOP = 0.1  # s: the shortest standstill
 _MOVING = 0.01  # rad/s
 _NOISE = 0.002  # rad: a joint that moves by less stands still
 _STEP = 0.004  # s
+_FALLING = 20  # steps: slower than `_MOVING` a movement begins and ends for so long at most
 _NEAR = 0.02  # s: points nearer to the ends of a movement are left out
 
 
@@ -67,17 +69,27 @@ def _runs(motion: JointTrajectory) -> list[tuple[float, float]]:
     count = max(int(np.ceil((motion.duration - motion.times[0]) / _STEP)), 2)
     at = np.linspace(motion.times[0], motion.duration, count)
     seen = motion.sample(at)
-    moving = (np.abs(seen.qd) > _MOVING).any(axis=1)
+    speed = np.abs(seen.qd).max(axis=1)
+    moving = speed > _MOVING
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int))).reshape(-1, 2)
     runs: list[tuple[float, float]] = []
     for first, behind in edges.tolist():
         if np.ptp(seen.q[first:behind], axis=0).max() < _NOISE:
             continue
-        begin, end = float(at[max(first - 1, 0)]), float(at[min(behind, count - 1)])
+        begin, end = float(at[_slowest(speed, first, -1)]), float(at[_slowest(speed, behind - 1, 1)])
         if runs and begin - runs[-1][1] < _STOP:
             begin = runs.pop()[0]
         runs.append((begin, end))
     return runs
+
+
+def _slowest(speed: FloatArray, row: int, step: int) -> int:
+    """The row near `row` up to which a speed (N,) goes on falling: where a movement really begins or ends."""
+    for _ in range(_FALLING):
+        if not 0 <= row + step < len(speed) or speed[row + step] >= speed[row]:
+            break
+        row += step
+    return row
 
 
 def cut(motion: JointTrajectory, begin: float, end: float) -> JointTrajectory:
