@@ -108,7 +108,8 @@ def measured(cell: str, request: Request, seed: int) -> Row:
     took, elapsed = time.process_time() - begin, time.monotonic() - elapsed
     assert plan is not None
     assert plan.status.ok, plan.status.message
-    layers = plan.info.stages[0].note.split(" x ")[1:]
+    found = next(stage for stage in plan.info.stages if stage.name == "configurations")
+    layers = found.note.split(" x ")[1:]
     return Row(
         cell, request.asked, took, elapsed, 0.0, watch.longest, float(np.mean([int(n) for n in layers]))
     )

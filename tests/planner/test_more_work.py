@@ -88,6 +88,37 @@ def keeps_its_budgets(cell: str, seed: int, count: int) -> None:
         found |= plan.status.ok
 
 
+@pytest.mark.parametrize(("cell", "seed"), [("cnc_door", 2)])
+def test_own_laws_of_the_joints_make_no_program_slower(cell: str, seed: int) -> None:
+    no_slower_with_own_laws(cell, seed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cell", ["cnc_door", "deep_box", "demo", "open", "table_columns"])
+@pytest.mark.parametrize("seed", range(3))
+def test_own_laws_of_the_joints_make_no_program_slower_in_any_cell(cell: str, seed: int) -> None:
+    no_slower_with_own_laws(cell, seed)
+
+
+def no_slower_with_own_laws(cell: str, seed: int) -> None:
+    """The fastest program of stations that are drawn, among them those that a withdrawal leads out of."""
+    planner = Planner(time.monotonic)
+    planner.set_cell("", cell)
+    rng = np.random.default_rng([seed, *cell.encode()])
+    names = [station.name for station in planner.cell.stations]
+    stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
+    plans = [
+        planned(
+            planner, stops, 0.0, PlanOptions(objective="time", timing=timing, seed=seed, planning_time=100.0)
+        )
+        for timing in ("synchronous", "asynchronous")
+    ]
+    assert all(isinstance(plan, ProgramPlan) for plan in plans)
+    common, own = (plan for plan in plans if isinstance(plan, ProgramPlan))
+    assert own.report.duration <= common.report.duration + SAME
+    assert own.info.timing == "asynchronous" or own.program_id == common.program_id
+
+
 def planned(
     planner: Planner, stops: tuple[str, ...], cycle: float, options: PlanOptions
 ) -> ProgramPlan | str:

@@ -53,9 +53,31 @@ class Answer:
 
 
 def best_answer(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
-    """The best program that the work of a request buys. Raises StageError where none is found, RequestError
-    where the cycle is too short.
+    """The best program that the work of a request buys. The synchronous one is a candidate of an asynchronous
+    request too, unless that names a planner and isn't for the fastest.
+
+    Raises StageError where none is found, RequestError where the cycle is too short.
     """
+    options = context.options
+    as_named = options.planner_id != "" and options.objective != "time"
+    if options.timing != "asynchronous" or as_named:
+        return _best(request, route, context, progress)
+    try:
+        common = _best(request, route, context.with_timing("synchronous"), progress)
+    except (StageError, RequestError):
+        return _best(request, route, context, progress)
+    try:
+        own = _best(request, route, context, progress)
+    except (StageError, RequestError):
+        own = common
+    if own.cost < common.cost:
+        return own
+    context.journal.timing = "synchronous"
+    return common
+
+
+def _best(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
+    """The best program of synchronous, or of asynchronous movements."""
     work = context.work
     with _limited(work, work.left, min(work.improvement, _FIRST)):
         best = planned(chosen(request, route, context, progress), progress)
