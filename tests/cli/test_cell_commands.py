@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from ir_cli.main import main
+from ir_cli.offline.plan_command import _kwh
 from ir_description import bundled_cells, cell_to_yaml, load_cell
 
 
@@ -32,6 +33,24 @@ def test_a_broken_cell_file_is_refused_with_its_line(
 def test_an_unknown_cell_lists_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["cell", "check", "nowhere"]) == 2
     assert "deep_box" in capsys.readouterr().err
+
+
+def test_a_file_without_its_ending_is_meant_before_a_bundled_cell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "Zelle Süd"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    (folder / "oven.yaml").touch()
+    assert main(["plan", "oven"]) == 2
+    assert capsys.readouterr().err == "ir: no cell oven: did you mean oven.yaml?\n"
+    assert main(["plan", "../Zelle Süd"]) == 2
+    assert "ir: ../Zelle Süd: file '../Zelle Süd' is not a regular file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("joules", "shown"), [(0.0, "0 Wh"), (629.0, "0.175 Wh"), (44_000.0, "0.0122 kWh")])
+def test_the_energy_of_a_small_robot_is_more_than_zeros(joules: float, shown: str) -> None:
+    assert _kwh(joules) == shown
 
 
 def test_list_prints_every_bundled_cell(capsys: pytest.CaptureFixture[str]) -> None:

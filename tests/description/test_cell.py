@@ -244,6 +244,15 @@ def test_a_tcp_inside_a_body_or_out_of_reach_is_found(cell: Cell) -> None:
     assert ("error", "infeed_pick") in found(far)
 
 
+def test_a_body_whose_middle_was_meant_as_its_underside_is_found(cell: Cell) -> None:
+    lowered = cell.with_equipment(
+        "cabinet", pose=composed(cell.machine("cabinet").pose, pose_of([0.0, 0.0, -0.2]))
+    )
+    sentences = {finding.subject: finding.sentence for finding in check_cell(lowered)}
+    assert sentences["cabinet"].startswith("reaches 0.200 m below the floor; xyz is the middle")
+    assert "cabinet" not in {subject for _, subject in found(replace(lowered, floor=False))}
+
+
 def test_overlapping_zones_are_found(cell: Cell) -> None:
     close = cell.with_equipment("gauge", pose=composed(cell.machine("infeed").pose, pose_of([0.5, 0.0, 0.0])))
     assert ("warning", "infeed") in found(close)

@@ -109,10 +109,18 @@ BROKEN = {
     "path as name": ("name: small", "name: ~/small", "name is '~/small', must be a name"),
     "newline in name": ("name: small", 'name: "a\\nb"', r"name is 'a\\nb', must be a name"),
     "NUL in name": ("name: small", 'name: "a\\0b"', r"name is 'a\\x00b', must be a name"),
-    "non-ASCII name": ("name: small", "name: Zelle_ä", r"name is 'Zelle_\\xe4', must be a name"),
+    "non-ASCII name": (
+        "name: small",
+        "name: Zelle_ä",
+        "name is 'Zelle_ä', must be a name: a letter of A to Z or a to z",
+    ),
     "not a boolean": ("floor: true", "floor: yes", "floor is 'yes', must be true or false"),
     "value missing": ("  mass: 100", "  mass:", "tool.mass is empty, must be a number"),
-    "list for mapping": ("tcp: {xyz: [0.42, 0, 0]}", "tcp: [0.42, 0, 0]", "tcp must be a mapping"),
+    "list for mapping": (
+        "tcp: {xyz: [0.42, 0, 0]}",
+        "tcp: [0.42, 0, 0]",
+        "tcp must be a mapping (key: value) of xyz, abc_deg",
+    ),
     # numbers
     "NaN": ("  mass: 100", "  mass: .nan", "tool.mass is .nan, which is not finite"),
     "infinite": ("xyz: [2, 0, 0]", "xyz: [2, .inf, 0]", "pose.xyz[1] is .inf, which is not finite"),

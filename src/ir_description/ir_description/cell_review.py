@@ -20,6 +20,7 @@ from ir_msgs_py.arrays import FloatArray
 OVERLAPS_MAX = 1_000
 """Zones that overlap are named up to this many pairs."""
 _LARGE = 50.0  # m: a body longer than that is rather one in mm
+_SUNK = 0.005  # m: a body that reaches farther below the floor is rather placed by its underside
 _FAR = 10.0  # times the reach: a place farther away is rather one in mm
 
 
@@ -37,6 +38,7 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...
     findings = [
         *_base(cell),
         *_sizes(cell),
+        *_sunk(cell),
         *_stations(cell),
         *_zones(cell),
         *_signals(cell),
@@ -52,6 +54,17 @@ def _sizes(cell: Cell) -> Iterator[Finding]:
         longest = float(body.size.max(initial=0.0)) if body.kind != "plane" else 0.0
         if longest > _LARGE:
             sentence = f"is {longest:g} m long; lengths are in m: {longest / 1000.0:g} for {longest:g} mm?"
+            yield Finding("warning", body.name, sentence)
+
+
+def _sunk(cell: Cell) -> Iterator[Finding]:
+    """Bodies whose middle was meant to be their underside."""
+    for body in cell.bodies() if cell.floor else ():
+        below = 0.0 if body.kind == "plane" else -float(body.bounds()[0][2])
+        if below > _SUNK:
+            sentence = (
+                f"reaches {below:.3f} m below the floor; xyz is the middle of a body, not its underside"
+            )
             yield Finding("warning", body.name, sentence)
 
 

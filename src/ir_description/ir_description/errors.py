@@ -52,8 +52,8 @@ class RobotFileError(DescriptionFileError):
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """The value as it may stand in a message or a log: quoted, one line, bounded."""
-    text = ascii(value)
+    """The value as it may stand in a message or a log: quoted, one line of printable characters, bounded."""
+    text = repr(value)
     return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
 
 

@@ -129,7 +129,7 @@ def load_cell(name_or_path: str | Path) -> Cell:
     try:
         content = read_regular_file(path, CELL_BYTES_MAX)
     except InvalidValueError as error:
-        raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
+        raise CellFileError(shown(name, 200)[1:-1], 0, str(error)) from error
     return read_cell(text_of(content, str(path), CellFileError), str(path), load_robot, path.parent)
 
 
@@ -138,7 +138,7 @@ def load_path(name: str) -> CartesianPath:
     try:
         content = read_regular_file(Path(name), CELL_BYTES_MAX)
     except InvalidValueError as error:
-        raise CellFileError(shown(name)[1:-1], 0, str(error)) from error
+        raise CellFileError(shown(name, 200)[1:-1], 0, str(error)) from error
     return path_from_yaml(text_of(content, name, CellFileError), name)
 
 

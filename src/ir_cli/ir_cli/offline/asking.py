@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from ir_description import DescriptionError, UnknownNameError, load_cell
 from ir_krl import KrlError
@@ -40,7 +41,9 @@ def planner_of(cell: str, power_parameters: str = "") -> Planner:
     try:
         load_cell(cell)
     except UnknownNameError as error:
-        raise InputError(unknown_name("cell", cell[:80], error.known, "ir cell list")) from error
+        beside = [name for name in (f"{cell[:80]}.yaml", f"{cell[:80]}.yml") if Path(name).is_file()]
+        known = beside or error.known
+        raise InputError(unknown_name("cell", cell[:80], known, "ir cell list")) from error
     planner.set_cell("", cell)
     return planner
 

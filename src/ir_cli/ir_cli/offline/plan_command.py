@@ -169,6 +169,12 @@ def totals_of(plan: ProgramPlan) -> Row:
     }
 
 
+def _kwh(joules: float) -> str:
+    """Energy as it is paid for; Wh where kWh would be 0.00.."""
+    kwh = joules / J_PER_KWH
+    return f"{kwh:.4f} kWh" if kwh >= 0.01 else f"{1e3 * kwh:.3g} Wh"
+
+
 def sentences_of(plan: ProgramPlan) -> list[str]:
     """The totals for people, and what is saved."""
     totals = totals_of(plan)
@@ -178,7 +184,7 @@ def sentences_of(plan: ProgramPlan) -> list[str]:
     lines = [
         f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
         f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
-        f"cycle {totals['seconds']:.2f} s, {totals['joules'] / J_PER_KWH:.4f} kWh from the mains, predicted: "
+        f"cycle {totals['seconds']:.2f} s, {_kwh(totals['joules'])} from the mains, predicted: "
         f"{predicted(plan.report)}; "
         f"{proof if totals['certified'] else 'NOT certified'}",
     ]

@@ -59,7 +59,7 @@ class Item:
     def table(self, required: Sequence[str] = (), optional: Sequence[str] = ()) -> Table:
         """Return the mapping here; unknown keys list the known ones, missing ones are named."""
         if not isinstance(self._content, dict):
-            self.fail("must be a mapping (key: value)")
+            self.fail(f"must be a mapping (key: value) of {listed([*required, *optional])}")
         prefix = f"{self.where}." if self.where else ""
         known = [*required, *optional]
         items = {}
@@ -135,7 +135,9 @@ class Item:
         if not 1 <= len(text) <= NAME_LENGTH:
             self.fail(f"is a name of {len(text)} characters, must have 1 to {NAME_LENGTH}")
         if not _NAME.fullmatch(text):
-            self.fail(f"is {shown(text)}, must be a name: a letter, then letters, digits, _ . or -")
+            self.fail(
+                f"is {shown(text)}, must be a name: a letter of A to Z or a to z, then such, digits, _ . or -"
+            )
 
     def choice(self, known: Sequence[str]) -> str:
         """Return one of the known words, whatever its case."""

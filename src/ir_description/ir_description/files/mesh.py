@@ -35,11 +35,11 @@ def read_regular_file(path: Path, limit: int) -> bytes:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InvalidValueError(f"file {shown(str(path))} can't be opened: {reason}") from error
+        raise InvalidValueError(f"file {shown(str(path), 200)} can't be opened: {reason}") from error
     try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
-            raise InvalidValueError(f"file {shown(str(path))} is not a regular file")
+            raise InvalidValueError(f"file {shown(str(path), 200)} is not a regular file")
         if status.st_size > limit:
             raise InvalidValueError(
                 f"file {shown(str(path))} has {status.st_size} bytes, must be at most {limit} bytes"
