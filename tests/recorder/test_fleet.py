@@ -23,6 +23,7 @@ from ir_recorder.report.fleet import (
     read_members,
     write_fleet_table,
 )
+from ir_recorder.report.fleet.files import recordings_below
 from ir_recorder.report.fleet.totals import by_measure, by_mode, by_movement, robots_of, yearly_of
 
 
@@ -100,11 +101,14 @@ def test_robots_of_one_name_in_two_halls_are_two(demo_file: Path, tmp_path: Path
     for place in ("north/r1", "north/r2", "south/r1"):
         (tmp_path / place).mkdir(parents=True)
         shutil.copy(demo_file, tmp_path / place / "monday.mcap")
-    found, said = fleet(tmp_path, tmp_path / "north", tmp_path / "south")
-    assert found == {"north/r1": 1, "r2": 1, "south/r1": 1}
+    said: list[str] = []
+    halls = [tmp_path / "north", tmp_path / "south"]
+    found = recordings_below(halls, FileRoots.of([tmp_path]), said.append)
+    assert [file.robot for file in found] == ["north/r1", "r2", "south/r1"]
     assert sum("is a copy of" in one and "another robot's" in one for one in said) == 2
     direct = [tmp_path / place / "monday.mcap" for place in ("north/r1", "south/r1")]
-    assert len(fleet(tmp_path, *direct)[0]) == 2
+    named = recordings_below(direct, FileRoots.of([tmp_path]), said.append)
+    assert len({file.robot for file in named}) == 2
 
 
 def test_copies_and_empty_folders_are_named(demo_file: Path, tmp_path: Path) -> None:
