@@ -69,3 +69,12 @@ def test_a_full_disk_is_a_sentence() -> None:
     assert ended.returncode != 0
     assert "No space left on device" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_a_file_that_cannot_be_written_is_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    into = tmp_path / "file" / "cell.sdf"
+    assert main(["cell", "export", "open", str(into)]) == 1
+    assert capsys.readouterr().err == f"ir: {into} can't be used: Not a directory\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -130,9 +131,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except _expected_errors() as error:
-        sys.stderr.write(f"ir: {error}\n")
+        sys.stderr.write(f"ir: {_sentence(error)}\n")
         return getattr(error, "exit_code", 1)
     return code
+
+
+def _sentence(error: Exception) -> str:
+    """What an error says; of the operating system with the file first, as all sentences have it."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{os.fsdecode(error.filename)} can't be used: {error.strerror}"
+    return str(error)
 
 
 def _parser(chosen: str) -> argparse.ArgumentParser:
