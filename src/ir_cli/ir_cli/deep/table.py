@@ -37,7 +37,7 @@ def _rows(visit: Visit) -> Iterator[Row]:
     for here, line in zip(there, out, strict=True):
         nearest = visit.scene.collision.min_distance(here.q[None]).distance[0]
         yield situation | {
-            "joints_deg": " ".join(f"{angle:.0f}" for angle in np.degrees(here.q)),
+            "joints_deg": " ".join(f"{round(angle):d}" for angle in np.degrees(here.q)),
             "clearance": float(nearest),
             "at_station": here.sentence or "free",
             "line_out": _said(line) if distance > 0.0 else "no approach_distance",
