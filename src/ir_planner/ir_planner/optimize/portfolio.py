@@ -22,11 +22,25 @@ from ir_planner.search import COARSE, apart, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
 
 _BETTER = 0.99  # share of the cost below which an alike path replaces another
-_FIRST_LOOK = 12  # evaluations from every guess
-_FOLLOWED, _FOLLOWING = 7, 25  # guesses that are followed further, and for how many evaluations
-_PROMISING = 3  # of these, the cheapest: they get as many as a free path
+_FOLLOWED = 7  # guesses that are followed after the first look
 _OUT_OF_REACH = 1.25  # times the cost of the best: coarse solutions above are not refined
 Look = tuple[Solution, FloatArray]  # a coarse solution, and the guess (M, n) that it came from
+
+
+@dataclass(frozen=True)
+class _Shares:
+    """Evaluations from every guess, then from those that are followed; how many of these get as many as a
+    free path.
+    """
+
+    first: int
+    following: int
+    promising: int
+
+
+# A guess that begins deep in a body shows late what it may come to. At a duration that is short or requested
+# classes are nearer to each other, and where a best is known that a guess has to be near, one look decides.
+_PATIENT, _BRIEF = _Shares(24, 13, 2), _Shares(12, 25, 3)
 
 
 @dataclass(eq=False)
@@ -74,16 +88,17 @@ class Portfolio:
         differ, if they cost less than `worth` times the best candidate; and the cheapest of these as far as
         free paths are. The number of them that are new.
         """
-        looks = list(zip(first_looks(guesses, self.refinement, _FIRST_LOOK), guesses, strict=True))
-        if self.candidates and np.isfinite(worth):
-            most = worth * self.candidates[0].solution.cost
-            looks = [look for look in looks if look[0].cost < most]
-        looks.sort(key=lambda look: look[0].cost)
+        most = worth * self.candidates[0].solution.cost if self.candidates else np.inf
+        options = self.context.options
+        hurried = np.isfinite(most) or options.duration > 0.0 or options.objective == "time"
+        shares = _BRIEF if hurried else _PATIENT
+        seen = zip(first_looks(guesses, self.refinement, shares.first), guesses, strict=True)
+        looks = sorted((look for look in seen if look[0].cost < most), key=lambda look: look[0].cost)
         followed, left = first_different(looks, _FOLLOWED, COARSE, lambda look: look[0].places), QUICK.coarse
-        if len(followed) > _PROMISING:
-            followed = sorted(self._further(followed, _FOLLOWING), key=lambda look: look[0].cost)
-            left -= _FOLLOWING
-        followed[:_PROMISING] = self._further(followed[:_PROMISING], left)
+        if len(followed) > shares.promising:
+            followed = sorted(self._further(followed, shares.following), key=lambda look: look[0].cost)
+            left -= shares.following
+        followed[: shares.promising] = self._further(followed[: shares.promising], left)
         found = [Candidate(method, solution.spline.knots()[0], solution) for solution, _ in followed]
         return sum(self._take(candidate) for candidate in found)
 
