@@ -19,6 +19,7 @@ from .stations import MARGIN, Visit, reaching
 HAND = 5  # links from here on, tool and part may touch what they work at
 _SHARE = 0.5  # of the distance on the line: how near a contact may come
 _GRID = 1e-4  # m, to which it is rounded down
+_NOISE = 1e-6  # of it: processors give distances that differ in their last bits
 _JUMP = 0.35  # rad between points of a line: more is another branch
 
 
@@ -123,5 +124,5 @@ def _by_hand(z: int, scene: PlanningScene) -> bool:
 
 def _contact(z: int, distance: float, scene: PlanningScene) -> AllowedContact:
     """What allows a pair to come to a distance [m]."""
-    pair, least = scene.collision.pairs[z], float(np.floor(_SHARE * distance / _GRID) * _GRID)
+    pair, least = scene.collision.pairs[z], float(np.floor(_SHARE * distance / _GRID + _NOISE) * _GRID)
     return AllowedContact(pair.body_a, pair.body_b, round(max(least, 0.0), 6))
