@@ -52,6 +52,7 @@ MISTAKES = (
     Mistake(
         "Units", "park_deg: [0, -125, 120, 0, 80, 0]", "park: [0, -125, 120, 0, 80, 0]", "write park_deg?"
     ),
+    Mistake("Units", "abc_deg: [0, 90, 0]}", "abc_deg: [0, 1.5708, 0]}", "90 for 1.5708 rad?"),
     Mistake("Names", "robot: kr210_r2700_extra", "robot: kr210", "known are kr210_r2700_extra"),
     Mistake("Names", "{station: form, wait", "{station: from, wait", "known are pick, form"),
     Mistake("Names", "name: press_head", "name: press_bed", "is there twice"),

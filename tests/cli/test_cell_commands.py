@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ir_cli.main import main
-from ir_cli.offline.plan_command import _kwh
+from ir_cli.offline.output import kilowatt_hours
 from ir_description import bundled_cells, cell_to_yaml, load_cell
 
 
@@ -48,9 +48,11 @@ def test_a_file_without_its_ending_is_meant_before_a_bundled_cell(
     assert "ir: ../Zelle Süd: file '../Zelle Süd' is not a regular file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("joules", "shown"), [(0.0, "0 Wh"), (629.0, "0.175 Wh"), (44_000.0, "0.0122 kWh")])
+@pytest.mark.parametrize(
+    ("joules", "shown"), [(0.0, "0 Wh"), (12.0, "0.00333 Wh"), (629.0, "0.175 Wh"), (44e3, "0.0122 kWh")]
+)
 def test_the_energy_of_a_small_robot_is_more_than_zeros(joules: float, shown: str) -> None:
-    assert _kwh(joules) == shown
+    assert kilowatt_hours(joules / 3.6e6) == shown
 
 
 def test_list_prints_every_bundled_cell(capsys: pytest.CaptureFixture[str]) -> None:

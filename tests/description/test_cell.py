@@ -253,6 +253,25 @@ def test_a_body_whose_middle_was_meant_as_its_underside_is_found(cell: Cell) -> 
     assert "cabinet" not in {subject for _, subject in found(replace(lowered, floor=False))}
 
 
+def test_angles_in_radians_are_found(cell: Cell) -> None:
+    assert not [each for each in check_cell(cell) if "rad?" in each.sentence]
+    for abc, meant in (([3.14, 0, 0], "180 for 3.14 rad?"), ([0.7, -1.571, 0], "-90 for -1.571 rad?")):
+        turned = pose_of([0.0, 0.0, 0.5], rotation_from_abc(abc))
+        (finding,) = (
+            each
+            for each in check_cell(cell.with_station(cell.stations[0].name, turned))
+            if "rad?" in each.sentence
+        )
+        assert (finding.severity, finding.subject) == ("warning", cell.stations[0].name)
+        assert finding.sentence.endswith(meant)
+    for abc in ([180, 0, 0], [90, 1.57, 0], [3, 0, 0], [1.5, 2.0, 0]):
+        turned = pose_of([0.0, 0.0, 0.5], rotation_from_abc(abc))
+        moved = cell.with_station(cell.stations[0].name, turned)
+        assert not [each for each in check_cell(moved) if "rad?" in each.sentence]
+    posture = replace(cell, park=np.radians([0.0, -6.28, 1.57, 0.0, 1.57, 0.0]))
+    assert ("warning", "park") in found(posture)
+
+
 def test_overlapping_zones_are_found(cell: Cell) -> None:
     close = cell.with_equipment("gauge", pose=composed(cell.machine("infeed").pose, pose_of([0.5, 0.0, 0.0])))
     assert ("warning", "infeed") in found(close)

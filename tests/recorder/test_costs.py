@@ -48,6 +48,10 @@ def test_a_file_says_what_a_joule_costs(tmp_path: Path) -> None:
         ("format: ir_costs/1\nprice: .nan", "must be finite"),
         ("format: ir_costs/1\navailability: 2", "availability is 2"),
         ("format: ir_costs/1\ncurrency: 12", "must be a text"),
+        (
+            "format: ir_costs/1\nprice: 1\nprice: 2",
+            r"yaml:3: 'price' stands here twice",
+        ),
         ("format: [", "costs.yaml"),
         ("[" * 5000, "costs.yaml"),
         (

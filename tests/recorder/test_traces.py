@@ -128,7 +128,11 @@ def test_every_writing_of_the_same_numbers_is_read_alike(
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ("[", "while parsing"),
+        ("[", "this is not YAML"),
+        (
+            "format: ir_trace/1\ncolumns: {time: t}\ncolumns: {time: s}",
+            "yaml:3: 'columns' stands here twice",
+        ),
         ("format: ir_cell/1", "is no mapping of a trace"),
         ("format: ir_trace/1\ncolumns: {power: p}", "must name at least time"),
         ("format: ir_trace/1\ncolumns: {time: t}\nclock: 3", "key 'clock' is unknown"),

@@ -6,13 +6,14 @@ No kinematics here; whether stations are reachable without collision is the plan
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ir_description.cell import AUTO, Cell, Zone
+from ir_description.poses import abc_from_rotation
 from ir_description.robot import PowerData
 from ir_description.shapes import Body, Capsule, capsule_distance, overlapping, point_distance
 from ir_msgs_py.arrays import FloatArray
@@ -21,6 +22,8 @@ OVERLAPS_MAX = 1_000
 """Zones that overlap are named up to this many pairs."""
 _LARGE = 50.0  # m: a body longer than that is rather one in mm
 _SUNK = 0.005  # m: a body that reaches farther below the floor is rather placed by its underside
+_RIGHT = 0.5 * np.pi  # rad
+_ROUNDED = 0.01  # rad: written as 3.14 or 1.57
 _FAR = 10.0  # times the reach: a place farther away is rather one in mm
 
 
@@ -38,6 +41,7 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...
     findings = [
         *_base(cell),
         *_sizes(cell),
+        *_angles(cell),
         *_sunk(cell),
         *_stations(cell),
         *_zones(cell),
@@ -55,6 +59,37 @@ def _sizes(cell: Cell) -> Iterator[Finding]:
         if longest > _LARGE:
             sentence = f"is {longest:g} m long; lengths are in m: {longest / 1000.0:g} for {longest:g} mm?"
             yield Finding("warning", body.name, sentence)
+
+
+def _angles(cell: Cell) -> Iterator[Finding]:
+    """Angles that were meant in radians: a right angle is usual, 1.57 degrees is not."""
+    for subject, angles in _angles_deg(cell):
+        turns = np.round(angles / _RIGHT)
+        right = (turns != 0.0) & (np.abs(angles - turns * _RIGHT) < _ROUNDED)
+        if right.any() and (np.abs(angles) < 2.0 * np.pi + _ROUNDED).all():
+            k = int(np.argmax(right))
+            meant = f"{90.0 * turns[k]:g} for {angles[k]:.6g} rad"
+            sentence = f"is turned by {angles[k]:.6g} degrees; angles are in degrees: {meant}?"
+            yield Finding("warning", subject, sentence)
+
+
+def _angles_deg(cell: Cell) -> Iterator[tuple[str, FloatArray]]:
+    """A, B, C [deg] of everything that has a pose, and the joint values of the postures."""
+    poses = [("base", cell.base_pose), ("tcp", cell.tcp)]
+    for machine in cell.equipment:
+        poses.append((machine.name, machine.pose))
+        poses += [(body.name, body.pose) for body in _first_of_pose(machine.bodies)]
+    for part in cell.parts:
+        poses.append((part.name, part.grasp))
+        poses += [(body.name, body.pose) for body in _first_of_pose(part.bodies)]
+    poses += [(station.name, station.pose_in_equipment) for station in cell.stations]
+    yield from ((subject, abc_from_rotation(pose[:3, :3])) for subject, pose in poses)
+    yield from (("home", np.degrees(cell.machine_home)), ("park", np.degrees(cell.park)))
+
+
+def _first_of_pose(bodies: Iterable[Body]) -> Iterable[Body]:
+    """One body of each pose: the pieces of a mesh share theirs."""
+    return {body.pose.tobytes(): body for body in reversed([*bodies])}.values()
 
 
 def _sunk(cell: Cell) -> Iterator[Finding]:

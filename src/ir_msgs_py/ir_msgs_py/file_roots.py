@@ -42,7 +42,7 @@ class FileRoots:
         known = ", ".join(str(folder) for folder in self.folders)
         raise FileRefusedError(
             f"{_shown(path)} lies outside of the folders that may be used: {known} "
-            f"(more by --root, the parameter roots, or {ENVIRONMENT})"
+            f"(more by {ENVIRONMENT}, a node's parameter roots, or --root where a command has it)"
         )
 
     def open_to_read(self, path: str | Path) -> BinaryIO:

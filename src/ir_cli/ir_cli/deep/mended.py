@@ -19,6 +19,7 @@ from .stations import MARGIN, Visit
 DISTANCES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)  # m of approach that are tried
 _PAD = 2e-3  # m that a suggested zone is larger than it must be
 _GRID = 1e-3  # m, to which its faces are rounded
+_NOISE = 1e-6  # of it: processors give places that differ in their last bits
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,8 @@ def with_zone(machine: Equipment, places: FloatArray) -> Equipment:
     in_machine = (places - machine.pose[:3, 3]) @ machine.pose[:3, :3]
     local = (in_machine - zone.pose[:3, 3]) @ zone.pose[:3, :3]
     half = 0.5 * zone.size
-    low = np.minimum(-half, np.floor((local.min(axis=0) - _PAD) / _GRID) * _GRID)
-    high = np.maximum(half, np.ceil((local.max(axis=0) + _PAD) / _GRID) * _GRID)
+    low = np.minimum(-half, np.floor((local.min(axis=0) - _PAD) / _GRID + _NOISE) * _GRID)
+    high = np.maximum(half, np.ceil((local.max(axis=0) + _PAD) / _GRID - _NOISE) * _GRID)
     pose = zone.pose.copy()
     pose[:3, 3] += zone.pose[:3, :3] @ (0.5 * (low + high))
     return replace(machine, zone_in_equipment=replace(zone, pose=pose, size=np.round(high - low, 6)))

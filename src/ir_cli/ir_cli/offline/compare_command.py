@@ -23,7 +23,18 @@ from .asking import (
 )
 from .krl_command import add_followed, followed
 from .measured_options import add_measured
-from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
+from .output import (
+    Columns,
+    ProgressLine,
+    Row,
+    add_formats,
+    kilowatt_hours,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
 from .today_trace import today_of_trace
 
 KRL = (".src", ".dat", ".sub")
@@ -34,7 +45,7 @@ COLUMNS: Columns = {
     "joules": ("J", number(0)),
     "joules_low": ("from", number(0)),
     "joules_high": ("to", number(0)),
-    "kwh": ("kWh", number(5)),
+    "kwh": ("mains", kilowatt_hours),
     "saved_share": ("saved %", number(1, 100.0)),
     "saved_joules": ("J", number(0)),
     "saved_low": ("from", number(0)),

@@ -57,6 +57,13 @@ def number(digits: int, scale: float = 1.0) -> Callable[[Any], str]:
     return shown
 
 
+def kilowatt_hours(value: Any) -> str:
+    """Energy [kWh] as it is paid for; Wh where kWh would be 0.00.."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    return f"{value:.4f} kWh" if abs(value) >= 0.01 else f"{1e3 * value:.3g} Wh"
+
+
 def text(value: Any) -> str:
     """A format of words."""
     return str(value) or NOTHING

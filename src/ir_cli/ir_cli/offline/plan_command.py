@@ -26,7 +26,18 @@ from .asking import (
     sentences,
 )
 from .move_command import predicted
-from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
+from .output import (
+    Columns,
+    ProgressLine,
+    Row,
+    add_formats,
+    kilowatt_hours,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
 
 J_PER_KWH = 3.6e6
 HOW_TO_SAVE = "--saving holds it against a common program in equal time, which takes some seconds more"
@@ -169,22 +180,17 @@ def totals_of(plan: ProgramPlan) -> Row:
     }
 
 
-def _kwh(joules: float) -> str:
-    """Energy as it is paid for; Wh where kWh would be 0.00.."""
-    kwh = joules / J_PER_KWH
-    return f"{kwh:.4f} kWh" if kwh >= 0.01 else f"{1e3 * kwh:.3g} Wh"
-
-
 def sentences_of(plan: ProgramPlan) -> list[str]:
     """The totals for people, and what is saved."""
     totals = totals_of(plan)
     standing = totals["seconds"] - totals["moving_seconds"]
     waiting = totals["joules"] - totals["moving_joules"]
+    energy = kilowatt_hours(totals["joules"] / J_PER_KWH)
     proof = "free of collision and within all limits at every instant, proved"
     lines = [
         f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
         f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
-        f"cycle {totals['seconds']:.2f} s, {_kwh(totals['joules'])} from the mains, predicted: "
+        f"cycle {totals['seconds']:.2f} s, {energy} from the mains, predicted: "
         f"{predicted(plan.report)}; "
         f"{proof if totals['certified'] else 'NOT certified'}",
     ]

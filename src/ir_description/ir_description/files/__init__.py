@@ -8,6 +8,7 @@ from ir_description.files.controller_reader import bundled_controller, bundled_c
 from ir_description.files.mesh import read_regular_file
 from ir_description.files.path_reader import path_from_yaml
 from ir_description.files.places import is_path
+from ir_description.files.plain_yaml import plain_yaml
 from ir_description.files.power_file import power_from_yaml
 from ir_description.files.power_parameters_file import power_parameters_from_yaml, power_parameters_to_yaml
 from ir_description.files.robot_file import read_robot, robot_errors, robot_file_errors, robot_from_yaml
@@ -25,6 +26,7 @@ __all__ = [
     "is_path",
     "is_utf16",
     "path_from_yaml",
+    "plain_yaml",
     "power_from_yaml",
     "power_parameters_from_yaml",
     "power_parameters_to_yaml",

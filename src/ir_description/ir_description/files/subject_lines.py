@@ -9,12 +9,12 @@ from ir_description.errors import CellFileError
 from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
 
 _STEP = re.compile(r"step (\d+)$")
-_POSTURES = ("home_deg", "home", "park_deg", "park")
+_KEYS = ("program", "base", "tcp", "home_deg", "home", "park_deg", "park")
 
 
 def subject_line(text: str, subject: str) -> int:
-    """The line (from 1) of the thing of that name, of "step 3", "program", "home" or "park"; 0: it is not
-    there.
+    """The line (from 1) of the thing of that name, of "step 3", "program", "base", "tcp", "home" or "park";
+    0: it is not there.
     """
     try:
         root = parse_yaml(text, "", CellFileError)
@@ -28,7 +28,7 @@ def subject_line(text: str, subject: str) -> int:
         number = int(step.group(1)) - 1
         return steps[number].line if isinstance(steps, list) and number < len(steps) else 0
     for key in (subject, f"{subject}_deg"):
-        if key in root.content and key in ("program", *_POSTURES):
+        if key in root.content and key in _KEYS:
             return root.content[key].line
     return next(_named(root, subject), 0)
 

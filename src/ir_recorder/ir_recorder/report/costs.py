@@ -18,17 +18,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import yaml
-
-from ir_description import DescriptionError
-from ir_description.files import read_regular_file
+from ir_description import DescriptionFileError
+from ir_description.files import plain_yaml
 from ir_msgs_py.errors import InvalidValueError, MsgsError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.settings import Setting, check_settings, describe, setting
 from ir_recorder.errors import CostsError
 
 FORMAT = "ir_costs/1"
-_BYTES_MAX = 100_000
 _CURRENCY_MAX = 12  # characters
 J_PER_KWH = 3.6e6
 _DAY = 24.0  # h
@@ -93,10 +90,10 @@ _WORDS = ("currency",)
 def read_costs(path: str | Path, roots: FileRoots = ANYWHERE) -> Costs:
     """The costs of a file below `roots`; CostsError with the key that is wrong."""
     try:
-        tree = yaml.safe_load(read_regular_file(roots.inside(path), _BYTES_MAX).decode("utf-8", "replace"))
-    except yaml.YAMLError as error:
-        raise CostsError(f"{path}: {' '.join(str(error).split())[:200]}") from error
-    except (DescriptionError, MsgsError, OSError, ValueError, RecursionError) as error:
+        tree = plain_yaml(roots.inside(path))
+    except DescriptionFileError as error:
+        raise CostsError(str(error)) from error
+    except (MsgsError, OSError) as error:
         raise CostsError(f"{path}: {error}") from error
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
         raise CostsError(f"{path}: is no file of costs, which begins with format: {FORMAT}")

@@ -27,10 +27,12 @@ def watts(value: float) -> str:
 
 
 def kilowatt_hours(value: float) -> str:
-    """Joules as kWh with three significant digits, whole ones from 100 on."""
+    """Joules as kWh with three significant digits, whole ones from 100 on, Wh below 0.01."""
     if not math.isfinite(value):
         return DASH
     kwh = value / 3.6e6
+    if abs(kwh) < 0.01:
+        return f"{1e3 * kwh:.3g} Wh"
     return f"{kwh:,.0f} kWh".replace(",", " ") if abs(kwh) >= 100.0 else f"{kwh:.3g} kWh"
 
 

@@ -19,16 +19,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import yaml
-
-from ir_description import DescriptionError
-from ir_description.files import read_regular_file
+from ir_description import DescriptionFileError
+from ir_description.files import plain_yaml
 from ir_msgs_py.errors import InvalidValueError
 from ir_recorder.errors import TraceError
 from ir_recorder.traces.units import factor
 
 FORMAT = "ir_trace/1"
-_BYTES_MAX = 100_000
 _KEYS = ("format", "columns", "clock_offset", "power_is")
 
 
@@ -56,11 +53,11 @@ class TraceMapping:
 def read_mapping(path: Path) -> TraceMapping:
     """The mapping of a file; TraceError with the key that is wrong."""
     try:
-        tree = yaml.safe_load(read_regular_file(path, _BYTES_MAX).decode("utf-8", "replace"))
-    except (DescriptionError, InvalidValueError, ValueError, RecursionError) as error:
+        tree = plain_yaml(path)
+    except DescriptionFileError as error:
+        raise TraceError(str(error)) from error
+    except InvalidValueError as error:
         raise TraceError(f"{path}: {error}") from error
-    except yaml.YAMLError as error:
-        raise TraceError(f"{path}: {' '.join(str(error).split())[:200]}") from error
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
         raise TraceError(f"{path}: is no mapping of a trace, which begins with format: {FORMAT}")
     unknown = [str(key)[:40] for key in tree if key not in _KEYS]
