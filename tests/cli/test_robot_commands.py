@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ir_cli.main import main
+from ir_cli.offline.robot_check import remarks_on
 from ir_description import load_cell, load_robot, robot_named, robot_urdf
 from ir_kernels import Chain, DynamicsModel
 
@@ -104,6 +106,16 @@ def test_a_check_finds_a_drive_that_cannot_hold_the_arm(
     assert re.search(
         r"shoulder_lift_joint: at machine home, empty, gravity needs \d+ Nm, the drive has 20 Nm", out
     )
+
+
+def test_a_check_names_links_that_are_near_in_most_postures() -> None:
+    robot = load_robot("ur10e")
+    assert not [each for each in remarks_on(robot) if each.subject == "self_pairs"]
+    *others, last = robot.capsules
+    wide = replace(robot, capsules=(*others, replace(last, radius=last.radius + 0.06)))
+    found = [each for each in remarks_on(wide) if each.subject == "self_pairs"]
+    assert any(last.name in each.sentence and "in 100 % of 2000 postures" in each.sentence for each in found)
+    assert {each.severity for each in found} == {"warning"}
 
 
 def test_all_errors_of_a_file_are_printed_in_one_run(made: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,7 +23,8 @@ from ir_kernels.arm_lines import arm_lines
 from ir_msgs_py.arrays import FloatArray
 
 MARGIN = 0.02  # m, the default of a request
-POSTURES = 2000  # random ones in which the drives hold the arm
+POSTURES = 2000  # random ones in which the drives hold the arm, and links keep their distance
+NEAR = 0.4  # share of postures; of the bundled robots' pairs 0.31 at most
 METHODS = {
     SphericalWristIk: "closed form (spherical wrist)",
     ThreeParallelIk: "closed form (axes 2, 3 and 4 parallel)",
@@ -50,6 +51,7 @@ def remarks_on(robot: RobotModel) -> tuple[Remark, ...]:
     found = [
         Remark("note", "inverse kinematics", METHODS[type(solver)]),
         *_home(robot, chain),
+        *_near_itself(robot, chain),
         *_torque(robot),
         *_speed(robot),
         *_controller(robot),
@@ -75,11 +77,31 @@ def _home(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
         )
 
 
+def _postures(robot: RobotModel) -> FloatArray:
+    """Random ones (N, n)."""
+    return np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (POSTURES, robot.n))
+
+
+def _near_itself(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
+    """Pairs of links that leave few postures to plan in."""
+    model = CollisionModel(chain, robot.capsules, (), robot.self_pairs)
+    near = (model.distances(_postures(robot)) <= MARGIN).mean(axis=0) if robot.self_pairs else np.zeros(0)
+    for z in np.flatnonzero(near > NEAR):
+        pair = model.pairs[int(z)]
+        often = f"in {100.0 * near[z]:.0f} % of {POSTURES} postures, where nothing is planned"
+        yield Remark(
+            "warning",
+            "self_pairs",
+            f"{pair.body_a} and {pair.body_b} come nearer than {1e3 * MARGIN:g} mm {often}: smaller capsules, "
+            "or without this pair where the links themselves can't touch",
+        )
+
+
 def _torque(robot: RobotModel) -> Iterator[Remark]:
     """Whether the drives hold the arm, empty and with the rated payload at the flange."""
     load = Load("payload", "tool", robot.rated_payload, np.zeros(3), np.eye(3) * 1e-6)
     home = robot.machine_home[None]
-    postures = np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (POSTURES, robot.n))
+    postures = _postures(robot)
     for what, loads in (("empty", ()), (f"with {robot.rated_payload:g} kg at the flange", (load,))):
         yield from _held(robot, home, loads, "error", f"at machine home, {what},")
         yield from _held(robot, postures, loads, "warning", f"in one of {POSTURES} postures, {what},")
