@@ -88,12 +88,12 @@ def _near_itself(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
     near = (model.distances(_postures(robot)) <= MARGIN).mean(axis=0) if robot.self_pairs else np.zeros(0)
     for z in np.flatnonzero(near > NEAR):
         pair = model.pairs[int(z)]
-        often = f"in {100.0 * near[z]:.0f} % of {POSTURES} postures, where nothing is planned"
+        often = f"{1e3 * MARGIN:g} mm in {100.0 * near[z]:.0f} % of {POSTURES} postures"
         yield Remark(
             "warning",
             "self_pairs",
-            f"{pair.body_a} and {pair.body_b} come nearer than {1e3 * MARGIN:g} mm {often}: smaller capsules, "
-            "or without this pair where the links themselves can't touch",
+            f"{pair.body_a} and {pair.body_b} come nearer than {often}, where nothing is planned: "
+            "smaller capsules, or without this pair where the links themselves can't touch",
         )
 
 
