@@ -145,10 +145,12 @@ def test_a_station_that_the_mouse_drags_is_planned_anew(browser: Any, tmp_path: 
     path.write_text(CELL)
     cell = load_cell(path)
     pose = cell.station("pick").pose
-    at = on_screen(cell, *LARGE)
-    begin, end = (at(pose[:3, 3] + along * pose[:3, 0]) for along in (0.4, 0.55))
     with viewed(browser, path, *LARGE) as page:
         choose_to_move(page, "station pick")
+        wide, high = page.run("((c) => [c.clientWidth, c.clientHeight])(document.querySelector('canvas'))")
+        assert wide < LARGE[0] - 200  # the panel stands beside the picture
+        at = on_screen(cell, wide, high)
+        begin, end = (at(pose[:3, 3] + along * pose[:3, 0]) for along in (0.4, 0.55))
         before = page.run("document.body.innerText.match(/cycle ([0-9.]+) s/)[1]")
         page.pointer("mouseMoved", *begin)
         page.pointer("mousePressed", *begin)

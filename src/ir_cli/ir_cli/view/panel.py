@@ -46,7 +46,9 @@ class Panel:
 
     def __init__(self, gui: Any, robot: RobotModel, post: Post, do: Actions) -> None:
         self._gui, self._post = gui, post
-        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.configure_theme(  # beside the picture, not over it
+            control_layout="collapsible", control_width="medium", show_logo=False, show_share_button=False
+        )
         self.status = gui.add_html("")
         with gui.add_folder("Program"):
             self.plan_text = gui.add_html("")

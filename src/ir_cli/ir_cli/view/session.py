@@ -207,7 +207,7 @@ class Session:
 
     def _say_moves(self) -> None:
         there = bool(self._moves)
-        text = f"<pre>{plain(snippet(self._moves))}</pre>" if there else ""
+        text = f"<pre style='white-space:pre-wrap'>{plain(snippet(self._moves))}</pre>" if there else ""
         self._panel.moves_text.content = box([text] if there else [])
         self._panel.save.visible = self._panel.undo.visible = there
 
