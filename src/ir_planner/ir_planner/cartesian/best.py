@@ -20,6 +20,7 @@ from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.speed_law import Span
 from ir_planner.cartesian.timed import timed_stroke
 from ir_planner.cartesian.tool_path import ToolPath
+from ir_planner.cartesian.whole_turns import difference
 from ir_planner.request import DURATION_MAX
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import Movement, within_torque
@@ -153,7 +154,8 @@ def _without(layers: Layers, one: DrivenPath) -> Layers:
     assert violation is not None  # that is why it is asked
     place = _place_at(one.sent, violation.time)
     q = one.movement.trajectory.sample([violation.time]).q[0]
-    near = (np.abs(layers.s[layers.layer] - place) <= _AROUND) & (np.abs(layers.q - q).max(axis=1) <= _NEAR)
+    away = np.abs(difference(layers.q, q, layers.turning)).max(axis=1)
+    near = (np.abs(layers.s[layers.layer] - place) <= _AROUND) & (away <= _NEAR)
     return replace(layers, free=layers.free & ~near)
 
 

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_planner.cartesian.layers import Layers
 from ir_planner.cartesian.refusal import NoChainError
+from ir_planner.cartesian.whole_turns import TURN, difference, without_turns
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
 
@@ -48,9 +49,11 @@ def chains(
     """
     nodes, scene = np.flatnonzero(layers.free), space.scene
     q, layer = layers.q[nodes], layers.layer[nodes]
-    before, after = _neighbours(q, layer, np.diff(layers.s) > wide if wide else None)
+    turning = layers.turning
+    before, after = _neighbours(q, layer, turning, np.diff(layers.s) > wide if wide else None)
     family = _families(len(q), before, after)
-    joules = _edge_joules(q, layer, before, after, layers.s, speed, scene)
+    seconds = (np.diff(layers.s) / speed)[layer[before]]
+    joules = _edge_joules(q[before], difference(q[before], q[after], turning), seconds, scene)
     apart = _SAME if len(np.unique(layers.angle)) == 1 else _APART
     if by_start:  # the same edges from the end
         before, after, layer = after, before, len(layers.s) - 1 - layer
@@ -70,15 +73,17 @@ def chains(
     return found
 
 
-def _neighbours(q: FloatArray, layer: IntArray, wide: BoolArray | None) -> tuple[IntArray, IntArray]:
+def _neighbours(
+    q: FloatArray, layer: IntArray, turning: BoolArray, wide: BoolArray | None
+) -> tuple[IntArray, IntArray]:
     """Edges (E,) from one layer to the next with no axis beyond JUMP, ordered by where they lead. wide
     (N - 1,): where they may be longer.
     """
     few = int(np.bincount(layer).max(initial=0)) <= _FEW
     jump = JUMP if wide is None else _WIDE_FEW if few else _WIDE
-    before, after = (_by_pairs if few else _by_tree)(q, layer, jump)
+    before, after = (_by_pairs if few else _by_tree)(q, layer, turning, jump)
     if wide is not None:
-        kept = wide[layer[before]] | (np.abs(q[before] - q[after]).max(axis=1) <= JUMP)
+        kept = wide[layer[before]] | (np.abs(difference(q[before], q[after], turning)).max(axis=1) <= JUMP)
         before, after = before[kept], after[kept]
     order = np.lexsort((before, after))
     return before[order], after[order]
@@ -90,7 +95,7 @@ def _families(count: int, before: IntArray, after: IntArray) -> IntArray:
     return np.asarray(connected_components(edges, directed=False)[1])
 
 
-def _by_pairs(q: FloatArray, layer: IntArray, jump: float) -> tuple[IntArray, IntArray]:
+def _by_pairs(q: FloatArray, layer: IntArray, turning: BoolArray, jump: float) -> tuple[IntArray, IntArray]:
     """The same in any order, all pairs compared axis by axis: quicker where layers are small."""
     count = np.bincount(layer)
     begin = np.cumsum(count) - count
@@ -98,38 +103,34 @@ def _by_pairs(q: FloatArray, layer: IntArray, jump: float) -> tuple[IntArray, In
     number[layer, np.arange(len(layer)) - begin[layer]] = np.arange(len(layer))
     axes = np.argsort(-q.std(axis=0))
     first = np.where(number >= 0, q[number, axes[0]], np.nan)
-    k, i, j = np.nonzero(np.abs(first[:-1, :, None] - first[1:, None, :]) <= jump)
+    step = difference(first[:-1, :, None], first[1:, None, :], turning[axes[0]])
+    k, i, j = np.nonzero(np.abs(step) <= jump)
     before, after = number[k, i], number[k + 1, j]
     for axis in axes[1:]:
-        near = np.abs(q[before, axis] - q[after, axis]) <= jump
+        near = np.abs(difference(q[before, axis], q[after, axis], turning[axis])) <= jump
         before, after = before[near], after[near]
     return before, after
 
 
-def _by_tree(q: FloatArray, layer: IntArray, jump: float) -> tuple[IntArray, IntArray]:
+def _by_tree(q: FloatArray, layer: IntArray, turning: BoolArray, jump: float) -> tuple[IntArray, IntArray]:
     """The same by a tree of all configurations: where layers are large."""
-    place = np.column_stack([q / jump, layer * _LAYER])
-    ahead = np.column_stack([q / jump, (layer + 1) * _LAYER])
-    near = cKDTree(ahead).sparse_distance_matrix(cKDTree(place), 1.0, p=np.inf, output_type="ndarray")
+    box = np.append(np.where(turning, TURN / jump, 0.0), 0.0)  # 0: not periodic
+    ahead, place = (
+        cKDTree(np.column_stack([without_turns(q, turning) / jump, number * _LAYER]), boxsize=box)
+        for number in (layer + 1, layer)
+    )
+    near = ahead.sparse_distance_matrix(place, 1.0, p=np.inf, output_type="ndarray")
     return near["i"].astype(np.int64), near["j"].astype(np.int64)
 
 
-def _edge_joules(
-    q: FloatArray,
-    layer: IntArray,
-    before: IntArray,
-    after: IntArray,
-    s: FloatArray,
-    speed: float,
-    scene: PlanningScene,
-) -> FloatArray:
-    """What the drives take along each edge (E,) [J], and what keeps the search from too fast ones."""
-    if len(before) == 0:
+def _edge_joules(q: FloatArray, steps: FloatArray, seconds: FloatArray, scene: PlanningScene) -> FloatArray:
+    """What the drives take along edges (E,) from q (E, n) by steps (E, n) in seconds (E,) [J], and what keeps
+    the search from too fast ones.
+    """
+    if len(q) == 0:
         return np.zeros(0)
-    seconds = (np.diff(s) / speed)[layer[before]]
-    first, second = q[before], q[after]
-    qd = (second - first) / seconds[:, None]
-    power = scene.dynamics.drive_power(0.5 * (first + second), qd, np.zeros_like(qd)).sum(axis=1)
+    qd = steps / seconds[:, None]
+    power = scene.dynamics.drive_power(q + 0.5 * steps, qd, np.zeros_like(qd)).sum(axis=1)
     share = (np.abs(qd) / scene.limits.velocity).max(axis=1)
     return np.asarray((np.maximum(power, 0.0) + _OVERSPEED_WATTS * share**8) * seconds)
 

@@ -10,6 +10,7 @@ from ir_planner.cartesian.joint_curve import singularity
 from ir_planner.cartesian.layers import Layers, nearest_sentence
 from ir_planner.cartesian.orientations import about_tool
 from ir_planner.cartesian.refusal import PathRefusedError
+from ir_planner.cartesian.whole_turns import difference
 from ir_planner.scene import PlanningScene
 
 _DAMPED = 1e-6  # of the squared singular values
@@ -20,7 +21,8 @@ def dead_end(asked: Asked, layers: Layers, reached: IntArray) -> PathRefusedErro
     last = int(layers.layer[reached].max())
     at = reached[layers.layer[reached] == last]
     here, ahead = layers.q[at], layers.q[layers.layer == last + 1]
-    away = np.abs(ahead[:, None] - here[None]).max(axis=2)
+    jumps = np.abs(difference(here[None], ahead[:, None], layers.turning))
+    away = jumps.max(axis=2)
     if (near := away.min(axis=1) <= JUMP).any():
         return PathRefusedError(
             f"every configuration that leads up to {layers.s[last]:.3f} m collides at "
@@ -29,7 +31,7 @@ def dead_end(asked: Asked, layers: Layers, reached: IntArray) -> PathRefusedErro
         )
     scene = asked.context.scene
     step = _steps(asked, layers, at, last)
-    why = _beyond_limit(here, step, scene) or _jump(here, ahead, away, scene)
+    why = _beyond_limit(here, step, scene) or _jump(here, jumps, scene)
     return PathRefusedError(
         f"no configuration leads past {layers.s[last]:.3f} m without a jump of an axis: {why}; {_help(asked)}"
     )
@@ -66,11 +68,14 @@ def _beyond_limit(here: FloatArray, step: FloatArray, scene: PlanningScene) -> s
     return f"{robot.joint_names[j]} reaches its limit of {np.degrees(limit):.0f} deg there"
 
 
-def _jump(here: FloatArray, ahead: FloatArray, away: FloatArray, scene: PlanningScene) -> str:
-    """The axis that would jump where configurations differ least."""
+def _jump(here: FloatArray, jumps: FloatArray, scene: PlanningScene) -> str:
+    """The axis that would jump where configurations here (M, n) and those ahead differ least, by jumps
+    (A, M, n).
+    """
+    away = jumps.max(axis=2)
     a, h = np.unravel_index(int(np.argmin(away)), away.shape)
-    j = int(np.argmax(np.abs(ahead[a] - here[h])))
-    jump = np.degrees(abs(ahead[a, j] - here[h, j]))
+    j = int(np.argmax(jumps[a, h]))
+    jump = np.degrees(jumps[a, h, j])
     return f"{scene.cell.robot.joint_names[j]} by {jump:.0f} deg{singularity(here[h], scene)}"
 
 

@@ -12,6 +12,7 @@ from ir_planner.cartesian.chains import JUMP, Chain, chains
 from ir_planner.cartesian.dead_end import dead_end
 from ir_planner.cartesian.layers import Layers, configurations_at
 from ir_planner.cartesian.refusal import NoChainError
+from ir_planner.cartesian.whole_turns import difference, turned_into_limits, with_all_turns
 
 _PARTS = 4  # of an interval where axes jump
 _FINEST = 2e-4  # m: what is shorter isn't divided
@@ -24,7 +25,20 @@ def chains_through(
 ) -> tuple[list[Chain], Layers]:
     """The cheapest chains as `chains` finds them, at finer samples where it takes them, and the layers with
     these. Raises PathRefusedError where no chain leads on.
+
+    Where one leaves the limits in every turn another one may lead to its end: all turns are looked at.
     """
+    scene, fixed = asked.context.scene, asked.fixed
+    found, layers = _chains_through(asked, layers, most, by_start=by_start)
+    turned = [turned_into_limits(chain.q, layers.turning, scene, fixed=fixed) for chain in found]
+    within = [replace(chain, q=q) for chain, q in zip(found, turned, strict=True) if q is not None]
+    if len(within) == len(found):
+        return within, layers
+    return chains_through(asked, with_all_turns(layers, scene, fixed=fixed), most, by_start=by_start)
+
+
+def _chains_through(asked: Asked, layers: Layers, most: int, *, by_start: bool) -> tuple[list[Chain], Layers]:
+    """The same, without regard to the limits of axes whose whole turns are left out."""
     speed, space = asked.path.tool_speed, asked.space
     try:
         return chains(layers, speed, space, most, by_start=by_start), layers
@@ -44,7 +58,7 @@ def _divided(asked: Asked, layers: Layers) -> Layers:
         asked.context.work.check()
         try:
             found = chains(layers, asked.path.tool_speed, asked.space, _LOOKED_AT, wide=_FINEST)
-            steps = [np.abs(np.diff(chain.q, axis=0)).max(axis=1) > JUMP for chain in found]
+            steps = [_jumps(chain.q, layers.turning) for chain in found]
             open_ = np.logical_or.reduce(steps)
             if not all(step.any() for step in steps):
                 break
@@ -57,6 +71,11 @@ def _divided(asked: Asked, layers: Layers) -> Layers:
     return layers
 
 
+def _jumps(q: FloatArray, turning: BoolArray) -> BoolArray:
+    """Where (N - 1,) a chain (N, n) jumps."""
+    return np.asarray(np.abs(difference(q[:-1], q[1:], turning)).max(axis=1) > JUMP)
+
+
 def _between(s: FloatArray, open_: BoolArray) -> FloatArray:
     """Further samples (B,) m in the intervals of s (N,) m that are open (N - 1,)."""
     share = np.arange(1, _PARTS) / _PARTS
@@ -66,7 +85,7 @@ def _between(s: FloatArray, open_: BoolArray) -> FloatArray:
 def _with(layers: Layers, between: FloatArray, asked: Asked) -> Layers:
     """The layers with all configurations at further samples (B,) m."""
     s = np.union1d(layers.s, between)
-    more = configurations_at(asked.whole, between, asked.path.free_angle, asked.space)
+    more = configurations_at(asked.whole, between, asked.path.free_angle, asked.space, layers.turning)
     layer = np.concatenate(
         [np.searchsorted(s, layers.s)[layers.layer], np.searchsorted(s, between)[more.layer]]
     )

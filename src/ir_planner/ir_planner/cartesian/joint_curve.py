@@ -13,6 +13,7 @@ from ir_planner.cartesian.chains import JUMP, Chain
 from ir_planner.cartesian.orientations import Rates, about_tool, rates_of
 from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.tool_path import ToolPath
+from ir_planner.cartesian.whole_turns import turned_towards
 from ir_planner.scene import PlanningScene
 
 SPLINE_ERROR = 5e-6  # m by which the spline may leave the path between its samples
@@ -115,8 +116,9 @@ def curve_of(
 def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScene) -> FloatArray:
     """Configurations (M, n) at poses (M, 4, 4) at s (M,), each the nearest to the chain there."""
     near = np.column_stack([np.interp(s, chain.s, column) for column in chain.q.T])
-    found = scene.inverse_kinematics.solve(poses)
-    away = np.abs(found.q - near[found.pose_index]).max(axis=1)
+    found = scene.inverse_kinematics_once.solve(poses)
+    every = turned_towards(found.q, near[found.pose_index], scene)
+    away = np.abs(every - near[found.pose_index]).max(axis=1)
     order = np.lexsort((away, found.pose_index))
     first = order[np.concatenate([[True], np.diff(found.pose_index[order]) > 0])] if len(order) else order
     reached = np.zeros(len(s), dtype=bool)
@@ -126,7 +128,7 @@ def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScen
         raise PathRefusedError(
             f"the path leaves the reach or an axis limit at {s[k]:.3f} m", StatusCode.NO_IK_SOLUTION
         )
-    q = np.asarray(found.q[first])
+    q = every[first]
     jump = np.abs(np.diff(q, axis=0)).max(axis=1)
     if jump.max() > JUMP:
         k = int(np.argmax(jump))

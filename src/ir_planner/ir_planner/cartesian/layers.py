@@ -1,7 +1,7 @@
 """Configurations along a path: at samples of it, for angles about the tool's axis, all of them."""
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,13 +22,16 @@ _FEWEST = 8
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """s (N,): samples; q (M, n), layer (M,), angle (M,) rad: configurations within the limits; free (M,)."""
+    """s (N,): samples; q (M, n), layer (M,), angle (M,) rad: configurations within the limits; free (M,).
+    turning (n,): axes whose whole turns are left out.
+    """
 
     s: FloatArray
     q: FloatArray
     layer: IntArray
     angle: FloatArray
     free: BoolArray
+    turning: BoolArray
 
 
 def samples(path: ToolPath, spacing: float) -> FloatArray:
@@ -55,8 +58,8 @@ def angles_of(free_angle: float) -> FloatArray:
 
 
 def layers_of(path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray | None) -> Layers:
-    """All configurations along a path. start (n,): the only one at its beginning. Raises PathRefusedError
-    where the path leaves the reach or every configuration collides.
+    """All configurations along a path, but for whole turns. start (n,): the only one at its beginning. Raises
+    PathRefusedError where the path leaves the reach or every configuration collides.
     """
     angles = angles_of(free_angle)
     s = samples(path, SPACING if len(angles) == 1 else _SPACING_FREE)
@@ -65,21 +68,26 @@ def layers_of(path: ToolPath, free_angle: float, space: FreeSpace, start: FloatA
             f"the path has {len(s)} samples of {len(angles)} angles: it must be at most "
             f"{_NODES_MAX // _FEWEST} poses in all; divide the path"
         )
-    result = configurations_at(path, s, free_angle, space)
+    result = configurations_at(path, s, free_angle, space, space.scene.turning)
     if start is not None:
         result = _begun(result, path, free_angle, space, start)
     _check_reached(result, space)
     return result
 
 
-def configurations_at(path: ToolPath, s: FloatArray, free_angle: float, space: FreeSpace) -> Layers:
-    """All configurations at arc lengths s (N,) m of a path."""
+def configurations_at(
+    path: ToolPath, s: FloatArray, free_angle: float, space: FreeSpace, turning: BoolArray
+) -> Layers:
+    """All configurations at arc lengths s (N,) m of a path, but for whole turns of the axes `turning` (n,):
+    all that turn twice, or none.
+    """
     angles = angles_of(free_angle)
     poses = np.repeat(path.poses(s), len(angles), axis=0)
     poses[:, :3, :3] = poses[:, :3, :3] @ about_tool(np.tile(angles, len(s)))
-    found = space.scene.inverse_kinematics.solve(poses)
+    scene = space.scene
+    found = (scene.inverse_kinematics_once if turning.any() else scene.inverse_kinematics).solve(poses)
     layer, angle = found.pose_index // len(angles), angles[found.pose_index % len(angles)]
-    return Layers(s, found.q, layer, angle, space.states_free(found.q))
+    return Layers(s, found.q, layer, angle, space.states_free(found.q), turning)
 
 
 def _begun(layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray) -> Layers:
@@ -98,12 +106,12 @@ def _begun(layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, 
             StatusCode.START_STATE_INVALID,
         )
     later = layers.layer > 0
-    return Layers(
-        layers.s,
-        np.concatenate([start[None], layers.q[later]]),
-        np.concatenate([[0], layers.layer[later]]),
-        np.concatenate([[angle], layers.angle[later]]),
-        np.concatenate([space.states_free(start[None]), layers.free[later]]),
+    return replace(
+        layers,
+        q=np.concatenate([start[None], layers.q[later]]),
+        layer=np.concatenate([[0], layers.layer[later]]),
+        angle=np.concatenate([[angle], layers.angle[later]]),
+        free=np.concatenate([space.states_free(start[None]), layers.free[later]]),
     )
 
 

@@ -38,6 +38,7 @@ from ir_planner.scene.motion_limits import MotionLimits
 from ir_planner.scene.movement_cost import movement_weights
 
 PROOF_TOLERANCE = 1e-6  # m: proofs show d > S_m - 1e-6
+_TURN = 2.0 * np.pi
 RUNNING = "STAND_ON_MOTORS"
 
 
@@ -100,6 +101,19 @@ class PlanningScene:
     def inverse_kinematics(self) -> InverseKinematics:
         """All branches and turns, by the method that the arm allows."""
         return inverse_kinematics(self.chain, self.cell.robot.position_min, self.cell.robot.position_max)
+
+    @cached_property
+    def turning(self) -> BoolArray:
+        """Axes (n,) that turn twice: a whole turn to both sides of 0."""
+        robot = self.cell.robot
+        return np.asarray((robot.position_min <= -_TURN) & (robot.position_max >= _TURN))
+
+    @cached_property
+    def inverse_kinematics_once(self) -> InverseKinematics:
+        """The same without whole turns of the axes that turn twice: these in [-pi, pi]."""
+        robot, turning = self.cell.robot, self.turning
+        low = np.where(turning, -np.pi, robot.position_min)
+        return inverse_kinematics(self.chain, low, np.where(turning, np.pi, robot.position_max))
 
     @cached_property
     def weights(self) -> FloatArray:
