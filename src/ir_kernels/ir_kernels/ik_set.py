@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ir_kernels import data
 from ir_kernels.errors import InputError
-from ir_kernels.reference.inverse_kinematics import turns
+from ir_kernels.reference.inverse_kinematics import LIMIT_TOLERANCE
 from ir_msgs_py.arrays import FloatArray, IntArray
 
 
@@ -45,18 +44,30 @@ Found = tuple[int, int, FloatArray]
 
 def with_turns(found: Iterable[Found], low: FloatArray, high: FloatArray) -> IkSet:
     """Every turn of what was found that lies within the limits (6,), sorted and read-only."""
-    rows = sorted(
-        (pose, branch, values)
-        for pose, branch, q in found
-        for values in product(
-            *(turns(float(v), float(a), float(b)) for v, a, b in zip(q, low, high, strict=True))
-        )
-    )
-    q = np.array([row[2] for row in rows]).reshape(-1, 6)
-    arrays = q, np.array([row[0] for row in rows], np.int64), np.array([row[1] for row in rows], np.int64)
+    solutions = list(found)
+    q = np.array([q for _, _, q in solutions]).reshape(-1, 6)
+    rows = np.array([(pose, branch) for pose, branch, _ in solutions], np.int64).reshape(-1, 2)
+    for axis in range(6):
+        node, values = turns_of_all(q[:, axis], float(low[axis]), float(high[axis]))
+        q, rows = q[node], rows[node]
+        q[:, axis] = values
+    order = np.lexsort((*q.T[::-1], rows[:, 1], rows[:, 0]))
+    arrays = q[order], rows[order, 0], rows[order, 1]
     for array in arrays:
         array.setflags(write=False)
     return IkSet(*arrays)
+
+
+def turns_of_all(angles: FloatArray, low: float, high: float) -> tuple[IntArray, FloatArray]:
+    """All values angle + 2 pi k within [low, high]: which angle (M,) each is of, in order, and its value
+    (M,); within LIMIT_TOLERANCE of a limit counts as on it.
+    """
+    first = np.ceil((low - LIMIT_TOLERANCE - angles) / (2.0 * np.pi)).astype(np.int64)
+    last = np.floor((high + LIMIT_TOLERANCE - angles) / (2.0 * np.pi)).astype(np.int64)
+    count = np.maximum(last - first + 1, 0)
+    which = np.repeat(np.arange(len(angles)), count)
+    turn = np.arange(len(which)) + np.repeat(first - np.cumsum(count) + count, count)
+    return which, np.clip(angles[which] + 2.0 * np.pi * turn, low, high)
 
 
 def limits(position_min: ArrayLike, position_max: ArrayLike) -> tuple[FloatArray, FloatArray]:

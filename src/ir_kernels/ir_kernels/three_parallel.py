@@ -45,18 +45,18 @@ class ThreeParallelIk:
         targets = shaped("poses", poses, None, 4, 4)
         data.poses(targets, "poses")
         X = displacements(self.chain, self.lines, targets)
-        found: list[Found] = []
         still = np.broadcast_to(np.eye(4), X.shape)
         q1, q5, exists, _ = shoulder_and_wrist(self.lines, X, still)
-        for pair in range(4):
-            rows = np.flatnonzero(exists[:, pair])
-            found += self._of_pair(X[rows], rows, q1[rows, pair], q5[rows, pair], 4 * (pair // 2) + pair % 2)
+        pair, rows = np.nonzero(exists.T)
+        found = self._elbows(X[rows], rows, q1[rows, pair], q5[rows, pair], 4 * (pair // 2) + pair % 2)
         return with_turns(polished(self.chain, targets, found), self.position_min, self.position_max)
 
-    def _of_pair(
-        self, X: FloatArray, rows: IntArray, q1: FloatArray, q5: FloatArray, branch: int
+    def _elbows(
+        self, X: FloatArray, rows: IntArray, q1: FloatArray, q5: FloatArray, branch: IntArray
     ) -> list[Found]:
-        """Both elbows of q1, q5 (M,), for displacements (M, 4, 4) that belong to the poses `rows` (M,)."""
+        """Both elbows of q1, q5 (M,) with branch numbers (M,), for displacements (M, 4, 4) that belong to the
+        poses `rows` (M,).
+        """
         found: list[Found] = []
         still = np.broadcast_to(np.eye(4), X.shape)
         open_ = np.ones(len(rows), dtype=bool)
@@ -66,7 +66,9 @@ class ThreeParallelIk:
             done = np.zeros(len(rows), dtype=bool)
             for elbow in (0, 1):
                 q, reached = self._planar(X, q1, q5, q6, total, bool(elbow))
-                found += [(int(rows[k]), branch + 2 * elbow, q[k]) for k in np.flatnonzero(reached & open_)]
+                found += [
+                    (int(rows[k]), int(branch[k]) + 2 * elbow, q[k]) for k in np.flatnonzero(reached & open_)
+                ]
                 done |= reached
             open_ &= singular & ~done  # a free angle: the next one may be in reach
             if not open_.any():
@@ -81,10 +83,11 @@ class ThreeParallelIk:
         z, o, turned = lines.z, lines.o, lines.turned
         back = turned(0, -q1) @ X @ turned(5, -q6) @ turned(4, -q5)  # = E2 E3 E4
         target = back[:, :3, :3] @ o[3] + back[:, :3, 3] - o[1]
-        across = np.cross(z[1], _normal(z[1]))
+        normal = _normal(z[1])
+        across = np.cross(z[1], normal)
 
         def planar(vector: FloatArray) -> FloatArray:
-            return np.asarray(vector @ _normal(z[1]) + 1j * (vector @ across))
+            return np.asarray(vector @ normal + 1j * (vector @ across))
 
         upper, fore, aim = planar(o[2] - o[1]), planar(o[3] - o[2]), planar(target)
         a, b, distance = abs(upper), abs(fore), np.abs(aim)

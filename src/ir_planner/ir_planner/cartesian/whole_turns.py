@@ -1,5 +1,5 @@
-"""Axes that turn twice: configurations along a path are looked for without their whole turns, and what is found
-is turned into the limits. Where such an axis moves by at most a whole turn along a path, that always works.
+"""Axes that turn twice: configurations along a path are looked for without their whole turns, and what is
+found is turned into the limits. Where such an axis moves by at most a whole turn, that always works.
 """
 
 from dataclasses import replace
@@ -29,8 +29,8 @@ def without_turns(q: FloatArray, turning: BoolArray) -> FloatArray:
 
 
 def turned_towards(q: FloatArray, near: FloatArray, scene: PlanningScene) -> FloatArray:
-    """q (M, n) with the axes that turn twice in the turns nearest to `near` (M, n); inf where these are beyond
-    the limits.
+    """q (M, n) with the axes that turn twice in the turns nearest to `near` (M, n); inf where these lie
+    beyond the limits.
     """
     if not scene.turning.any():
         return q
