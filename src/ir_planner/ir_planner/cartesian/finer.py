@@ -11,7 +11,7 @@ from ir_planner.cartesian.asked import Asked
 from ir_planner.cartesian.chains import JUMP, Chain, chains
 from ir_planner.cartesian.dead_end import dead_end
 from ir_planner.cartesian.layers import Layers, configurations_at
-from ir_planner.cartesian.refusal import NoChainError
+from ir_planner.cartesian.refusal import NoChainError, PathRefusedError
 from ir_planner.cartesian.whole_turns import difference, turned_into_limits, with_all_turns
 
 _PARTS = 4  # of an interval where axes jump
@@ -26,15 +26,21 @@ def chains_through(
     """The cheapest chains as `chains` finds them, at finer samples where it takes them, and the layers with
     these. Raises PathRefusedError where no chain leads on.
 
-    Where one leaves the limits in every turn another one may lead to its end: all turns are looked at.
+    Where one leaves the limits in every turn, another one may lead to its end: all turns are looked at. They
+    are too where none leads on from a start beyond half a turn: a limit may be what comes first.
     """
     scene, fixed = asked.context.scene, asked.fixed
-    found, layers = _chains_through(asked, layers, most, by_start=by_start)
-    turned = [turned_into_limits(chain.q, layers.turning, scene, fixed=fixed) for chain in found]
+    try:
+        found, finer = _chains_through(asked, layers, most, by_start=by_start)
+    except PathRefusedError:
+        if not (fixed and (layers.turning & (np.abs(layers.q[0]) > np.pi)).any()):
+            raise
+        found, finer = [], layers
+    turned = [turned_into_limits(chain.q, finer.turning, scene, fixed=fixed) for chain in found]
     within = [replace(chain, q=q) for chain, q in zip(found, turned, strict=True) if q is not None]
-    if len(within) == len(found):
-        return within, layers
-    return chains_through(asked, with_all_turns(layers, scene, fixed=fixed), most, by_start=by_start)
+    if found and len(within) == len(found):
+        return within, finer
+    return chains_through(asked, with_all_turns(finer, scene, fixed=fixed), most, by_start=by_start)
 
 
 def _chains_through(asked: Asked, layers: Layers, most: int, *, by_start: bool) -> tuple[list[Chain], Layers]:
