@@ -9,17 +9,21 @@ from ir_kernels.ik_set import Found
 from ir_msgs_py.arrays import FloatArray
 
 _STEPS = 3  # doubling the digits each: 1e-5 rad of a near-tangent to rounding
+_EXACT = 1e-13  # m and rad: what rounding leaves
 _DAMPING = 1e-10  # of the squared singular values: a singular configuration stays where it is
 _MOST = 0.2  # rad in one step
 
 
 def polished(chain: Chain, targets: FloatArray, found: Sequence[Found]) -> list[Found]:
-    """What was found for targets (N, 4, 4), each after Newton's steps where these brought it nearer."""
+    """What was found for targets (N, 4, 4), each that isn't exact after Newton's steps where these brought it
+    nearer.
+    """
     if not found:
         return []
     rows, q = np.array([row for row, _, _ in found]), np.array([each for _, _, each in found])
-    better, _ = newton(chain, targets[rows], q, _STEPS)
-    return [(row, branch, own) for (row, branch, _), own in zip(found, better, strict=True)]
+    off = np.linalg.norm(pose_error(chain, targets[rows], q), axis=1) > _EXACT
+    q[off], _ = newton(chain, targets[rows[off]], q[off], _STEPS)
+    return [(row, branch, own) for (row, branch, _), own in zip(found, q, strict=True)]
 
 
 def newton(chain: Chain, poses: FloatArray, q: FloatArray, steps: int) -> tuple[FloatArray, FloatArray]:
