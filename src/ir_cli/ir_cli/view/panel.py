@@ -21,7 +21,7 @@ from .motion import Motion
 Post = Callable[[str, Callable[[], None]], None]
 NOBODY = "nothing"
 SPEEDS = {f"{speed:g}x": speed for speed in (0.25, 0.5, 1.0, 2.0, 4.0)}
-_BOX = "style='font-size:12px;line-height:1.4;padding:2px 12px'"
+_BOX = "style='font-size:12px;line-height:1.4;padding:2px 12px;overflow-wrap:anywhere'"
 _BAD = "#d11a2a"
 
 
