@@ -22,7 +22,8 @@ from ir_planner.errors import RequestError
 from ir_planner.program.bounds import Rates
 from ir_planner.program.cycle_time import Task, shared_out
 from ir_planner.program.ladder import FASTEST, LADDER, Ladder
-from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.program import plan_program
+from ir_planner.program.request import ProgramPlan, ProgramRequest
 from ir_planner.program.standby import plan_standby
 from ir_planner.program.station_graph import Part
 from ir_planner.program.time_values import Point, TimeValues, convex_front
@@ -261,3 +262,32 @@ def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
     assert short.status.message == ""
     assert slow.report.duration > 1.2 * short.report.duration
     assert slow.report.energy > short.report.energy
+
+
+@pytest.mark.parametrize(
+    ("cell", "stops", "seed"),
+    [
+        ("table_columns", ("mid", "tR", "side2", "park"), 16),
+        pytest.param("cnc_door", ("cnc", "pal", "cncL", "press", "park"), 10, marks=pytest.mark.long),
+        pytest.param(
+            "table_columns", ("side2", "side1", "mid", "tL", "tR", "park"), 21, marks=pytest.mark.long
+        ),
+    ],
+)
+def test_no_cycle_time_that_the_fastest_program_keeps_is_refused(
+    cell: str, stops: tuple[str, ...], seed: int
+) -> None:
+    """The cheapest chain may be too slow, and the one for time alone is not the fastest at all values."""
+    planner = Planner(lambda: 0.0)
+    planner.set_cell("", cell)
+
+    def plan(objective: str, cycle_time: float) -> ProgramPlan:
+        options = PlanOptions(objective=objective, seed=seed)
+        return planner.plan_program(stops, cycle_time, options, np.array(planner.cell.park))
+
+    cycle = 1.0002 * plan("time", 0.0).report.duration
+    for objective in ("time_and_energy", "time"):
+        found = plan(objective, cycle)
+        assert found.status.ok, found.status.message
+        assert found.report.certified
+        assert found.report.duration == pytest.approx(cycle, abs=1e-4)

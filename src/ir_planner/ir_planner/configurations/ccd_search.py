@@ -73,6 +73,10 @@ class _Descent:
         blocked = np.full(len(q), -1)  # the pair that last set a start back
         sweeps = 0
         while len(q) and sweeps < self.settings.sweeps and not work.exhausted:
+            affordable = np.arange(len(q)) < work.left
+            self._reject(start[~affordable], blocked[~affordable], "not converged, set back")
+            q, distance, psi, start = q[affordable], distance[affordable], psi[affordable], start[affordable]
+            stalled, blocked = stalled[affordable], blocked[affordable]
             work.spend(len(q))
             q, distance, blocked = self._sweep(q, distance, blocked)
             sweeps += 1

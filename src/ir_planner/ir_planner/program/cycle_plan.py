@@ -131,13 +131,16 @@ def _tried(choice: Choice, seconds: float, standing: float, rung: int | None) ->
 
 def _fastest(best: _Tried, seconds: float, standing: float, progress: Progress) -> _Tried:
     """The chain that is fastest of all, where that is faster than the best so far, which is too slow; once
-    work has ended, the one of straight segments.
+    work has ended, the one of straight segments. At high values of a second some movements are faster than
+    those for time alone, which are all that a request for time has tried.
     """
-    other = _cheapest_at(FASTEST, best.choice, progress)
-    if other is None or other.chain.chosen == best.choice.chain.chosen:
-        return best
-    tried = _tried(other, seconds, standing, FASTEST - 1)
-    return tried if tried.values.shortest < best.values.shortest else best
+    own = best.choice
+    again = [own] if own.ladder.first == FASTEST else []
+    other = _cheapest_at(FASTEST, own, progress)
+    if other is not None and other.chain.chosen != own.chain.chosen:
+        again.append(other)
+    tried = [best, *(_tried(choice, seconds, standing, FASTEST - 1) for choice in again)]
+    return min(tried, key=lambda each: (each.energy, each.values.shortest))
 
 
 def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None:

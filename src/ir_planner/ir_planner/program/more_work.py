@@ -80,7 +80,7 @@ def _best(request: ProgramRequest, route: Route, context: Context, progress: Pro
     """The best program of synchronous, or of asynchronous movements."""
     work = context.work
     with _limited(work, work.left, min(work.improvement, _FIRST)):
-        best = planned(chosen(request, route, context, progress), progress)
+        best = _first(request, route, context, progress)
     followed = request.savings or request.front_points > 0
     with _limited(work, int(_HALF * work.left) if followed else work.left, work.improvement):
         for improvement in _DEEPER:
@@ -91,6 +91,18 @@ def _best(request: ProgramRequest, route: Route, context: Context, progress: Pro
                 break
             best = min(best, again, key=lambda answer: answer.cost)
         return best if request.cycle_time > 0.0 else _with_better_movements(best, progress)
+
+
+def _first(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
+    """The first program. A cycle time that is too short along the cheapest chain may do along that of the
+    fastest program: what one objective can do is refused by none.
+    """
+    try:
+        return planned(chosen(request, route, context, progress), progress)
+    except RequestError:
+        if request.cycle_time <= 0.0 or context.options.objective == "time" or context.work.exhausted:
+            raise
+    return planned(chosen(request, route, context.asking("time"), progress), progress)
 
 
 def chosen(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Choice:
