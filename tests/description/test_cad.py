@@ -377,3 +377,43 @@ def test_ir_cell_import_gives_the_line_to_paste(
     assert "is its unit another" in capsys.readouterr().err
     assert main(["cell", "import", str(folder / "frame.obj")]) == 2
     assert "--unit" in capsys.readouterr().err
+
+
+def shell(low: tuple[float, float, float], high: tuple[float, float, float]) -> FloatArray:
+    """Triangles of a box."""
+    return np.asarray(trimesh.creation.box(bounds=[low, high]).triangles, dtype=np.float64)
+
+
+def test_shells_that_touch_are_divided_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pedestal of plates and a column: CoACD did not end with them in ten minutes."""
+    asked: list[int] = []
+
+    def one_piece(triangles: FloatArray, most: int) -> list[FloatArray]:
+        asked.append(most)
+        return [triangles.reshape(-1, 3)]
+
+    monkeypatch.setattr(convex, "decomposed", one_piece)
+    column = np.asarray(trimesh.creation.cylinder(0.15, 0.52, sections=200).triangles)
+    column = column + np.array([0.0, 0.0, 0.3])
+    plates = shell((-0.3, -0.3, 0.0), (0.3, 0.3, 0.04)), shell((-0.2, -0.2, 0.56), (0.2, 0.2, 0.6))
+    found = convex.convex_pieces(np.concatenate([plates[0], column, plates[1]]), 8)
+    assert asked == [6]  # for the column alone, which has more corners than a piece
+    assert len(found.vertices) == 3
+    assert contains(found.vertices, np.concatenate([*plates, column]))
+
+
+@pytest.mark.parametrize("most", [1, 8])
+def test_hollows_and_more_shells_than_pieces_are_divided_as_a_whole(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole: list[int] = []
+
+    def box(triangles: FloatArray, most: int) -> list[FloatArray]:
+        whole.append(len(triangles))
+        return [triangles.reshape(-1, 3)]
+
+    monkeypatch.setattr(convex, "decomposed", box)
+    outer, other = shell((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), shell((0.2, 0.2, 0.2), (0.8, 0.8, 0.8))
+    inner = other if most == 1 else other[:, ::-1]
+    convex.convex_pieces(np.concatenate([outer, inner]), most)
+    assert whole == [24]

@@ -25,7 +25,8 @@ PROCESSOR_SECONDS = 600
 MEMORY_BYTES = 6_000_000_000
 PROGRAM = f"from {__name__} import main; main()"
 _SEED = 0
-_CORNERS = 64  # of a piece
+CORNERS = 64
+"""Of a piece, at most."""
 
 
 def decomposed(triangles: FloatArray, most: int) -> list[FloatArray]:
@@ -67,7 +68,7 @@ def main() -> None:
         threshold=CONCAVITY,
         max_convex_hull=most,
         preprocess_mode="off",
-        max_ch_vertex=_CORNERS,
+        max_ch_vertex=CORNERS,
         seed=_SEED,
     )
     stream = io.BytesIO()

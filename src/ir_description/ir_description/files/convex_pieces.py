@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
-from ir_description.files.coacd_process import decomposed
+from ir_description.files.coacd_process import CORNERS, decomposed
 from ir_description.files.mesh import HULL_VERTICES_MAX, open_edges
 from ir_description.files.protrusion import protrusion
 from ir_msgs_py.arrays import BoolArray, FloatArray
@@ -24,6 +26,7 @@ MARGINS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016)
 _WIDENED = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 """Corners of an octahedron that contains the unit ball."""
 _CUTS = 16
+_CONVEX = 1e-6  # of its volume that a shell's hull may have more
 _TRIANGLES = 100_000  # that are looked at in one cut
 
 
@@ -65,7 +68,7 @@ def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
         )
     if volume <= 0.0:
         raise InvalidValueError(f"the mesh has {volume:.3g} m^3: its triangles must be seen from outside")
-    raw = [_sorted(piece) for piece in decomposed(triangles, most)]
+    raw = [_sorted(piece) for piece in _divided(triangles, most)]
     for margin in MARGINS:
         pieces = [_widened(piece, margin) for piece in raw]
         if contains(pieces, triangles):
@@ -76,6 +79,45 @@ def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
         f"its convex pieces leave out more than {1e3 * MARGINS[-1]:g} mm of it: "
         "give more pieces, or a simpler mesh"
     )
+
+
+def _divided(triangles: FloatArray, most: int) -> list[FloatArray]:
+    """Corners (V, 3) of at most `most` pieces of a closed mesh (T, 3, 3). Each of its shells is divided by
+    itself, unless one is a hollow: CoACD takes minutes for shells that touch; a convex one is a piece.
+    """
+    shells = closed_shells(triangles)
+    if len(shells) > most or any(np.linalg.det(shell).sum() <= 0.0 for shell in shells):
+        return decomposed(triangles, most)
+    hulls = [_hull_of_convex(shell) for shell in shells]
+    pieces = [hull for hull in hulls if hull is not None]
+    rest = [shell for shell, hull in zip(shells, hulls, strict=True) if hull is None]
+    for k, shell in enumerate(rest):
+        share = (most - len(pieces)) // (len(rest) - k)
+        pieces += decomposed(shell, max(share, 1))
+    return pieces
+
+
+def closed_shells(triangles: FloatArray) -> list[FloatArray]:
+    """The parts of a mesh (T, 3, 3) that share no corner, each (T, 3, 3), in the order of the mesh."""
+    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = index.reshape(-1, 3)
+    pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(corners), len(corners)))
+    shell = connected_components(graph, directed=False)[1][faces[:, 0]]
+    order = dict.fromkeys(shell.tolist())
+    return [triangles[shell == each] for each in order]
+
+
+def _hull_of_convex(shell: FloatArray) -> FloatArray | None:
+    """Corners (V, 3) of a shell (T, 3, 3) that is convex and has few of them; None for others."""
+    points = _sorted(shell.reshape(-1, 3))
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return None
+    volume = float(np.linalg.det(shell).sum()) / 6.0
+    convex = float(hull.volume) <= (1.0 + _CONVEX) * volume
+    return points[hull.vertices] if convex and len(hull.vertices) <= CORNERS else None
 
 
 def _place(point: FloatArray) -> str:
