@@ -59,9 +59,9 @@ def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_ta
                 return  # it waits forever
             now = max(now, due[0])
         machines.step(now)
-        for doors, wait in ((before, moving), (after, step.dwell)):
+        for arrived, doors, wait in ((False, before, moving), (True, after, step.dwell)):
             planned = dict(doors).get("lathe", (written,))
-            if doors is after:
+            if arrived:
                 for signal in step.set_signals:
                     machines.hear(OPEN, signal.value, now)
                     due = (now + delay, signal.value)
