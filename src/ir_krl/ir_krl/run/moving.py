@@ -8,22 +8,19 @@ from typing import TypeVar
 
 from ir_krl.errors import KrlRunError
 from ir_krl.language import Tree
+from ir_krl.run.assigning import Assigning
 from ir_krl.run.commands import Motion, SetOutput, SplineBlock, TimeBlock
-from ir_krl.run.control import Control
 from ir_krl.run.motions import Motions
 from ir_krl.run.values import copied
 
 _Built = TypeVar("_Built", Motion, SplineBlock)
 
 
-class Moving(Control):
+class Moving(Assigning):
     """Runs motions; what they are is built by `_motions`."""
 
     _motions: Motions
     _triggers: list[tuple[float, Tree]]
-
-    def _assignment(self, tree: Tree) -> None:
-        raise NotImplementedError
 
     def _trigger(self, tree: Tree) -> None:
         when, where, delay, action = tree.children[0], *tree.children[1:4]

@@ -8,7 +8,7 @@ from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Routine, Source, Tree, place_of
-from ir_krl.run.commands import Command, SetOutput
+from ir_krl.run.commands import Command
 from ir_krl.run.control import LoopExit, Note, Returned
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import Library
@@ -16,9 +16,9 @@ from ir_krl.run.memory import Memory
 from ir_krl.run.motions import Motions
 from ir_krl.run.moving import Moving
 from ir_krl.run.routines import Routines, module_of
-from ir_krl.run.signals import OUTPUT, SIGNALS, Signals
-from ir_krl.run.system import HARMLESS, MODELLED, system_variables
-from ir_krl.run.values import Array, Symbol, Value, copied, kind_of, typed
+from ir_krl.run.signals import Signals
+from ir_krl.run.system import system_variables
+from ir_krl.run.values import Array, Value, copied, typed
 from ir_msgs_py.arrays import FloatArray
 
 GLOBAL, CONFIGURATION = "GLOBAL", "$CONFIG"
@@ -132,33 +132,6 @@ class _Run(Moving):
         name, first, last = tree.children
         end = None if last is None else self.expressions.path(last)
         self._signals.declare(str(name), self.expressions.path(first), end, self.place(tree))
-
-    def _assignment(self, tree: Tree) -> None:
-        access, expression = tree.children
-        path, value = self.expressions.path(access), self.expressions.value(expression)
-        (name, index), where = path[0], self.place(tree)
-        if name in self._signals.groups and index is None:
-            for number, level in self._signals.group_bits(name, value, where):
-                self._set_output(number, level, where)
-            return
-        if name == OUTPUT and index is not None:
-            if not isinstance(value, bool):
-                raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", where)
-            self._set_output(index[0], value, where)
-            return
-        if name == "$IPO_MODE" and value != Symbol("BASE"):
-            raise KrlRunError(f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", where)
-        if name.startswith("$") and name not in MODELLED and name not in HARMLESS:
-            self.note(tree, f"{name} isn't modelled")
-        self.memory.set(path, value, where)
-
-    def _set_output(self, number: float, level: bool, place: Place, pulse: float = 0.0) -> None:
-        """Set a digital output. Raises KrlRunError for one that no controller has."""
-        if number != int(number) or not 1 <= number <= SIGNALS:
-            raise KrlRunError(f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place)
-        self.commands.append(SetOutput(int(number), level, place, pulse, self.continuing))
-        if pulse == 0.0:
-            self.memory.set(((OUTPUT, (int(number),)),), level, place)
 
     # calls
 
