@@ -386,10 +386,10 @@ def shell(low: tuple[float, float, float], high: tuple[float, float, float]) -> 
 
 def test_shells_that_touch_are_divided_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """A pedestal of plates and a column: CoACD did not end with them in ten minutes."""
-    asked: list[int] = []
+    asked: list[tuple[int, int]] = []
 
-    def one_piece(triangles: FloatArray, most: int) -> list[FloatArray]:
-        asked.append(most)
+    def one_piece(triangles: FloatArray, most: int, share: int) -> list[FloatArray]:
+        asked.append((most, share))
         return [triangles.reshape(-1, 3)]
 
     monkeypatch.setattr(convex, "decomposed", one_piece)
@@ -397,7 +397,7 @@ def test_shells_that_touch_are_divided_one_by_one(monkeypatch: pytest.MonkeyPatc
     column = column + np.array([0.0, 0.0, 0.3])
     plates = shell((-0.3, -0.3, 0.0), (0.3, 0.3, 0.04)), shell((-0.2, -0.2, 0.56), (0.2, 0.2, 0.6))
     found = convex.convex_pieces(np.concatenate([plates[0], column, plates[1]]), 8)
-    assert asked == [6]  # for the column alone, which has more corners than a piece
+    assert asked == [(6, 1)]  # for the column alone, which has more corners than a piece
     assert len(found.vertices) == 3
     assert contains(found.vertices, np.concatenate([*plates, column]))
 
@@ -417,3 +417,14 @@ def test_hollows_and_more_shells_than_pieces_are_divided_as_a_whole(
     inner = other if most == 1 else other[:, ::-1]
     convex.convex_pieces(np.concatenate([outer, inner]), most)
     assert whole == [24]
+
+
+def test_shells_share_the_time_of_a_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many shells a hostile mesh has, it takes no longer than one."""
+    read = "numpy.load(io.BytesIO(sys.stdin.buffer.read()))['seconds']"
+    seconds = f"import io, numpy, sys; sys.exit(int({read}))"
+    monkeypatch.setattr(coacd_process, "PROGRAM", seconds)
+    monkeypatch.setattr(coacd_process, "PROCESSOR_SECONDS", 100)
+    two = np.concatenate([c_frame(), c_frame() + 2.0])
+    with pytest.raises(InvalidValueError, match="code 50"):
+        convex.convex_pieces(two, 8)

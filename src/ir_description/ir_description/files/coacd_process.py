@@ -29,13 +29,16 @@ CORNERS = 64
 """Of a piece, at most."""
 
 
-def decomposed(triangles: FloatArray, most: int) -> list[FloatArray]:
-    """Corners (V, 3) of at most `most` convex pieces of a closed mesh (T, 3, 3); raises InvalidValueError."""
+def decomposed(triangles: FloatArray, most: int, share: int = 1) -> list[FloatArray]:
+    """Corners (V, 3) of at most `most` convex pieces of a closed mesh (T, 3, 3), in one of `share` parts
+    of PROCESSOR_SECONDS. Raises InvalidValueError.
+    """
     if find_spec("coacd") is None:
         raise InvalidValueError(MISSING)
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     stream = io.BytesIO()
-    np.savez(stream, corners=corners, faces=index.reshape(-1, 3).astype(np.int32), most=most)
+    faces, seconds = index.reshape(-1, 3).astype(np.int32), max(PROCESSOR_SECONDS // share, 1)
+    np.savez(stream, corners=corners, faces=faces, most=most, seconds=seconds)
     process = subprocess.run(
         [sys.executable, "-c", PROGRAM],
         input=stream.getvalue(),
@@ -55,13 +58,13 @@ def decomposed(triangles: FloatArray, most: int) -> list[FloatArray]:
 
 def main() -> None:
     """Read a mesh from standard input, and write its pieces to standard output."""
-    resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_SECONDS, PROCESSOR_SECONDS))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     import coacd
 
     with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as given:
         mesh = coacd.Mesh(given["corners"], given["faces"])
-        most = int(given["most"])
+        most, seconds = int(given["most"]), int(given["seconds"])
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     coacd.set_log_level("error")
     found = coacd.run_coacd(
         mesh,

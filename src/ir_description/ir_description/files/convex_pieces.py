@@ -92,8 +92,7 @@ def _divided(triangles: FloatArray, most: int) -> list[FloatArray]:
     pieces = [hull for hull in hulls if hull is not None]
     rest = [shell for shell, hull in zip(shells, hulls, strict=True) if hull is None]
     for k, shell in enumerate(rest):
-        share = (most - len(pieces)) // (len(rest) - k)
-        pieces += decomposed(shell, max(share, 1))
+        pieces += decomposed(shell, (most - len(pieces)) // (len(rest) - k), len(rest))
     return pieces
 
 
