@@ -22,6 +22,7 @@ NOT_RUN = {
     r"view\b.*": "waits for a browser until Ctrl-C: tests/cli/test_view.py",
     r"study .* --scheduler .*": "needs a cluster: tests/studies",
     r"(study layout layout|study statistics statistics|arena arena).yaml -o .*": "minutes: tests/studies",
+    r"arena --quick": "two minutes: tests/cli/test_arena_command.py, tests/studies",
     r"energy fit (run\.mcap|joints\.csv) .*": "needs a meter: tests/recorder/test_measuring_page.py",
     r"energy excite .*": "takes minutes: tests/recorder/test_measuring_page.py, shorter",
     r"energy (drive|fit) out/excitation.*": "follows from excite: tests/recorder/test_measuring_page.py",

@@ -143,6 +143,8 @@ def test_names_of_points_that_nearly_coincide_stand_below_each_other() -> None:
     names = sorted(float(y) for y in re.findall(r'y="([-\d.]+)" class="name"', drawn))
     assert len(names) == 11
     assert all(b - a >= 13.9 for a, b in pairwise(names))
+    lowest = max(float(y) for y in re.findall(r'd="M84 ([-\d.]+)H', drawn))
+    assert names[-1] < max(lowest, 256.0) + 0.1  # not below the drawing, nor in the numbers of its axis
     ticks = re.findall(r'text-anchor="end">([^<]+)<', drawn)
     assert len(set(ticks)) == len(ticks) > 2  # no two read alike
 

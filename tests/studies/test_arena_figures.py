@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from ir_studies.arena.entries import Entry
 from ir_studies.arena.figures import (
+    Compared,
+    blocked_and_free,
     compared,
     cost_over_time,
     energy_and_time,
@@ -56,12 +59,20 @@ def test_figures_of_a_planner_count_what_it_did_not_solve() -> None:
 
 
 def test_planners_are_compared_where_both_solved() -> None:
-    assert compared("a", "b", RUNS) == (1, 1.5)
-    assert compared("b", "a", RUNS) == (1, 100.0 / 150.0)
-    assert compared("a", "a", RUNS) == (2, 1.0)
-    count, ratio = compared("a", "nobody", RUNS)
-    assert count == 0
-    assert math.isnan(ratio)
+    assert compared("a", "b", RUNS) == Compared(1, 1.5, 0)
+    assert compared("b", "a", RUNS) == Compared(1, 100.0 / 150.0, 1)
+    assert compared("b", "a", RUNS, tie=0.5) == Compared(1, 100.0 / 150.0, 0)
+    assert compared("a", "a", RUNS) == Compared(2, 1.0, 0)
+    nobody = compared("a", "nobody", RUNS)
+    assert (nobody.both, nobody.lower) == (0, 0)
+    assert math.isnan(nobody.ratio)
+
+
+def test_a_run_that_died_is_listed_with_its_question() -> None:
+    entry = Entry("b", "open", "1", 0, "", "synchronous")
+    free = replace(RUNS[0], row={**RUNS[0].row, "free_ptp": True})
+    lost = Run(entry, {"solved": False, "outcome": "died"})
+    assert blocked_and_free([free, lost, *RUNS[1::2]]) == ([RUNS[1], RUNS[3]], [free, lost])
 
 
 def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
@@ -69,11 +80,25 @@ def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
     mine = [run("portfolio", "1", 100.0, 0.1, 0.5), run("portfolio", "2", 200.0, 0.1, 0.5)]
     said = verdict([*mine, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings)
     assert "open: J of sbl is 10.00 % below the portfolio&#x27;s in the median of the 1 runs" in said
+    assert "it is lower in 1 of them" in said
     assert "solved" not in said.partition("runs that both solved")[2]
     same = [run("sbl", task, cost, 0.1, 0.5) for task, cost in (("1", 100.0), ("2", 250.0))]
-    assert "In every cell the portfolio solved most" in verdict([*mine, *same], settings)
+    assert "In no cell did anybody solve more than the portfolio" in verdict([*mine, *same], settings)
     more = [run("portfolio", "1", math.nan, 0.0, 0.0), run("sbl", "1", 90.0, 0.1, 0.5)]
     assert "open: sbl solved 1 of 1, the portfolio 0." in verdict(more, settings)
+
+
+def test_free_questions_do_not_hide_where_the_portfolio_is_beaten() -> None:
+    settings = ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))
+    free = [
+        replace(one, row={**one.row, "free_ptp": True})
+        for planner in settings.planners
+        for one in (run(planner, str(k), 50.0, 0.1, 0.5) for k in range(7))
+    ]
+    blocked = [run("portfolio", "b", 100.0, 0.1, 0.5), run("sbl", "b", 90.0, 0.1, 0.5)]
+    assert "open: J of sbl is 10.00 % below" in verdict([*free, *blocked], settings)
+    cheaper = [replace(r, row={**r.row, "cost_j": 45.0}) if r.entry.planner == "sbl" else r for r in free]
+    assert "open, straight movement free: J of sbl is 10.00 % below" in verdict([*cheaper], settings)
 
 
 def test_means_are_of_questions_that_all_solved() -> None:

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+from ir_description import cell_to_yaml, load_cell
 from ir_studies import Means
-from ir_studies.arena import ArenaSettings, Finished, run_arena
+from ir_studies.arena import ArenaSettings, Finished, read_settings, run_arena
 from ir_studies.arena.table import columns
 from ir_studies.errors import FolderError, WorkerError
 from ir_studies.work.results import NAME
@@ -63,6 +64,10 @@ def test_interrupted_and_resumed_it_gives_the_same_table(fought: Fought, tmp_pat
 
     with pytest.raises(KeyboardInterrupt):
         fought("sbl", "genetic", seeds=4, progress=interrupt)
+    page = (tmp_path / "out" / "index.html").read_text()  # of what there was when it was stopped
+    assert "so far 3 of 8 runs" in page
+    with (tmp_path / "out" / "table.csv").open() as rows:
+        assert len(list(csv.DictReader(rows))) == 3
     with (tmp_path / "out" / NAME).open("ab") as file:  # as a line that power loss cut
         file.write(b'{"key": "sbl|open|home->p1|3||sync')
     again: list[str] = []
@@ -79,6 +84,56 @@ def test_more_seeds_and_planners_are_added_to_a_folder(fought: Fought) -> None:
     finished = fought("sbl", "genetic", progress=lambda phase, done, of, best: again.append(phase))
     assert len(again) == 3
     assert len(finished.runs) == 4
+
+
+def test_the_settings_in_the_folder_run_the_same_arena(
+    fought: Fought, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    finished = fought("sbl", "genetic")
+    kept = finished.files[-1]
+    settings = read_settings(kept)
+    assert (settings.planners, settings.seconds, settings.tasks) == (("sbl", "genetic"), 0.01, ("home->p1",))
+    again = run_arena(settings, tmp_path / "again", Means(2, command=command))
+    assert table(again) == table(finished)
+    kept.write_text(kept.read_text() + "# mine\n")
+    fought("sbl", "genetic")
+    assert kept.read_text().endswith("# mine\n")  # it says the same
+    fought("sbl")
+    assert read_settings(kept).planners == ("sbl",)
+
+
+@pytest.mark.parametrize("name", ["my cell.yaml", "größer | <b>.yaml"])
+def test_a_cell_file_is_known_from_wherever_it_is_named(
+    tmp_path: Path, command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    cells, settings = tmp_path / "my cells", tmp_path / "arena.yaml"
+    cells.mkdir()
+    (cells / name).write_text(cell_to_yaml(load_cell("open")))
+    head = "format: ir_arena/1\nplanners: [sbl, prm]\ntasks: [home->p1]\nseeds: 2\nseconds: 0.01\n"
+    settings.write_text(head + f'cells: ["my cells/{name}"]\n')
+    monkeypatch.chdir(tmp_path)
+    first = run_arena(read_settings("arena.yaml"), "out", Means(2, command=command))
+    assert "<b>.yaml" not in (tmp_path / "out" / "index.html").read_text()
+    monkeypatch.chdir(cells)
+    made: list[str] = []
+    means = Means(2, progress=lambda phase, done, of, best: made.append(phase), command=command)
+    for path in (settings, Path("../arena.yaml"), first.files[-1]):
+        assert table(run_arena(read_settings(path), tmp_path / "out", means)) == table(first)
+    assert made == []
+
+
+def test_a_cell_that_changed_between_two_runs_is_refused(tmp_path: Path, command: tuple[str, ...]) -> None:
+    file, settings = tmp_path / "cell.yaml", tmp_path / "arena.yaml"
+    file.write_text(cell_to_yaml(load_cell("open")))
+    settings.write_text(
+        "format: ir_arena/1\nplanners: [sbl]\ntasks: [home->p1]\nseeds: 1\nseconds: 0.01\n"
+        "cells: [cell.yaml]\n"
+    )
+    run_arena(read_settings(settings), tmp_path / "out", Means(1, command=command))
+    file.write_text(cell_to_yaml(load_cell("deep_box")).replace("name: deep_box", "name: open"))
+    settings.write_text(settings.read_text().replace("tasks: [home->p1]\n", ""))
+    with pytest.raises(FolderError, match="results of another cell"):
+        run_arena(read_settings(settings), tmp_path / "out", Means(1, command=command))
 
 
 def test_a_folder_of_other_settings_is_refused(fought: Fought, tmp_path: Path) -> None:

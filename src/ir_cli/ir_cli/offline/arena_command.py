@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 
 from ir_studies import read_settings, run_arena
-from ir_studies.arena import EXAMPLE
+from ir_studies.arena import EXAMPLE, ArenaSettings, arena_settings
 
 from .studying import add_study, settings_of, studied
+
+_FOLDER, _QUICK_FOLDER = "out/arena", "out/arena_quick"
+_QUICK_S = 0.2  # of processor per run: 550 runs of the example take two minutes on two cores
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -18,7 +22,11 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="planners against each other over cells, tasks and seeds; needs no ROS",
         description="Runs what the folder has no result of; the same command goes on after an interruption.",
     )
-    add_study(arena, "out/arena")
+    add_study(arena, _FOLDER)
+    words = (
+        f"one seed and {_QUICK_S:g} s per run, in {_QUICK_FOLDER}; without SETTINGS.yaml those of --example"
+    )
+    arena.add_argument("--quick", action="store_true", help=words)
     arena.add_argument("--parquet", action="store_true", help="also table.parquet; needs pyarrow")
     arena.set_defaults(run=run)
 
@@ -28,10 +36,18 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.example:
         sys.stdout.write(EXAMPLE)
         return 0
-    settings = read_settings(settings_of(arguments, "ir arena"))
-    finished = studied(
-        arguments, lambda means: run_arena(settings, arguments.output, means, parquet=arguments.parquet)
-    )
+    settings, folder = asked(arguments)
+    finished = studied(arguments, lambda means: run_arena(settings, folder, means, parquet=arguments.parquet))
     sys.stdout.write(f"{finished.summary}\n")
     sys.stdout.writelines(f"{path}\n" for path in finished.files)
     return 0
+
+
+def asked(arguments: argparse.Namespace) -> tuple[ArenaSettings, str]:
+    """The settings, and the folder of the results."""
+    if not arguments.quick:
+        return read_settings(settings_of(arguments, "ir arena")), str(arguments.output)
+    named = arguments.settings is not None
+    settings = read_settings(arguments.settings) if named else arena_settings(EXAMPLE, str)
+    folder = _QUICK_FOLDER if arguments.output == _FOLDER else str(arguments.output)
+    return replace(settings, seeds=1, seconds=_QUICK_S), folder

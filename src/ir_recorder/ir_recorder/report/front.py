@@ -14,7 +14,11 @@ from ir_recorder.report.words import joules, seconds, text
 
 WIDTH, HEIGHT = 720.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 84.0, 190.0, 18.0, 44.0
-_NAME, _LINE = 90.0, 14.0  # how wide and how high a name is
+_NAME, _LINE, _HALF = (
+    90.0,
+    14.0,
+    4.0,
+)  # how wide and how high a name is, and how far it stands below its middle
 _LEAST_S, _LEAST_J = 0.05, 5.0  # span of an axis: what differs by less reads alike
 
 
@@ -119,15 +123,24 @@ def _grid(x: _Axis, y: _Axis, along: str) -> str:
 
 
 def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:
-    """Where the names of points go: beside them, or below another name that stands there."""
+    """Where the names of points go: beside them, or below another name that stands there, and all of them
+    higher where the last would stand below the drawing.
+    """
     heights = [y.at(point.energy) for point in points]
+    named = sorted((k for k, point in enumerate(points) if point.name), key=heights.__getitem__)
     placed: list[tuple[float, float]] = []
-    for k in sorted(range(len(points)), key=heights.__getitem__):
+    for k in named:
         at = x.at(points[k].seconds)
-        for other, high in sorted(placed, key=lambda one: one[1]) if points[k].name else ():
+        for other, high in sorted(placed, key=lambda one: one[1]):
             if abs(other - at) < _NAME and abs(high - heights[k]) < _LINE:
                 heights[k] = high + _LINE
-        placed += [(at, heights[k])] if points[k].name else []
+        placed.append((at, heights[k]))
+    below: list[tuple[float, float]] = []
+    for k in sorted(named, key=heights.__getitem__, reverse=True):
+        at = x.at(points[k].seconds)
+        lower = [high - _LINE for other, high in below if abs(other - at) < _NAME]
+        heights[k] = min(heights[k], HEIGHT - _BOTTOM - _HALF, *lower)
+        below.append((at, heights[k]))
     return heights
 
 

@@ -2,6 +2,15 @@
 
 from ir_studies.arena.entries import Entry
 from ir_studies.arena.runs import Finished, run_arena
-from ir_studies.arena.settings import EXAMPLE, PORTFOLIO, ArenaSettings, read_settings
+from ir_studies.arena.settings import EXAMPLE, PORTFOLIO, ArenaSettings, arena_settings, read_settings
 
-__all__ = ["EXAMPLE", "PORTFOLIO", "ArenaSettings", "Entry", "Finished", "read_settings", "run_arena"]
+__all__ = [
+    "EXAMPLE",
+    "PORTFOLIO",
+    "ArenaSettings",
+    "Entry",
+    "Finished",
+    "arena_settings",
+    "read_settings",
+    "run_arena",
+]

@@ -45,7 +45,10 @@ def entries(settings: ArenaSettings) -> list[Entry]:
     count = settings.seeds * sum(map(len, tasks.values()))
     count *= len(settings.loads) * len(settings.timings) * len(settings.planners)
     if count > MOST_RUNS:
-        raise SettingsError(f"these are {count} runs: at most {MOST_RUNS} are made")
+        days = count * settings.seconds / 86_400.0
+        raise SettingsError(
+            f"these are {count} runs, {days:.1f} days of one core: at most {MOST_RUNS} are made"
+        )
     return list(_entries(settings, tasks))
 
 

@@ -69,15 +69,26 @@ def figures(planner: str, runs: Sequence[Run]) -> Figures:
     )
 
 
-def compared(planner: str, other: str, runs: Sequence[Run]) -> tuple[int, float]:
-    """Runs (a question and a seed each) that both solved, and the median of the other's J over its own."""
+@dataclass(frozen=True)
+class Compared:
+    """Runs (a question and a seed each) that both planners solved, the median of the other's J over its own
+    there, and in how many the other's is lower.
+    """
+
+    both: int
+    ratio: float
+    lower: int
+
+
+def compared(planner: str, other: str, runs: Sequence[Run], tie: float = 0.0) -> Compared:
+    """A planner against another one; what differs by less than the share `tie` of J is not lower."""
     a, b = (
         {(run.entry.question, run.entry.seed): run.number("cost_j") for run in runs
          if run.solved and run.entry.planner == name}
         for name in (planner, other)
     )  # fmt: skip
-    both = a.keys() & b.keys()
-    return len(both), _median(b[key] / a[key] for key in both)
+    ratios = [b[key] / a[key] for key in a.keys() & b.keys()]
+    return Compared(len(ratios), _median(ratios), sum(ratio < 1.0 - tie for ratio in ratios))
 
 
 def success_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
@@ -136,6 +147,17 @@ def _ratio_until(run: Run, best: Mapping[Question, float], time: FloatArray) -> 
 def _median(values: Iterable[float]) -> float:
     found = [value for value in values if math.isfinite(value)]
     return float(np.median(found)) if found else math.nan
+
+
+def blocked_and_free(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
+    """Runs whose straight movement is blocked, and those whose is free. That is asked of the question: a run
+    that was cut or died does not know it.
+    """
+    free = {run.entry.question for run in runs if run.free_ptp}
+    return (
+        [run for run in runs if run.entry.question not in free],
+        [run for run in runs if run.entry.question in free],
+    )
 
 
 def of_cell(runs: Iterable[Run], cell: str) -> list[Run]:

@@ -11,8 +11,7 @@ import numpy as np
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner, PlannerError
-from ir_planner.search import SEARCHES
-from ir_planner.search.with_ompl import charge_to, needs_ompl
+from ir_planner.search.with_ompl import charge_to
 from ir_studies.arena.entries import Entry
 from ir_studies.arena.one_run import one_run
 from ir_studies.arena.processor_time import charged, processor_time
@@ -41,17 +40,19 @@ def row_of(entry: Entry, settings: ArenaSettings) -> Row:
 
 
 def warm_up(settings: ArenaSettings) -> None:
-    """What is loaded once is loaded before anything is timed: cells, models, OMPL."""
+    """What is loaded once is loaded before anything is timed: cells, models with every load, OMPL."""
     for cell in settings.cells:
         planner = planner_of(cell)
         start = next(iter(tasks_of(planner.cell).values()))[0]
-        for name in settings.planners:
-            if name == PORTFOLIO or needs_ompl(SEARCHES[name]):
+        goal = Goal(configuration=start + np.eye(len(start))[0] * 1e-3)
+        for load in settings.loads:
+            for name in settings.planners:
                 planner_id = "" if name == PORTFOLIO else name
-                options = PlanOptions(planner_id=planner_id, max_iterations=10, planning_time=120.0)
+                options = PlanOptions(
+                    planner_id=planner_id, max_iterations=10, planning_time=120.0, load=load
+                )
                 with suppress(PlannerError):
-                    goal = start + np.eye(len(start))[0] * 1e-3
-                    planner.plan_regional(start, Goal(configuration=goal), options)
+                    planner.plan_regional(start, goal, options)
 
 
 @cache

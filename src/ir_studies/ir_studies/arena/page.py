@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ir_description import load_cell
+from ir_description import is_path, load_cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE
+from ir_planner.search import SEARCHES
+from ir_planner.search.with_ompl import needs_ompl
 from ir_recorder.report.axes import Curves, packed
 from ir_recorder.report.files import write_output
 from ir_recorder.report.front import Point, front_chart
@@ -23,6 +25,7 @@ from ir_studies.arena.cell_picture import cell_picture
 from ir_studies.arena.figures import (
     GRID,
     Figures,
+    blocked_and_free,
     compared,
     cost_over_time,
     energy_and_time,
@@ -31,7 +34,7 @@ from ir_studies.arena.figures import (
     of_cell,
     success_over_time,
 )
-from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
+from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, settings_text
 from ir_studies.arena.table import Run
 from ir_studies.page import BUTTON, page
 
@@ -41,83 +44,121 @@ _HEADS = (
     ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
 _TIE = 5e-5  # of J: less is not shown
-_ABOVE = 300.0  # percent: what a curve of costs shows where nothing, or something dearer, is known
+_ABOVE = 25.0  # percent: what a curve of costs shows where nothing, or something more expensive, is known
+_BLOCKED, _FREE = "The straight movement is blocked", "The straight movement is free"
 
 
-def write_page(runs: Sequence[Run], settings: ArenaSettings, path: Path) -> Path:
+def write_page(runs: Sequence[Run], settings: ArenaSettings, path: Path, missing: int = 0) -> Path:
     """Write the page in place of another page; its absolute path. PathError when it can't be written."""
-    return write_output(path, page_html(runs, settings).encode(), PAGE_START, ANYWHERE)
+    return write_output(path, page_html(runs, settings, missing).encode(), PAGE_START, ANYWHERE)
 
 
-def page_html(runs: Sequence[Run], settings: ArenaSettings) -> str:
-    """The page as text."""
-    planners = settings.planners
-    questions = len({run.entry.question for run in runs})
+def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) -> str:
+    """The page as text. missing: runs that were not made yet."""
+    titles = _titles(settings.cells)
+    blocked, _ = blocked_and_free(runs)
+    shown = blocked or runs
     parts = {
         "title": "Arena",
-        "subtitle": text(
-            f"{len(planners)} planners, {len(settings.cells)} cells, {questions} questions, "
-            f"{settings.seeds} seed{'s' if settings.seeds > 1 else ''}: {len(runs)} runs of "
-            f"{settings.seconds:g} s of processor"
-        ),
+        "subtitle": text(_subtitle(runs, settings, missing)),
         "verdict": verdict(runs, settings),
-        "cells": "".join(_cell_section(runs, cell, planners) for cell in settings.cells),
-        "settings": text(json.dumps(settings.budget)),
+        "shown": "Questions whose straight movement is free are left out: there nothing is searched."
+        if blocked
+        else "The straight movement is free in every question: nothing was searched.",
+        "above": f"{_ABOVE:g}",
+        "longest": seconds(longest(runs)),
+        "cells": "".join(_cell_section(runs, cell, titles, settings.planners) for cell in settings.cells),
+        "bindings": text(_bindings(settings.planners)),
+        "settings": text(settings_text(settings)),
         "data": json.dumps(
-            {"end": longest(runs), "axes": list(_curves(runs, settings))}, separators=(",", ":")
+            {"end": longest(shown), "axes": list(_curves(shown, titles, settings.planners))},
+            separators=(",", ":"),
         ).replace("<", "\\u003c"),
         "script": "\n".join(asset(script) for script in SCRIPTS),
     }
     return page("arena", parts, BUTTON)
 
 
+def _subtitle(runs: Sequence[Run], settings: ArenaSettings, missing: int) -> str:
+    questions = len({run.entry.question for run in runs})
+    made = f"{len(runs)} runs" if not missing else f"so far {len(runs)} of {len(runs) + missing} runs"
+    return (
+        f"{len(settings.planners)} planners, {len(settings.cells)} cells, {questions} questions, "
+        f"{settings.seeds} seed{'s' if settings.seeds > 1 else ''}: {made} of {settings.seconds:g} s "
+        "of processor"
+    )
+
+
+def _bindings(planners: Sequence[str]) -> str:
+    """What is not alike for planners of OMPL, where there are any."""
+    names = ", ".join(name for name in planners if name in SEARCHES and needs_ompl(SEARCHES[name]))
+    if not names:
+        return ""
+    return (
+        f"Not alike: OMPL's planners ({names}) ask for each check on its own, through Python; the project's "
+        "searches ask for many in one call, so they make more of them in the same seconds. Each request "
+        "starts anew: a roadmap (prm) is not kept for the next one, and aorrtc, which goes on improving its "
+        "path, answers when its checks are spent, not with its first path."
+    )
+
+
+def _titles(cells: Sequence[str]) -> dict[str, str]:
+    """What the page calls the cells: files by their names, by their paths where two have the same."""
+    short = {cell: Path(cell).name if is_path(cell) else cell for cell in cells}
+    names = list(short.values())
+    return {cell: name if names.count(name) == 1 else cell for cell, name in short.items()}
+
+
 def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
-    """Whether the portfolio solved most and cost least in every cell, or where not."""
+    """Whether nobody solved more and cost less than the portfolio in any cell, or where not."""
     if PORTFOLIO not in settings.planners or len(settings.planners) == 1:
         return ""
-    said = [words for cell in settings.cells for words in _against(of_cell(runs, cell), cell, settings)]
-    held = "In every cell the portfolio solved most, and nobody has a lower median J where both solved."
+    said = []
+    for cell, title in _titles(settings.cells).items():
+        blocked, free = blocked_and_free(of_cell(runs, cell))
+        said += _against(blocked, title, settings)
+        said += _against(free, f"{title}, straight movement free", settings)
+    held = "In no cell did anybody solve more than the portfolio, or have a lower median J where both solved."
     items = "".join(f"<li>{text(words)}</li>" for words in said or [held])
     return f'<section id="verdict"><h2>The portfolio against the others</h2><ul>{items}</ul></section>'
 
 
-def _against(own: Sequence[Run], cell: str, settings: ArenaSettings) -> Iterator[str]:
+def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterator[str]:
     found = {planner: figures(planner, own) for planner in settings.planners}
     mine = found[PORTFOLIO]
     for planner, other in found.items():
         if other.success > mine.success:
-            yield f"{cell}: {planner} solved {other.solved} of {other.count}, the portfolio {mine.solved}."
-        count, ratio = compared(PORTFOLIO, planner, own)
-        if ratio < 1.0 - _TIE:
-            less = f"{100.0 * (1.0 - ratio):.2f} % below the portfolio's"
-            yield f"{cell}: J of {planner} is {less} in the median of the {count} runs that both solved."
+            yield f"{place}: {planner} solved {other.solved} of {other.count}, the portfolio {mine.solved}."
+        against = compared(PORTFOLIO, planner, own, _TIE)
+        if against.ratio < 1.0 - _TIE:
+            less = f"{100.0 * (1.0 - against.ratio):.2f} % below the portfolio's"
+            yield (
+                f"{place}: J of {planner} is {less} in the median of the {against.both} runs that both "
+                f"solved; it is lower in {against.lower} of them."
+            )
 
 
-def _cell_section(runs: Sequence[Run], name: str, planners: Sequence[str]) -> str:
+def _cell_section(runs: Sequence[Run], name: str, titles: Mapping[str, str], planners: Sequence[str]) -> str:
     """Picture, figures of blocked and of free pairs apart, and time against energy."""
-    cell, own = load_cell(name), of_cell(runs, name)
-    blocked, free = [r for r in own if not r.free_ptp], [r for r in own if r.free_ptp]
+    cell, title = load_cell(name), titles[name]
+    blocked, free = blocked_and_free(of_cell(runs, name))
     picture = cell_picture(cell, np.array(cell.tasks[0].start))
-    parts = [f"<h2>{text(cell.name)}</h2>{picture}"]
-    for title, part in (
-        ("The straight movement is blocked", blocked),
-        ("The straight movement is free", free),
-    ):
+    parts = [f"<h2>{text(title)}</h2>{picture}"]
+    for head, part in ((_BLOCKED, blocked), (_FREE, free)):
         if part:
             rows = [_row(figures(planner, part)) for planner in planners]
-            parts.append(f"<h3>{title}</h3>{table(_HEADS, rows, f'{cell.name}: {title.lower()}')}")
-    means = energy_and_time(planners, own)
+            parts.append(f"<h3>{head}</h3>{table(_HEADS, rows, f'{title}: {head.lower()}')}")
+    means = energy_and_time(planners, blocked or free)
     drawn = front_chart([Point(planner, *means[planner], "measured") for planner in means], "duration")
     if drawn:
         parts.append(f'<h3>Time against energy</h3><p class="hint">{_FRONT_HINT}</p>{drawn}')
-    return f"<section>{''.join(parts)}</section>".replace(
-        'id="energy_over_cycle_time"', f'id="energy_{text(re.sub(r"[^a-z0-9]+", "_", cell.name.lower()))}"'
-    )
+    key = f"{list(titles).index(name) + 1}_{re.sub(r'[^a-z0-9]+', '_', title.lower())}"
+    return f"<section>{''.join(parts)}</section>".replace('id="energy_over_cycle_time"', f'id="energy_{key}"')
 
 
 _FRONT_HINT = (
-    "Means over the questions that all planners solved which solved any; the line joins those that no other "
-    "one beats in both."
+    "Means over the questions (blocked ones where there are any) that all planners solved which solved any; "
+    "the line joins those that no other one beats in both."
 )
 
 
@@ -141,16 +182,18 @@ def milliseconds(value: float) -> str:
     return f"{1e3 * value:,.0f} ms".replace(",", " ") if np.isfinite(value) else DASH
 
 
-def _curves(runs: Sequence[Run], settings: ArenaSettings) -> Iterator[dict[str, Json]]:
+def _curves(
+    runs: Sequence[Run], titles: Mapping[str, str], planners: Sequence[str]
+) -> Iterator[dict[str, Json]]:
     """Success and cost over time, for all cells together and for each."""
-    time, planners = np.linspace(0.0, longest(runs), GRID), settings.planners
-    places = [("all cells", list(runs)), *((cell, of_cell(runs, cell)) for cell in settings.cells)]
-    kinds: tuple[tuple[str, Callable[..., FloatArray], float], ...] = (
-        ("solved", success_over_time, 0.0),
-        ("J above the best known, median", cost_over_time, _ABOVE),
+    time = np.linspace(0.0, longest(runs), GRID)
+    places = [("all cells", list(runs)), *((title, of_cell(runs, cell)) for cell, title in titles.items())]
+    kinds: tuple[tuple[str, Callable[..., FloatArray], float, float], ...] = (
+        ("solved", success_over_time, 100.0, 0.0),
+        ("J above the best known, median", cost_over_time, _ABOVE, _ABOVE),
     )
-    for name, compute, missing in kinds:
-        for place, own in places if len(settings.cells) > 1 else places[:1]:
-            value = np.nan_to_num(np.minimum(compute(planners, own, time), _ABOVE), nan=missing)
+    for name, compute, most, missing in kinds:
+        for place, own in places if len(titles) > 1 else places[:1]:
+            value = np.nan_to_num(np.minimum(compute(planners, own, time), most), nan=missing)
             curves = Curves(f"{name}, {place}", "%", time, value, shown=place == "all cells")
             yield {**packed(curves), "names": list(planners), "ends": [float(time[-1])] * len(planners)}

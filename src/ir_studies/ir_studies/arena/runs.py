@@ -1,7 +1,12 @@
-"""The whole arena: what is not yet in the folder is run, then table, database and page are written."""
+"""The whole arena: what is not yet in the folder is run, then table, database and page are written; also when
+it is stopped, of what is there.
+"""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,10 +14,10 @@ from pathlib import Path
 from ir_description import cell_hash, load_cell
 from ir_studies.arena.entries import Entry, entries
 from ir_studies.arena.figures import figures
-from ir_studies.arena.outputs import write_outputs
+from ir_studies.arena.outputs import write_outputs, write_settings
 from ir_studies.arena.settings import ArenaSettings
 from ir_studies.arena.table import Run
-from ir_studies.errors import StudyError
+from ir_studies.errors import StoppedError, StudyError, WorkerError
 from ir_studies.work import Means, Results, Task
 
 _COLUMNS = ("planner", "solved", "count", "first", "final", "cost_ratio", "duration", "energy", "lost")
@@ -47,7 +52,9 @@ def run_arena(
     *,
     parquet: bool = False,
 ) -> Finished:
-    """Run what the folder has no result of; interrupted, it goes on where it ended. Raises StudyError."""
+    """Run what the folder has no result of; interrupted, it writes what is known so far, and goes on from
+    there the next time. Raises StudyError.
+    """
     if parquet and find_spec("pyarrow") is None:
         raise StudyError("a Parquet file needs pyarrow: pip install pyarrow")
     means = means or Means()
@@ -55,16 +62,42 @@ def run_arena(
     cells = {name: cell_hash(load_cell(name)) for name in settings.cells}
     task = Task("arena", asdict(settings), settings.seconds + settings.hang_after)
     with Results(Path(folder), "arena", settings.budget, cells) as results:
+        kept = write_settings(settings, Path(folder))
         missing = [entry.job for entry in wanted.values() if entry.key not in results.rows]
-        done = len(wanted) - len(missing)
-        with means.makers(task) as makers:
-            for job, row in makers.rows(missing):
+        begin, before = time.monotonic(), len(wanted) - len(missing)
+
+        def write() -> Finished:
+            runs = tuple(Run(entry, results.rows[k]) for k, entry in wanted.items() if k in results.rows)
+            if not runs:
+                return Finished((), (kept,))
+            written = write_outputs(runs, settings, Path(folder), len(wanted) - len(runs), parquet=parquet)
+            return Finished(runs, (*written, kept))
+
+        with _written_when_stopped(write), means.makers(task) as makers:
+            for made, (job, row) in enumerate(makers.rows(missing), 1):
                 results.add(job, row)
-                done += 1
-                means.progress(_words(wanted[job.key]), done, len(wanted), "")
-        runs = tuple(Run(entry, results.rows[key]) for key, entry in wanted.items())
-    return Finished(runs, write_outputs(runs, settings, Path(folder), parquet=parquet))
+                left = (time.monotonic() - begin) / made * (len(missing) - made)
+                means.progress(_words(wanted[job.key], left), before + made, len(wanted), "")
+        return write()
 
 
-def _words(entry: Entry) -> str:
-    return f"{entry.cell} {entry.task} by {entry.planner}, seed {entry.seed}: run"
+@contextmanager
+def _written_when_stopped(write: Callable[[], object]) -> Iterator[None]:
+    """Where what is done inside is stopped, what is known so far is written before that goes on."""
+    try:
+        yield
+    except (KeyboardInterrupt, StoppedError, WorkerError):
+        write()
+        raise
+
+
+def _words(entry: Entry, left: float) -> str:
+    cell = Path(entry.cell).name
+    return f"{minutes(left)} left; {cell} {entry.task} by {entry.planner}, seed {entry.seed}: run"
+
+
+def minutes(value: float) -> str:
+    """Seconds as a person plans with them: 50 s, 12 min, 3.5 h."""
+    if value < 99.5:
+        return f"{value:.0f} s"
+    return f"{value / 60.0:.0f} min" if value < 5_970.0 else f"{value / 3600.0:.1f} h"

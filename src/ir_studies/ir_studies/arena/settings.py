@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from ir_description import DescriptionError, load_cell, load_power_data
+import yaml
+
+from ir_description import DescriptionError, is_path, load_cell, load_power_data
 from ir_msgs_py.options import TIMINGS
 from ir_planner import PlannerError
 from ir_planner.scene import scene_with
@@ -105,14 +108,29 @@ def read_settings(path: str | Path) -> ArenaSettings:
         raise SettingsError(f"{path}: {error}") from error
 
 
+def settings_text(settings: ArenaSettings, folder: Path | None = None) -> str:
+    """A settings file with all keys; cell files as seen from a folder, None: by their whole paths."""
+    values = {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(settings).items()}
+    if folder is not None:
+        values["cells"] = [os.path.relpath(c, folder) if is_path(c) else c for c in settings.cells]
+    lines = {"format": FORMAT, **values}
+    return yaml.safe_dump(lines, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100)
+
+
 def arena_settings(content: str, placed: Placed) -> ArenaSettings:
-    """The settings of a text. placed: where cells are."""
+    """The settings of a text. placed: where cells are; files are known by their whole paths, however and from
+    wherever they are named.
+    """
     values = settings_values(content, FORMAT, [field.name for field in fields(ArenaSettings)])
     if "cells" not in values:
         raise SettingsError("cells are missing: names of bundled cells, or files")
     if isinstance(values["cells"], tuple):
-        values["cells"] = tuple(placed(n) if isinstance(n, str) else n for n in values["cells"])
+        values["cells"] = tuple(_whole_path(placed(n)) if isinstance(n, str) else n for n in values["cells"])
     return ArenaSettings(**values)
+
+
+def _whole_path(name: str) -> str:
+    return os.path.abspath(name) if is_path(name) else name
 
 
 def _check_names(key: str, names: Any, *, may_be_empty: bool) -> None:
