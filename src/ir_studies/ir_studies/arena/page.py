@@ -113,7 +113,7 @@ def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
     """Whether nobody solved more and cost less than the portfolio in any cell, or where not."""
     if PORTFOLIO not in settings.planners or len(settings.planners) == 1:
         return ""
-    said = []
+    said: list[str] = []
     for cell, title in _titles(settings.cells).items():
         blocked, free = blocked_and_free(of_cell(runs, cell))
         said += _against(blocked, title, settings)
