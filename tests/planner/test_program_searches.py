@@ -2,29 +2,43 @@
 
 from __future__ import annotations
 
+import re
+import sys
 import time
 from importlib.resources import files
-from itertools import pairwise
+from itertools import pairwise, product
+from pathlib import Path
 from typing import TypeVar
 
+import coal
 import numpy as np
 import pytest
 
-from ir_description import Cell, PowerData, cell_from_yaml, cell_to_yaml
+from ir_description import Cell, PowerData, cell_from_yaml, cell_to_yaml, load_cell
 from ir_description.errors import DescriptionError
 from ir_kernels import Chain
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.search_log import LOG, ConfigurationLog, CorrectionLog, SearchLog, WithdrawalLog, log_of
+from ir_msgs_py.status import StatusCode
+from ir_planner import PlannerSettings
 from ir_planner.errors import RequestError
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.request.work import Work
+from ir_planner.service import ModifiedGa
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+from _coal_shapes import along_z, solid
 
 Log = TypeVar("Log", WithdrawalLog, ConfigurationLog, CorrectionLog)
 BENCH = (files("ir_description") / "data" / "cells" / "kr6_bench.yaml").read_text(encoding="utf-8")
 PICK = "abc_deg: [0, 90, 0]}, approach_distance: 0.1}"
 PLACE = "{station: place, dwell: 0.5}"
 ROUNDED = 2e-3  # m: positions in a log are whole millimetres, in three axes
+S_M = PlanOptions().safety_distance
+FINE = 0.002  # rad between configurations that Coal is asked about
+A_STEP = 0.02  # m: the tool in a hundredth of a radian of each joint, at its reach, and the rounding
 AT_THE_POSE = 1e-3  # m: Psi below xi (1e-8 m^2), and the rounding
 
 
@@ -67,10 +81,11 @@ def one(plan: ProgramPlan, kind: type[Log]) -> Log:
 def test_a_station_that_asks_for_a_withdrawal_is_left_by_it(plan: ProgramPlan, asked: Cell) -> None:
     log, station = one(plan, WithdrawalLog), asked.station("pick")
     assert (log.station, log.method, log.load) == ("pick", "modified_ga", "gripper")
+    assert (log.asked, log.blocked) == (True, "")  # a straight line is free there
     for places in (log.path, log.kept):
         assert np.abs(places[0] - station.pose[:3, 3]).max() < ROUNDED
     assert (log.parents[1:] < np.arange(1, len(log.parents))).all()
-    assert len(log.kept) - 1 + sum(count for _, count in log.rejected) <= log.candidates
+    assert len(log.kept) - 1 + sum(count for _, count in log.rejected) == log.candidates
     assert log.distance[1] > log.distance[0]
     (out,) = [m for m in plan.movements if m.kind == MovementKind.SERVICE_EXIT and m.to_station == "pick"]
     assert out.trajectory is not None
@@ -104,6 +119,91 @@ def test_a_step_s_planner_corrects_its_movement(plan: ProgramPlan) -> None:
     assert all(later <= earlier for each in log.fitness for earlier, later in pairwise(each))
     assert log.costs[1] > log.costs[0] > 0.0
     assert np.abs(log.straight[[0, -1]] - log.path[[0, -1]]).max() < ROUNDED
+
+
+def test_what_collides_of_the_straight_movement_is_what_coal_finds_there(
+    plan: ProgramPlan, asked: Cell
+) -> None:
+    log = one(plan, CorrectionLog)
+    (across,) = [m for m in plan.movements if (m.from_station, m.to_station) == ("pick", "place")]
+    assert across.trajectory is not None
+    first, last = across.trajectory.positions[[0, -1]]
+    share = np.linspace(0.0, 1.0, 1 + int(np.ceil(np.abs(last - first).max() / FINE)))
+    q = first + share[:, None] * (last - first)
+    near = np.array([_least_distance(asked, one) for one in q]) <= PlanOptions().safety_distance
+    tool = Chain(asked.robot, asked.base_pose, asked.tcp).tcp_poses(q)[:, :3, 3]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
+    assert len(log.stretches) == len(edges) // 2 > 0
+    for stretch, begin, end in zip(log.stretches, edges[::2], edges[1::2], strict=True):
+        assert np.linalg.norm(stretch[0] - tool[begin], axis=-1) < A_STEP
+        assert np.linalg.norm(stretch[-1] - tool[end - 1], axis=-1) < A_STEP
+    driven = across.trajectory.sample(np.linspace(0.0, across.duration, len(log.driven))).q
+    places = Chain(asked.robot, asked.base_pose, asked.tcp).tcp_poses(driven)[:, :3, 3]
+    assert np.abs(log.driven - places).max() < ROUNDED
+    assert re.fullmatch(r"\w+ too near \w+", log.met)
+
+
+def _least_distance(cell: Cell, q: FloatArray) -> float:
+    """The least distance [m] of what moves beyond link 2 to the machines' bodies, by Coal."""
+    links = Chain(cell.robot, cell.base_pose, cell.tcp).link_poses(q[None])[0]
+    capsules = [*cell.robot.capsules, *(c for load in cell.loads("") for c in load.capsules)]
+    found = [np.inf]
+    for capsule, body in product((c for c in capsules if c.link > 2), cell.bodies()):
+        if np.linalg.norm(capsule.p1 - capsule.p0) > 0.0 and body.kind != "plane":
+            here = links[capsule.link] @ along_z(capsule.p0, capsule.p1)
+            shape = coal.Capsule(capsule.radius, float(np.linalg.norm(capsule.p1 - capsule.p0)))
+            asked = coal.DistanceRequest(), coal.DistanceResult()
+            found.append(
+                coal.distance(shape, _placed(here), solid(body), _placed(np.asarray(body.pose)), *asked)
+            )
+    return float(min(found))
+
+
+def _placed(pose: FloatArray) -> coal.Transform3s:
+    return coal.Transform3s(np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3]))
+
+
+def test_lines_out_of_the_washer_are_blocked_about_the_tool_s_axis() -> None:
+    cell = load_cell("demo")
+    station = cell.station("washer_rinse")
+    held = [
+        (coal.Capsule(c.radius, float(np.linalg.norm(c.p1 - c.p0))), along_z(c.p0, c.p1))
+        for load in cell.loads("gear")
+        for c in load.capsules
+    ]
+    washer = [(solid(body), _placed(np.asarray(body.pose))) for body in cell.machine("washer").world_bodies()]
+
+    def free(direction: FloatArray) -> bool:
+        for share in np.linspace(0.0, 1.0, 101):
+            pose = np.array(station.pose)
+            pose[:3, 3] += 1.2 * share * direction  # farther than the washer is wide
+            flange = pose @ np.linalg.inv(cell.tcp)
+            for (shape, local), (body, place) in product(held, washer):
+                asked = coal.DistanceRequest(), coal.DistanceResult()
+                if coal.distance(shape, _placed(flange @ local), body, place, *asked) <= S_M:
+                    return False
+        return True
+
+    k = np.arange(600) + 0.5
+    height, turn = 1.0 - 2.0 * k / len(k), np.pi * (1.0 + np.sqrt(5.0)) * k
+    flat = np.sqrt(1.0 - height**2)
+    directions = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), height])
+    angle = np.degrees(np.arccos(np.clip(directions @ -station.pose[:3, 0], -1.0, 1.0)))
+    assert not any(free(direction) for direction in directions[angle < 75.0])
+    assert free(np.append(-station.pose[:2, 3] / np.linalg.norm(station.pose[:2, 3]), 0.0))
+
+
+def test_a_withdrawal_that_is_asked_for_and_found_by_nobody_is_refused(power: PowerData) -> None:
+    cell = cell_from_yaml(bench("withdrawal: modified_ga,"))
+    feeble = ModifiedGa(population=2, offspring=1, generations=1, step=0.001, spread=0.01)
+    settings = PlannerSettings(withdrawal=feeble)
+    start = np.array(cell.machine_home)
+    asked = ProgramRequest(cell, power, ("pick",), start, PlanOptions(), settings=settings)
+    refused = plan_program(asked, Work(100_000, time.monotonic() + 60.0, time.monotonic)).status
+    assert refused.code == StatusCode.PLANNING_FAILED
+    assert "station pick: the withdrawal modified_ga that it asks for leads out of none of" in refused.message
+    assert "without `withdrawal: modified_ga`" in refused.message
+    assert "straight lines are free" in refused.message
 
 
 def test_what_the_searches_did_is_the_same_for_the_same_seed(

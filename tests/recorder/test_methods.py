@@ -19,7 +19,7 @@ from ir_recorder.report.methods.view import HEIGHT, WIDTH, View
 
 ROWS = np.array([[1.8, -1.1, 1.0], [1.7, -1.0, 1.2], [1.4, -0.9, 1.2], [1.3, -0.8, 1.3]])
 WITHDRAWAL = WithdrawalLog(
-    *("washer_rinse", "gripper+gear", "modified_ga", 3, 90, (("gear_held too near washer_nozzles", 80),)),
+    *("washer_rinse", "gripper+gear", "modified_ga", 3, 83, (("gear_held too near washer_nozzles", 80),)),
     *((50.0, 66.0), ROWS, np.array([0, 0, 1, 1]), ROWS[:2] + 0.1, ROWS[[0, 1, 3]]),
 )
 CONFIGURATIONS = ConfigurationLog(
@@ -45,12 +45,12 @@ def section(analysis: Analysis, *logs: SearchLog) -> str:
 def test_each_method_has_a_sentence_with_its_figures_and_a_drawing(analysis: Analysis) -> None:
     html = section(analysis, WITHDRAWAL, CONFIGURATIONS, CORRECTION)
     first, second, third = re.findall(r"<figcaption>(.*?)</figcaption>", html)
-    assert first.startswith("Leaving washer_rinse by eq. (7): 3 generations drew 90 configurations")
+    assert first.startswith("Leaving washer_rinse by eq. (7): 3 generations drew 83 configurations")
     assert "3 were kept, 80 dropped (80 gear_held too near washer_nozzles)" in first
     assert "from 50.0 m to 66.0 m" in first
     assert "of 5 random starts 2 were accepted, 1 of them distinct; 3 were rejected" in second
     assert "From lathe_work to gauge_measure" in third
-    assert "4 generations in 2 populations" in third
+    assert "4 generations for 2 stretches" in third
     assert "+4.00 %" in third
     drawings = [ElementTree.fromstring(svg) for svg in re.findall(r"<svg.*?</svg>", html)]
     assert len(drawings) == 3
@@ -62,12 +62,62 @@ def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(anal
     tree = ElementTree.fromstring(withdrawal)
     groups = {group.get("class"): len(group) for group in tree.iter("g")}
     assert groups == {"dropped": 2, "kept": 3, "place": 1}
-    assert {path.get("class") for path in tree.iter("path")} == {"tool", "part", "tried"}
+    assert {path.get("class") for path in tree.iter("path")} == {"tool", "part", "tried", "bar"}
     names = {title.text for title in tree.iter("title")}
     assert {"washer_nozzles", "gear_held", "t_f1"} <= names
     (configurations,) = re.findall(r"<svg.*?</svg>", section(analysis, CONFIGURATIONS))
     lines = [line.get("class") for line in ElementTree.fromstring(configurations).iter("polyline")]
     assert sorted(lines) == ["accepted", "tried"]
+
+
+@pytest.mark.parametrize(
+    ("log", "said"),
+    [
+        (replace(WITHDRAWAL, blocked="line out of washer_rinse: a too near b"), "not free (a too near b); 3"),
+        (
+            replace(WITHDRAWAL, asked=True),
+            "asks for it, though the straight line back along the tool is free",
+        ),
+        (WITHDRAWAL, "by eq. (7): 3 generations"),
+    ],
+)
+@pytest.mark.parametrize("generations", [0, 3])
+def test_a_withdrawal_says_why_it_is_not_the_straight_line(
+    log: WithdrawalLog, said: str, generations: int, analysis: Analysis
+) -> None:
+    words = section(analysis, replace(log, generations=generations))
+    assert said in words or generations == 0
+    assert ("two trees" in words) is (generations == 0)
+    assert ("is free" in words) is log.asked
+    assert ("not free" in words) is (log.blocked != "")
+
+
+def test_the_movement_that_is_driven_is_drawn_beside_the_corrected_path(analysis: Analysis) -> None:
+    html = section(analysis, replace(CORRECTION, met="a too near b", driven=ROWS - 0.1))
+    assert "collides (a too near b)" in html
+    assert html.count('class="driven"') == 1
+
+
+def test_each_drawing_has_a_length_and_says_from_where_it_is_seen(analysis: Analysis) -> None:
+    drawings = re.findall(r"<svg.*?</svg>", section(analysis, WITHDRAWAL, CONFIGURATIONS, CORRECTION))
+    for drawn in drawings:
+        length, x0, wide = map(float, _bar(drawn))
+        assert 0.1 * WIDTH < wide <= 0.3 * WIDTH
+        assert x0 + wide < WIDTH
+        assert length in (0.1, 0.2, 0.5, 1.0, 2.0)
+        assert re.search(r"m, seen from (the side|above)</text>", drawn)
+
+
+def _bar(drawn: str) -> tuple[str, str, str]:
+    (x0, wide) = re.findall(r'class="bar" d="M(\S+) \S+v6h([0-9.]+)v-6"', drawn)[0]
+    return re.findall(r">([0-9.]+) m, seen", drawn)[0], x0, wide
+
+
+def test_figures_that_are_left_out_are_counted(analysis: Analysis) -> None:
+    html = section(analysis, *[CORRECTION] * 30)
+    assert html.count("<figure>") == 24
+    assert "24 of 30 are shown" in html
+    assert "are shown" not in section(analysis, CORRECTION)
 
 
 def test_a_recording_without_logs_has_no_such_section(analysis: Analysis) -> None:

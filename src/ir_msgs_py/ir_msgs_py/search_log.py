@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -24,12 +24,18 @@ _MOST = 20_000  # numbers of one log's positions
 Counts = tuple[tuple[str, int], ...]
 
 
+def _nowhere() -> FloatArray:
+    return np.zeros((0, 3))
+
+
 @dataclass(frozen=True, eq=False)
 class WithdrawalLog:
     """A withdrawal from a station (eq. 7). kept (N, 3) m: positions of the tool at the configurations that
     were kept, the station first, each with the index of its parent (N,); dropped (M, 3): some of those that
     came too near something. path (L, 3): along what was left of the best path. load: what was held.
-    distance: the total metric distance D [m] at the station and the largest one reached.
+    distance: the total metric distance D [m] at the station and the largest one reached. asked: whether the
+    cell asks for a withdrawal there. blocked: why the straight line back along the tool leads nowhere from
+    the same configuration, "": it is free, or nobody knows.
     """
 
     station: str
@@ -43,6 +49,8 @@ class WithdrawalLog:
     parents: IntArray
     dropped: FloatArray
     path: FloatArray
+    asked: bool = False
+    blocked: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +80,11 @@ class ConfigurationLog:
 @dataclass(frozen=True, eq=False)
 class CorrectionLog:
     """A genetic correction of a straight movement: positions (K, 3) m of the tool along it, along the parts
-    of it that collided, and along the corrected path (L, 3). fitness: by such part, of the best individual of
-    each generation, 1 is the cost of the straight part. costs: W of eq. (9) before and after.
+    of it that collide, and along the corrected path of least W (L, 3). fitness: by stretch that was
+    corrected, of this movement and of paths on which something still collided, of the best individual of each
+    generation; 1 is the cost of the straight stretch. costs: W of eq. (9) before and after. met: the first
+    pair that is too near. driven (M, 3): along the movement that is driven, optimised from the corrected
+    paths; empty where nobody says.
     """
 
     start: str
@@ -84,6 +95,8 @@ class CorrectionLog:
     straight: FloatArray
     stretches: tuple[FloatArray, ...]
     path: FloatArray
+    met: str = ""
+    driven: FloatArray = field(default_factory=_nowhere)
 
 
 SearchLog = WithdrawalLog | ConfigurationLog | CorrectionLog
@@ -138,6 +151,8 @@ def _withdrawal(data: Mapping[str, Any]) -> WithdrawalLog:
         parents,
         _points(data["dropped"]),
         _points(data["path"]),
+        bool(data.get("asked", False)),
+        str(data.get("blocked", "")),
     )
 
 
@@ -163,6 +178,8 @@ def _correction(data: Mapping[str, Any]) -> CorrectionLog:
         _points(data["straight"]),
         tuple(_points(each) for each in data["stretches"]),
         _points(data["path"]),
+        str(data.get("met", "")),
+        _points(data.get("driven", [])),
     )
 
 

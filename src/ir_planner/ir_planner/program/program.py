@@ -73,7 +73,7 @@ def _answered(
             f"(is {request.front_points}) must be 0",
         )
     plan = replace(_planned(steps), gap=answer.gap)
-    for log in logs_of(choice):
+    for log in logs_of(choice, steps):
         context.journal.keep(log)
     if choice.parts and request.options.objective == "energy" and cycle <= 0.0:
         moving = plan.report.duration - standing

@@ -48,7 +48,8 @@ def station_nodes(
     or none and why.
 
     The path is the straight service line where it is free and ends outside the machine's zone, else a
-    withdrawal; where neither leaves the zone, a free line within it. A station may ask for the withdrawal.
+    withdrawal; where neither leaves the zone, a free line within it. A station may ask for the withdrawal:
+    then it is that or none.
     """
     scene, journal, name = arriving.scene, arriving.journal, arriving.station
     station = scene.station(name)
@@ -63,19 +64,32 @@ def station_nodes(
         free = lines_free(lines, context, rejected)
         lines = [line for line, is_free in zip(lines, free, strict=True) if is_free]
     out = leaves_zone(lines, arriving)
-    if any(out) and not station.search.withdrawal:
-        lines = [line for line, leaves in zip(lines, out, strict=True) if leaves]
+    straight, asked = [line for line, leaves in zip(lines, out, strict=True) if leaves], station.search
+    if straight and not asked.withdrawal:
+        lines = straight
     else:
-        lines = withdrawn_lines(found.q[:_MOST], both, searches, rejected) or lines
+        withdrawn = withdrawn_lines(found.q[:_MOST], both, searches, rejected)
+        lines = withdrawn if withdrawn or asked.withdrawal else lines
     journal.rejected.update(+rejected)
     if not lines:
-        reasons = ", ".join(f"{reason} ({count})" for reason, count in (+rejected).most_common(4))
-        return [], Status(
-            StatusCode.PLANNING_FAILED,
-            f"station {name}: none of {len(found.q)} free configurations has a free straight line out of "
-            f"{station.approach_distance:g} m, nor a withdrawal: {reasons}",
-        )
+        return [], _no_exit(station, len(found.q), len(straight), +rejected)
     return [Node(line) for line in lines], Status.success()
+
+
+def _no_exit(station: Station, configurations: int, straight: int, rejected: Counter[str]) -> Status:
+    """The status of a station that no line and no withdrawal leaves; straight: lines that are free and that
+    the station doesn't want.
+    """
+    reasons = ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common(4))
+    method = station.search.withdrawal
+    if method:
+        free = f"; without `withdrawal: {method}` {straight} straight lines are free" if straight else ""
+        sentence = f"the withdrawal {method} that it asks for leads out of none of {configurations} free "
+        sentence += f"configurations: {reasons}{free}"
+    else:
+        sentence = f"none of {configurations} free configurations has a free straight line out of "
+        sentence += f"{station.approach_distance:g} m, nor a withdrawal: {reasons}"
+    return Status(StatusCode.PLANNING_FAILED, f"station {station.name}: {sentence}")
 
 
 def _configurations(

@@ -46,7 +46,7 @@ def first_paths(
             else:
                 notes.append("nothing free" + (f", {found.note}" if found.note else ""))
         if found.correction is not None:
-            journal.keep(correction_log(found.correction, found.paths[0], ends.start, space.scene))
+            journal.keep(correction_log(found.correction, found.paths[0], ends.start, space))
         if found.paths:
             return [(name, path) for path in found.paths]
         if journal.work.exhausted:  # not before the first: what is free at once is found in any time

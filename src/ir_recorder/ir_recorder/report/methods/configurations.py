@@ -7,7 +7,7 @@ import numpy as np
 from ir_description import Cell
 from ir_msgs_py.search_log import ConfigurationLog
 from ir_recorder.report.methods.view import View, drawing
-from ir_recorder.report.methods.words import reasons
+from ir_recorder.report.methods.words import counted, reasons, were
 
 
 def sentence(log: ConfigurationLog) -> str:
@@ -15,8 +15,8 @@ def sentence(log: ConfigurationLog) -> str:
     rejected = sum(count for _, count in log.rejected)
     said = (
         f"Configurations at {log.station} by cyclic coordinate descent, eqs. (1) to (6): "
-        f"of {log.starts} random starts {log.accepted} were accepted, {log.distinct} of them distinct; "
-        f"{rejected} were rejected"
+        f"of {counted(log.starts, 'random start')} {were(log.accepted, 'accepted')}, {log.distinct} of them "
+        f"distinct; {were(rejected, 'rejected')}"
     )
     return f"{said}: {reasons(log.rejected)}." if rejected else f"{said}."
 
@@ -40,6 +40,7 @@ def picture(log: ConfigurationLog, cell: Cell, number: int) -> str:
         *lines,
         view.dots(station.pose[None, :3, 3], "place", 4.5),
         view.names(cell),
+        view.scale_bar("from the side"),
     )
     label = f"Search for configurations at {log.station}: {log.accepted} of {log.starts} starts accepted"
     return drawing(content, label, f"configurations_{number}")

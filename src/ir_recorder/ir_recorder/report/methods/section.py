@@ -12,18 +12,21 @@ from ir_recorder.report.words import text
 
 _MOST = 24  # figures
 _KEY = (
-    '<p class="hint">Black: the path that was taken on from there. Green: kept or accepted. Red: dropped, '
-    "rejected or colliding. Grey: bodies of the machines, those that are not near the drawn plane as "
-    "outlines.</p>"
+    '<p class="hint">Black: the path that was found. Blue: what is driven, optimised from there. '
+    "Dashed: the straight movement. Green: kept or accepted. Red: dropped, rejected or colliding. Grey: "
+    "bodies of the machines, those that are not near the drawn plane as outlines. Paths are those of the "
+    "tool centre point.</p>"
 )
 
 
 def methods_section(analysis: Analysis) -> str:
     """What the paper's methods did for the recorded program; "" where none was asked for."""
-    logs, cell = analysis.recording.searches[:_MOST], analysis.cell
-    figures = "".join(_figures(logs, cell))
+    logs, cell = analysis.recording.searches, analysis.cell
+    figures = "".join(_figures(logs[:_MOST], cell))
     if not figures:
         return ""
+    if len(logs) > _MOST:
+        figures += f'<p class="hint">{_MOST} of {len(logs)} are shown.</p>'
     head = "<h2>What the paper's methods did</h2>"
     return f'<section id="methods">{head}{_KEY}<div class="methods">{figures}</div></section>'
 

@@ -15,6 +15,8 @@ from ir_recorder.report.words import text
 WIDTH, HEIGHT = 560.0, 360.0
 _MARGIN = 24.0
 _LEAST = 0.4  # m: less is not shown, however short a path is
+_SEEN = 9.0  # of a machine, by each letter of its name, so that the name may stand there
+_LENGTHS, _BAR = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0), 0.3 * WIDTH  # m; the longest bar
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,20 +112,34 @@ class View:
                 )
         return "".join(lines)
 
-    def names(self, cell: Cell, style: str = "name") -> str:
-        """The name of each machine at the middle of its bodies."""
+    def names(self, cell: Cell, only: str = "") -> str:
+        """The name of each machine, or of one alone, in the middle of what is seen of its bodies."""
         parts = []
         for machine in cell.equipment:
-            bounds = [body.bounds() for body in machine.world_bodies() if body.kind != "plane"]
-            if bounds:
-                low, high = np.min([b[0] for b in bounds], axis=0), np.max([b[1] for b in bounds], axis=0)
-                ((x, y),) = self.flat((low + high) / 2.0)
-                if 0.0 < x < WIDTH and 0.0 < y < HEIGHT:
-                    parts.append(
-                        f'<text class="{style}" x="{x:.1f}" y="{y:.1f}" text-anchor="middle">'
-                        f"{text(machine.name)}</text>"
-                    )
+            corners = [_corners(body) for body in machine.world_bodies() if body.kind != "plane"]
+            if not corners or only not in ("", machine.name):
+                continue
+            flat = self.flat(np.vstack(corners))
+            low = np.clip(flat.min(axis=0), 0.0, [WIDTH, HEIGHT])
+            high = np.clip(flat.max(axis=0), 0.0, [WIDTH, HEIGHT])
+            x, y = (low + high) / 2.0
+            if (high - low >= [_SEEN * len(machine.name), _SEEN]).all() or (
+                0.0 < flat.mean(axis=0)[0] < WIDTH and 0.0 < flat.mean(axis=0)[1] < HEIGHT
+            ):
+                parts.append(
+                    f'<text class="name" x="{x:.1f}" y="{y:.1f}" text-anchor="middle">'
+                    f"{text(machine.name)}</text>"
+                )
         return "".join(parts)
+
+    def scale_bar(self, seen: str) -> str:
+        """A length to compare with, and from where the drawing is `seen`."""
+        lengths = [length for length in _LENGTHS if length * self.scale <= _BAR]
+        length = max(lengths, default=_LENGTHS[0])
+        x, y = _MARGIN / 2.0, HEIGHT - _MARGIN / 2.0
+        bar = f'<path class="bar" d="M{x:g} {y - 6:g}v6h{length * self.scale:.1f}v-6"/>'
+        words = f"{length:g} m, seen {seen}"
+        return f'{bar}<text x="{x + length * self.scale + 8:.1f}" y="{y:g}">{words}</text>'
 
 
 def drawing(content: Iterable[str], label: str, name: str) -> str:
@@ -131,6 +147,14 @@ def drawing(content: Iterable[str], label: str, name: str) -> str:
     return (
         f'<div class="figure scroll"><svg class="method" id="{name}" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" '
         f'role="img" aria-label="{text(label)}">{"".join(content)}</svg></div>'
+    )
+
+
+def _corners(body: Body) -> FloatArray:
+    """Corners (8, 3) of the box of a body along the axes."""
+    low, high = body.bounds()
+    return np.array(
+        [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
     )
 
 

@@ -8,26 +8,34 @@ from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.search_log import WithdrawalLog
 from ir_recorder.report.methods.view import View, drawing
-from ir_recorder.report.methods.words import reasons
+from ir_recorder.report.methods.words import counted, reasons, were
 
 _LEAST = 0.05  # m: a path that goes less far sideways is seen across the direction to the robot
 _DEPTH = 0.12  # m: bodies farther from the plane of the drawing are outlines
+_ENTERING = "Entering is the same path reversed."
 
 
 def sentence(log: WithdrawalLog) -> str:
     """What was done at the station."""
     if not log.generations:
-        return f"Leaving {log.station}: no straight line was free, and two trees found the path out."
-    dropped, first = sum(count for _, count in log.rejected), len(log.kept) - 1
-    said = (
-        f"Leaving {log.station} by eq. (7): {log.generations} generations drew {log.candidates} "
-        f"configurations around those before; {first} were kept, {dropped} dropped"
-    )
-    said += f" ({reasons(log.rejected)})" if log.rejected else ""
+        return f"Leaving {log.station}: {_why(log)}two trees found the path out. {_ENTERING}"
+    kept = len(log.kept) - 1
+    dropped = max(log.candidates - kept, 0)
+    why = f" ({reasons(log.rejected)})" if log.rejected else ""
     return (
-        f"{said}. The total metric distance D to the machine grew from {log.distance[0]:.1f} m to "
-        f"{log.distance[1]:.1f} m, and the best path out was shortened. Entering is the same path reversed."
+        f"Leaving {log.station} by eq. (7): {_why(log)}{counted(log.generations, 'generation')} drew "
+        f"{counted(log.candidates, 'configuration')} around those before; {were(kept, 'kept')}, {dropped} "
+        f"dropped{why}. The total metric distance D to the machine grew from {log.distance[0]:.1f} m to "
+        f"{log.distance[1]:.1f} m, and the best path out was shortened. {_ENTERING}"
     )
+
+
+def _why(log: WithdrawalLog) -> str:
+    """Why it isn't the straight line; "" for recordings that don't say."""
+    if log.blocked:
+        reason = log.blocked.removeprefix(f"line out of {log.station}: ")
+        return f"the straight line back along the tool is not free ({reason}); "
+    return "the cell asks for it, though the straight line back along the tool is free; " if log.asked else ""
 
 
 def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
@@ -45,6 +53,8 @@ def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
         view.dots(child, "kept", 2.2),
         view.line(log.path, "path"),
         view.dots(log.path[:1], "place", 4.5),
+        view.names(cell, only=station.equipment),
+        view.scale_bar("from the side"),
     )
     label = f"Withdrawal from {log.station}, seen from the side: {len(log.kept)} kept configurations"
     return drawing(content, label, f"withdrawal_{number}")
