@@ -1,7 +1,8 @@
 """One run: a planner is asked for one task, with other seeds until its seconds are over; the best counts.
 
-All are treated alike: what a planner finds is simplified, optimised, timed and proved by the same code, and
-who answers quickly is asked more often. Seconds are those of processors, also where another process answers.
+All are treated alike: what a planner finds is simplified, optimised, timed and proved by the same code. Who
+answers quickly is asked more often, who can use more work for a better answer gets it. Seconds are those of
+processors, also where another process answers.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def one_run(entry: Entry, settings: ArenaSettings, planner: Planner, clock: Call
         options = PlanOptions(
             planner_id="" if entry.planner == PORTFOLIO else entry.planner,
             seed=entry.seed * SEEDS + requests,
-            max_iterations=settings.max_iterations,
+            max_iterations=settings.work_of(requests),
             planning_time=max(left, 0.001),
             safety_distance=margin,
             time_value=settings.time_value,

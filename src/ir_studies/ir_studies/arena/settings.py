@@ -34,7 +34,8 @@ loads: [""]                  # what is attached: "" is the tool of the cell, non
 timings: [synchronous]       # and asynchronous
 seconds: 1.0                 # of processor per run: the planner is asked again, with other seeds
 requests: 0                  # per run at most; 0: as many as the seconds hold
-max_iterations: 0            # work of a request; 0: the planner's default
+max_iterations: 0            # work of the first request of a run; 0: the planner's default
+further_iterations: 100000000   # of its other requests, for who can make better answers of it; 0: the same
 safety_distance: 0.02        # m; less where an end of the task is nearer
 time_value: 500.0            # W in J = energy of the drives + time_value x T
 hang_after: 60.0             # s of the wall beyond `seconds` after which a run is cut
@@ -54,6 +55,7 @@ class ArenaSettings:
     seconds: float = 1.0
     requests: int = 0
     max_iterations: int = 0
+    further_iterations: int = 100_000_000
     safety_distance: float = 0.02
     time_value: float = 500.0
     hang_after: float = 60.0
@@ -76,6 +78,10 @@ class ArenaSettings:
         kept = {name: value for name, value in asdict(self).items() if name not in axes}
         return {**kept, "clock": "processor"}
 
+    def work_of(self, request: int) -> int:
+        """What a request of a run may cost, counted from 0; 0: the planner's default."""
+        return (request and self.further_iterations) or self.max_iterations
+
     def _check_cells(self) -> None:
         known_tasks: list[str] = []
         for name in self.cells:
@@ -91,7 +97,12 @@ class ArenaSettings:
         checked_known("tasks", self.tasks, known_tasks)
 
 
-_WHOLE = (("seeds", 1, 100_000), ("requests", 0, 1_000_000), ("max_iterations", 0, 2**32 - 1))
+_WHOLE = (
+    ("seeds", 1, 100_000),
+    ("requests", 0, 1_000_000),
+    ("max_iterations", 0, 2**32 - 1),
+    ("further_iterations", 0, 2**32 - 1),
+)
 _REAL = (
     ("seconds", 0.01, 86_400.0),
     ("safety_distance", 0.0, 10.0),

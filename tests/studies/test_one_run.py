@@ -1,0 +1,62 @@
+"""What a run of an arena asks of a planner, request by request."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+
+from ir_msgs_py.options import PlanOptions
+from ir_planner import Goal, MovementPlan, Planner
+from ir_studies.arena.entries import Entry
+from ir_studies.arena.one_run import one_run
+from ir_studies.arena.settings import ArenaSettings
+
+FURTHER = 20_000
+ENTRY = Entry("portfolio", "deep_box", "pal->bin", 3, "", "synchronous")
+
+
+@pytest.fixture(scope="module")
+def planner() -> Planner:
+    """With the cell of the run."""
+    made = Planner(time.monotonic)
+    made.set_cell("", ENTRY.cell)
+    return made
+
+
+def asked(
+    planner: Planner, monkeypatch: pytest.MonkeyPatch, **settings: Any
+) -> tuple[list[PlanOptions], Any]:
+    """The options of the run's requests, and its row."""
+    options: list[PlanOptions] = []
+    plan = planner.plan_regional
+
+    def noted(start: Any, goal: Goal, asked: PlanOptions) -> MovementPlan:
+        options.append(asked)
+        return plan(start, goal, asked)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(planner, "plan_regional", noted)
+        row = one_run(
+            ENTRY, ArenaSettings((ENTRY.cell,), seconds=3600.0, **settings), planner, time.monotonic
+        )
+    return options, row
+
+
+def test_requests_after_the_first_may_use_more_work(
+    planner: Planner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options, row = asked(planner, monkeypatch, requests=3, further_iterations=FURTHER)
+    assert [one.max_iterations for one in options] == [0, FURTHER, FURTHER]
+    assert len({one.seed for one in options}) == 3
+    costs = [cost for _, cost in row["progress"]]
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < costs[0]  # which other seeds alone don't reach
+    assert row["cost_j"] == costs[-1]
+
+
+def test_all_requests_may_be_given_the_same_work(planner: Planner, monkeypatch: pytest.MonkeyPatch) -> None:
+    options, row = asked(planner, monkeypatch, requests=2, max_iterations=9_000, further_iterations=0)
+    assert [one.max_iterations for one in options] == [9_000, 9_000]
+    assert row["solved"]
