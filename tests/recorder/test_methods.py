@@ -113,6 +113,22 @@ def _bar(drawn: str) -> tuple[str, str, str]:
     return re.findall(r">([0-9.]+) m, seen", drawn)[0], x0, wide
 
 
+def test_the_chart_of_the_fitness_lies_where_it_hides_least(analysis: Analysis) -> None:
+    x, y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    for to in (x + y, x - y):  # from above: towards the right top, or the right bottom
+        path = np.linspace(0.0, 1.0, 30)[:, None] * 2.0 * to
+        drawn = section(analysis, replace(CORRECTION, straight=path, path=path + 0.01 * x, stretches=()))
+        left, top, wide, high = map(
+            float, re.findall(r'class="chart" x="(\S+)" y="(\S+)" width="(\S+)" height="(\S+)"', drawn)[0]
+        )
+        (line,) = re.findall(r'class="path" points="(.*?)"', drawn)
+        flat = np.array([point.split(",") for point in line.split()], dtype=float)
+        assert not ((flat >= [left, top]) & (flat <= [left + wide, top + high])).all(axis=1).any()
+        assert min(left, top) >= 0.0
+        assert left + wide <= WIDTH
+        assert top + high <= HEIGHT
+
+
 def test_figures_that_are_left_out_are_counted(analysis: Analysis) -> None:
     html = section(analysis, *[CORRECTION] * 30)
     assert html.count("<figure>") == 24

@@ -12,7 +12,7 @@ from ir_recorder.report.methods.view import HEIGHT, WIDTH, View, drawing
 from ir_recorder.report.methods.words import counted
 from ir_recorder.report.words import percent
 
-_CHART = (WIDTH - 246.0, 12.0, 234.0, 112.0)  # left, top, width, height
+_CHART, _GAP = (250.0, 112.0), 12.0  # width and height of the chart; to the edges of the drawing
 
 
 def sentence(log: CorrectionLog) -> str:
@@ -45,7 +45,7 @@ def picture(log: CorrectionLog, cell: Cell, number: int) -> str:
         view.dots(log.path[[0, -1]], "place", 4.0),
         view.names(cell),
         view.scale_bar(seen),
-        _fitness(log),
+        _fitness(log, _emptiest(view, log)),
     )
     label = f"Genetic correction from {log.start} to {log.goal}: straight movement and corrected path"
     return drawing(content, label, f"correction_{number}")
@@ -69,12 +69,25 @@ def _best_view(log: CorrectionLog) -> tuple[View, str]:
     return max(views, key=lambda pair: apart(pair[0]))
 
 
-def _fitness(log: CorrectionLog) -> str:
-    """The best fitness of every generation on a logarithmic axis, one line for each part."""
+def _emptiest(view: View, log: CorrectionLog) -> tuple[float, float]:
+    """The corner (left, top) where a chart hides least of the paths; the scale bar has one of the four."""
+    flat = view.flat(np.vstack([log.straight, log.path, log.driven]))
+    right, bottom = WIDTH - _GAP - _CHART[0], HEIGHT - _GAP - _CHART[1]
+
+    def hidden(corner: tuple[float, float]) -> int:
+        return int(((flat >= corner) & (flat <= np.add(corner, _CHART))).all(axis=1).sum())
+
+    return min(((right, _GAP), (_GAP, _GAP), (right, bottom)), key=hidden)
+
+
+def _fitness(log: CorrectionLog, corner: tuple[float, float]) -> str:
+    """The best fitness of every generation on a logarithmic axis, one line for each stretch, in a chart with
+    its left top at `corner`.
+    """
     values = [value for each in log.fitness for value in each if value > 0.0]
     if len(values) < 2:
         return ""
-    left, top, width, height = _CHART
+    (left, top), (width, height) = corner, _CHART
     low, high = math.log(min(values)), math.log(max(values))
     longest = max(len(each) for each in log.fitness)
 
@@ -91,4 +104,4 @@ def _fitness(log: CorrectionLog) -> str:
     head = f'<text x="{left + 8:g}" y="{top + 20:g}">best fitness, straight: 1</text>'
     ends = f"{max(values):.2f} to {min(values):.2f} in {counted(longest, 'generation')}"
     foot = f'<text class="small" x="{left + 8:g}" y="{top + height - 8:g}">{ends}</text>'
-    return frame + head + lines + foot if top + height < HEIGHT else ""
+    return frame + head + lines + foot
