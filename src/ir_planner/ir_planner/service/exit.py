@@ -46,9 +46,13 @@ class Exit:
         outside = self.area.left(self.interaction[None], self.safety_distance)[0]
         return float(self.area.station.approach_distance) if outside else 0.0
 
-    def is_out(self, q: FloatArray) -> BoolArray:
-        """Which configurations (N, n) have left the zone and are free without allowed contacts."""
-        out = self.area.left(q, self.safety_distance)
+    def is_out(self, q: FloatArray, zone_distance: FloatArray | None = None) -> BoolArray:
+        """Which configurations (N, n) have left the zone and are free without allowed contacts.
+
+        zone_distance (N,) m, where that is known.
+        """
+        zone = self.area.zone_distance(q) if zone_distance is None else zone_distance
+        out = np.asarray(zone > self.safety_distance)
         if self.least_distance > 0.0:
             chain = self.inside.scene.chain
             moved = chain.tcp_poses(q)[:, :3, 3] - chain.tcp_poses(self.interaction[None])[:, :3, 3]

@@ -23,6 +23,8 @@ from ir_planner.service.step_weights import step_weights
 
 _DAMPING = 0.02  # m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)
 _ROTATION_LENGTH = 0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its travel
+_WEIGHTED = np.array([1.0, 1.0, 1.0, *[_ROTATION_LENGTH] * 3])[:, None]
+_DAMPED = _DAMPING**2 * np.eye(6)
 _SHARPEST = 0.25  # the spread shrinks at most to this share in one generation, so that one step can't end it
 _WIDEST = 1.3  # and grows at most so, where D was lost
 _MEAN_LEAST, _MEAN_MOST = 0.25, 4.0  # of the first step: mean steps grow with D between them
@@ -190,13 +192,11 @@ class _Walker:
     def _mean(self, parents: _Population) -> FloatArray:
         """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
         counted = self.area.pairs > 0  # a zone without bodies has no D
-        grown = np.clip(
-            parents.total / self.first_total if counted else np.ones(len(parents)), _MEAN_LEAST, _MEAN_MOST
-        )
+        ratio = parents.total / self.first_total if counted else np.ones(len(parents))
+        grown = np.minimum(np.maximum(ratio, _MEAN_LEAST), _MEAN_MOST)
         out = self._straight_out(parents.q) * self.settings.step
-        length = np.linalg.norm(out, axis=1, keepdims=True)
         last = parents.step
-        size = np.linalg.norm(last, axis=1, keepdims=True)
+        length, size = (np.sqrt((x * x).sum(axis=1, keepdims=True)) for x in (out, last))
         momentum = np.where(size > 1e-9, last / np.maximum(size, 1e-9) * length, out)
         share = self.rng.uniform(0.0, self.settings.momentum, (len(parents), 1))
         return np.asarray(grown[:, None] * ((1.0 - share) * out + share * momentum))
@@ -204,41 +204,44 @@ class _Walker:
     def _straight_out(self, q: FloatArray) -> FloatArray:
         """Joint rates (N, n) per metre that the tool moves along its -x, by damped least squares."""
         J = self.scene.chain.jacobian(q)
-        J = J * np.array([1.0, 1.0, 1.0, *[_ROTATION_LENGTH] * 3])[:, None]
-        target = np.zeros((len(q), 6))
-        target[:, :3] = -self.scene.chain.tcp_poses(q)[:, :3, 0]
-        normal = J @ J.transpose(0, 2, 1) + _DAMPING**2 * np.eye(6)
-        rate: FloatArray = (J.transpose(0, 2, 1) @ np.linalg.solve(normal, target[:, :, None]))[:, :, 0]
+        J = J * _WEIGHTED
+        target = np.zeros((len(q), 6, 1))
+        target[:, :3, 0] = -self.scene.chain.tcp_poses(q)[:, :3, 0]
+        turned = J.transpose(0, 2, 1)
+        rate: FloatArray = (turned @ np.linalg.solve(J @ turned + _DAMPED, target))[:, :, 0]
         return rate
 
     def _free(self, q: FloatArray, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, BoolArray]:
         """Candidates within the limits and free; and which parents lost all of theirs to collisions."""
         low, high = self.inside.low, self.inside.high
         beyond = (q < low) | (q > high)
-        names = self.scene.cell.robot.joint_names
-        for j, lost in enumerate((beyond & (np.cumsum(beyond, axis=1) == 1)).sum(axis=0)):
-            if lost:
-                self.walk.rejected[f"{names[j]} beyond its limit"] += int(lost)
-        within = ~beyond.any(axis=1)
-        q, owner = q[within], owner[within]
+        out = beyond.any(axis=1)
+        if out.any():
+            names = self.scene.cell.robot.joint_names
+            for j, lost in _counted(np.argmax(beyond[out], axis=1)):
+                self.walk.rejected[f"{names[j]} beyond its limit"] += lost
+            q, owner = q[~out], owner[~out]
         if len(q) == 0:
             return q, owner, np.ones(count, dtype=bool)
         near = self.scene.collision.min_distance(q, self.inside.threshold)
         free = (near.pair < 0) | (near.distance > self.inside.threshold[near.pair])
         self._count_pairs(near.pair[~free], "too near")
         self.dropped.append(q[~free])
-        return q[free], owner[free], ~np.isin(np.arange(count), owner[free])
+        q, owner = q[free], owner[free]
+        collided = np.ones(count, dtype=bool)
+        collided[owner] = False
+        return q, owner, collided
 
     def _certified(self, parents: _Population, q: FloatArray, owner: IntArray) -> IntArray:
         """The best candidates, in rank order, whose step from the parent is proved free."""
-        taken: Counter[int] = Counter()
-        ranked = []
+        population = self.settings.population
+        most, taken, ranked = max(_PER_PARENT, population // len(parents)), [0] * len(parents), []
         for k, parent in enumerate(owner.tolist()):
-            if taken[parent] < max(_PER_PARENT, self.settings.population // len(parents)):
+            if taken[parent] < most:
                 taken[parent] += 1
                 ranked.append(k)
-            if len(ranked) == self.settings.population:
-                break
+                if len(ranked) == population:
+                    break
         rows = np.array(ranked[: self.inside.work.left], dtype=np.int64)
         if len(rows) == 0:
             return rows
@@ -254,14 +257,13 @@ class _Walker:
     ) -> _Population:
         """Survivors with their spread: it shrinks in proportion to the gain of D."""
         gain = (total - parents.total[owner]) / np.maximum(parents.total[owner], _SMALLEST_D)
-        shrink = np.clip(1.0 - self.settings.shrink * gain, _SHARPEST, _WIDEST)
-        sigma = np.clip(
-            parents.sigma[owner] * shrink, self.settings.spread_least, self.settings.collision_spread
-        )
+        shrink = np.minimum(np.maximum(1.0 - self.settings.shrink * gain, _SHARPEST), _WIDEST)
+        sigma = np.maximum(parents.sigma[owner] * shrink, self.settings.spread_least)
+        sigma = np.minimum(sigma, self.settings.collision_spread)
         self.largest = max(self.largest, float(total.max(initial=0.0)))
         node = np.arange(len(self.nodes), len(self.nodes) + len(q))
         self.nodes.extend(q)
-        self.parents.extend(int(k) for k in parents.node[owner])
+        self.parents.extend(parents.node[owner].tolist())
         return _Population(q, total, sigma, q - parents.q[owner], node)
 
     def _finished(self, children: _Population) -> _Population:
@@ -272,7 +274,7 @@ class _Walker:
         far = int(np.argmax(zone))
         if zone[far] > self.best_zone:
             self.best_zone, self.walk.best = float(zone[far]), children.q[far]
-        done = self.problem.is_out(children.q)
+        done = self.problem.is_out(children.q, zone)
         grown = (children.total > self.first_total) | (self.area.pairs == 0)
         if (done & ~grown).any():
             self.walk.rejected["outside, but D did not grow"] += int((done & ~grown).sum())
@@ -287,9 +289,15 @@ class _Walker:
         return np.array([self.nodes[k] for k in path[::-1]])
 
     def _count_pairs(self, pairs: IntArray, what: str) -> None:
-        for z, count in zip(*np.unique(pairs[pairs >= 0], return_counts=True), strict=True):
-            pair = self.scene.collision.pairs[int(z)]
-            self.walk.rejected[f"{pair.body_a} {what} {pair.body_b}"] += int(count)
+        for z, count in _counted(pairs[pairs >= 0]):
+            pair = self.scene.collision.pairs[z]
+            self.walk.rejected[f"{pair.body_a} {what} {pair.body_b}"] += count
+
+
+def _counted(numbers: IntArray) -> list[tuple[int, int]]:
+    """Every one of the numbers, none negative, and how often it is there, in order."""
+    counts = np.bincount(numbers)
+    return [(z, int(counts[z])) for z in np.flatnonzero(counts).tolist()]
 
 
 def _joined(a: _Population, b: _Population) -> _Population:

@@ -18,6 +18,7 @@ from ir_planner.errors import TimingError
 from ir_planner.scene import Dynamics, MotionLimits
 from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.ptp import torque_per_segment
+from ir_planner.timing.spline_use import spline_use
 from ir_planner.timing.time_law import GRID_NS, GRID_S
 
 _ROUNDS = 14
@@ -41,19 +42,21 @@ def time_spline(
     if given is None:
         steps = _even(1.5 * natural_durations(points, limits.velocity))
         for _ in range(_ROUNDS):
-            use = _interval_use(_spline(points, steps, joint_names), len(points), limits, dynamics)
+            use = spline_use(points, steps * GRID_S, limits, dynamics)
             steps = _even(steps * GRID_S * np.clip(use, 0.6, 1.7) ** 0.6)
     else:
         steps = _even(given)
     for k in range(_STRETCHES):
-        trajectory = _spline(points, steps, joint_names)
-        use = _interval_use(trajectory, len(points), limits, dynamics)
-        worst = float(use.max())
+        worst = float(spline_use(points, steps * GRID_S, limits, dynamics).max())
         if worst <= 1.0:
-            return trajectory
+            trajectory = _spline(points, steps, joint_names)
+            worst = float(_interval_use(trajectory, len(points), limits, dynamics).max())
+            if worst <= 1.0:
+                return trajectory
         # gravity doesn't fall with speed: for torque the factor is too small, the more the nearer it comes
         steps = _even(steps * GRID_S * max(worst, 1.0 + _LEAST_STRETCH * 2**k))
-    joint = int(np.argmax(torque_per_segment(trajectory, dynamics).max(axis=0)))
+    slowest = torque_per_segment(_spline(points, steps, joint_names), dynamics)
+    joint = int(np.argmax(slowest.max(axis=0)))
     raise TimingError(f"joint {joint + 1}: its torque does not carry the load along these points", joint)
 
 
