@@ -18,6 +18,7 @@ from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.settings import check_settings, setting
 from ir_planner.request import Work
 from ir_planner.service.exit import Exit
+from ir_planner.service.exit_population import ExitPopulation, counted, joined
 from ir_planner.service.exit_search import ExitsFound, WalkRecord
 from ir_planner.service.step_weights import step_weights
 
@@ -96,25 +97,6 @@ class Walk:
     record: WalkRecord | None = None
 
 
-@dataclass(eq=False)
-class _Population:
-    """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, index of their
-    node.
-    """
-
-    q: FloatArray
-    total: FloatArray
-    sigma: FloatArray
-    step: FloatArray
-    node: IntArray
-
-    def of(self, rows: IntArray) -> "_Population":
-        return _Population(self.q[rows], self.total[rows], self.sigma[rows], self.step[rows], self.node[rows])
-
-    def __len__(self) -> int:
-        return len(self.q)
-
-
 def withdraw(problem: Exit, settings: ModifiedGa, rng: np.random.Generator, wanted: int) -> Walk:
     """Search from the interaction configuration until `wanted` paths end outside.
 
@@ -140,7 +122,7 @@ class _Walker:
 
     def run(self, wanted: int) -> Walk:
         n, count = len(self.nodes[0]), self.settings.population
-        population = _Population(
+        population = ExitPopulation(
             self.nodes[0][None],
             np.array([self.first_total]),
             np.array([self.settings.spread]),
@@ -162,7 +144,7 @@ class _Walker:
         counts, distance = (self.walk.generations, self.walk.candidates), (self.first_total, self.largest)
         return WalkRecord(kept, parents, np.concatenate(self.dropped), *counts, distance)
 
-    def _next(self, parents: _Population, offspring: int) -> _Population:
+    def _next(self, parents: ExitPopulation, offspring: int) -> ExitPopulation:
         """One generation: perturb, drop, rank, certify, keep the best."""
         owner = np.repeat(np.arange(len(parents)), offspring)
         mean = self._mean(parents)
@@ -185,11 +167,11 @@ class _Walker:
         if len(stuck):  # all of its offspring collide, or all steps do: look 1 rad around it
             stay = parents.of(stuck)
             wide = np.full(len(stuck), self.settings.collision_spread)
-            again = _Population(stay.q, stay.total, wide, stay.step * 0.0, stay.node)
-            children = _joined(children, again)
+            again = ExitPopulation(stay.q, stay.total, wide, stay.step * 0.0, stay.node)
+            children = joined(children, again)
         return children
 
-    def _mean(self, parents: _Population) -> FloatArray:
+    def _mean(self, parents: ExitPopulation) -> FloatArray:
         """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
         counted = self.area.pairs > 0  # a zone without bodies has no D
         ratio = parents.total / self.first_total if counted else np.ones(len(parents))
@@ -218,7 +200,7 @@ class _Walker:
         out = beyond.any(axis=1)
         if out.any():
             names = self.scene.cell.robot.joint_names
-            for j, lost in _counted(np.argmax(beyond[out], axis=1)):
+            for j, lost in counted(np.argmax(beyond[out], axis=1)):
                 self.walk.rejected[f"{names[j]} beyond its limit"] += lost
             q, owner = q[~out], owner[~out]
         if len(q) == 0:
@@ -232,7 +214,7 @@ class _Walker:
         collided[owner] = False
         return q, owner, collided
 
-    def _certified(self, parents: _Population, q: FloatArray, owner: IntArray) -> IntArray:
+    def _certified(self, parents: ExitPopulation, q: FloatArray, owner: IntArray) -> IntArray:
         """The best candidates, in rank order, whose step from the parent is proved free."""
         population = self.settings.population
         most, taken, ranked = max(_PER_PARENT, population // len(parents)), [0] * len(parents), []
@@ -253,8 +235,8 @@ class _Walker:
         return certified
 
     def _children(
-        self, parents: _Population, q: FloatArray, owner: IntArray, total: FloatArray
-    ) -> _Population:
+        self, parents: ExitPopulation, q: FloatArray, owner: IntArray, total: FloatArray
+    ) -> ExitPopulation:
         """Survivors with their spread: it shrinks in proportion to the gain of D."""
         gain = (total - parents.total[owner]) / np.maximum(parents.total[owner], _SMALLEST_D)
         shrink = np.minimum(np.maximum(1.0 - self.settings.shrink * gain, _SHARPEST), _WIDEST)
@@ -264,9 +246,9 @@ class _Walker:
         node = np.arange(len(self.nodes), len(self.nodes) + len(q))
         self.nodes.extend(q)
         self.parents.extend(parents.node[owner].tolist())
-        return _Population(q, total, sigma, q - parents.q[owner], node)
+        return ExitPopulation(q, total, sigma, q - parents.q[owner], node)
 
-    def _finished(self, children: _Population) -> _Population:
+    def _finished(self, children: ExitPopulation) -> ExitPopulation:
         """Take those out of the population that have left the zone; they count where D grew."""
         if len(children) == 0:
             return children
@@ -289,17 +271,6 @@ class _Walker:
         return np.array([self.nodes[k] for k in path[::-1]])
 
     def _count_pairs(self, pairs: IntArray, what: str) -> None:
-        for z, count in _counted(pairs[pairs >= 0]):
+        for z, count in counted(pairs[pairs >= 0]):
             pair = self.scene.collision.pairs[z]
             self.walk.rejected[f"{pair.body_a} {what} {pair.body_b}"] += count
-
-
-def _counted(numbers: IntArray) -> list[tuple[int, int]]:
-    """Every one of the numbers, none negative, and how often it is there, in order."""
-    counts = np.bincount(numbers)
-    return [(z, int(counts[z])) for z in np.flatnonzero(counts).tolist()]
-
-
-def _joined(a: _Population, b: _Population) -> _Population:
-    both = ((getattr(a, name), getattr(b, name)) for name in a.__dataclass_fields__)
-    return _Population(*(np.concatenate(pair) for pair in both))
