@@ -97,3 +97,15 @@ def test_a_coarse_solution_less_its_margin_is_below_the_planner_s_movement(
         report = plan.report
         cost = report.energy - report.base_energy + options.time_value * report.duration
         assert (1.0 - MARGIN) * coarse.between(a, b) <= cost
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_coarse_movement_whose_ends_are_turned_alike_costs_the_same(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    whole = 2.0 * np.pi * np.array([0, 0, 0, 1, 0, 1])  # the axes that turn twice
+    low, high = (0.8 * bound for bound in (ROBOT.position_min, ROBOT.position_max))
+    first, second = rng.uniform(low, high - whole, (2, ROBOT.n))
+    coarse = CoarseCost(asked(SCENE, PlanOptions()), Rates(1.0, 500.0))
+    turned = coarse.between(first + whole, second + whole)
+    assert turned == pytest.approx(coarse.between(first, second), rel=0.1 * MARGIN)

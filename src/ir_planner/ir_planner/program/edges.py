@@ -32,6 +32,7 @@ class CostEdges:
         ]
         self._looked_at: set[Part] = set()
         self._costs: dict[Turned, float] = {}
+        self._coarse_found: dict[tuple[int, bytes, bytes], float] = {}
 
     def hops(self) -> list[Hop]:
         """All hops with what physics demands of their parts."""
@@ -88,8 +89,10 @@ class CostEdges:
     def _coarse(self, part: Part) -> Settled:
         self.movements.context.work.check()
         first, second = self.movements.ends(part)
-        value = self._coarse_costs[part.hop].between(first, second)
-        return Settled(value * (1.0 - MARGIN), exact=False, proved=False)
+        turned = part.hop, _turned(first), np.round(second - first, 6).tobytes()
+        if turned not in self._coarse_found:  # ends that differ by the same whole turns
+            self._coarse_found[turned] = self._coarse_costs[part.hop].between(first, second)
+        return Settled(self._coarse_found[turned] * (1.0 - MARGIN), exact=False, proved=False)
 
     def _planned(self, parts: list[Part]) -> list[Settled]:
         """Costs of the movements; a service line that is another one turned costs what that one does."""
@@ -108,7 +111,7 @@ class CostEdges:
         if part.kind == ACROSS:
             return part
         points = self.movements.nodes(part)[0].line.points
-        return part.hop, part.kind, np.round(np.stack([np.sin(points), np.cos(points)]), 6).tobytes()
+        return part.hop, part.kind, _turned(points)
 
 
 class TravelEdges:
@@ -161,6 +164,11 @@ class TravelEdges:
             np.inf if isinstance(found, Failure) else found.consumption.movement_cost for found in planned
         ]
         return [Settled(cost, exact=True) for cost in costs]
+
+
+def _turned(q: FloatArray) -> bytes:
+    """What configurations (..., n) have in common that differ by whole turns of joints."""
+    return np.round(np.stack([np.sin(q), np.cos(q)]), 6).tobytes()
 
 
 def _arrivals(nodes: list[Node]) -> FloatArray:
