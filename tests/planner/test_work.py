@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 
@@ -10,6 +11,9 @@ import pytest
 from asking import planned
 
 from ir_msgs_py.options import PlanOptions
+from ir_planner.program.parallel import mapped
+from ir_planner.request.context import Context
+from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search import SEARCHES
@@ -31,3 +35,10 @@ def test_max_iterations_is_never_exceeded(planner_id: str, allowed: int, scene_o
     plan = planned(np.array(task.start), np.array(task.goal), scene, options, work)
     assert plan.info.iterations <= allowed
     assert not plan.info.truncated
+
+
+def test_work_for_one_thread_is_done_by_the_thread_that_asks(demo_scene: PlanningScene) -> None:
+    work = Work(1000, time.monotonic() + 600.0, time.monotonic, threads=1)
+    context = Context(demo_scene, PlanOptions(), Journal(work, 0))
+    found = mapped(lambda item, mine: threading.get_ident(), range(8), context, 0, [1] * 8)
+    assert set(found) == {threading.get_ident()}

@@ -23,11 +23,11 @@ def mapped(
 ) -> list[Result]:
     """task(item, context of its own) for every item, in order; what each did is added to `context`'s journal.
 
-    improvement: work of each for better answers; most: of each at all. threads: 0: as many as there are
-    cores. Raises what the first failing task raises, CancelledError when asked to stop.
+    improvement: work of each for better answers; most: of each at all. threads: 0: those of the context's
+    work. Raises what the first failing task raises, CancelledError when asked to stop.
     """
     own = [_own(context, improvement, left) for left in most]
-    count = min(threads or len(os.sched_getaffinity(0)), len(items))
+    count = min(threads or context.work.threads or len(os.sched_getaffinity(0)), len(items))
     if count <= 1:
         results = [task(item, mine) for item, mine in zip(items, own, strict=True)]
     else:
@@ -44,5 +44,5 @@ def mapped(
 def _own(context: Context, improvement: int, left: int) -> Context:
     """The context with so much work and a journal of its own."""
     work = context.work
-    mine = Work(left, work.deadline, work.clock, work.cancelled, improvement)
+    mine = Work(left, work.deadline, work.clock, work.cancelled, improvement, work.threads)
     return Context(context.scene, context.options, Journal(mine, context.journal.seed), context.station)

@@ -18,7 +18,8 @@ class Work:
 
     `max_iterations`: edges that searches may certify; the evaluations of a descent count as edges too.
     `deadline` [s] on `clock`. `cancelled` is asked at every step. `improvement`: how much of the work may go
-    into better answers once there is one.
+    into better answers once there is one. `threads`: that may share it, 0: one per core; no answer depends on
+    it.
     """
 
     max_iterations: int
@@ -26,6 +27,7 @@ class Work:
     clock: Clock
     cancelled: Callable[[], bool] = lambda: False
     improvement: int = 2_500
+    threads: int = 0
     iterations: int = field(default=0, init=False)
     truncated: bool = field(default=False, init=False)
 

@@ -107,11 +107,11 @@ class Maker:
 
 
 def work_of(request: ProgramRequest) -> Work:
-    """As much as the planner gives a program of so many stops."""
+    """As much as the planner gives a program of so many stops, in one thread: processes share the cores."""
     stops, settings = max(len(request.stations or request.cell.program), 1), request.settings
     most = (request.options.max_iterations or settings.max_iterations) * stops
     better = request.options.max_iterations or settings.improvement_iterations
-    return Work(most, time.monotonic() + NEVER, time.monotonic, improvement=better)
+    return Work(most, time.monotonic() + NEVER, time.monotonic, improvement=better, threads=1)
 
 
 def refused(status: Status) -> Row:
