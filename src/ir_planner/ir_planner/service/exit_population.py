@@ -20,7 +20,7 @@ class ExitPopulation:
     node: IntArray
 
     def of(self, rows: IntArray) -> "ExitPopulation":
-        """Some of them."""
+        """Those of the `rows` (M,)."""
         return ExitPopulation(
             self.q[rows], self.total[rows], self.sigma[rows], self.step[rows], self.node[rows]
         )
@@ -36,6 +36,6 @@ def joined(a: ExitPopulation, b: ExitPopulation) -> ExitPopulation:
 
 
 def counted(numbers: IntArray) -> list[tuple[int, int]]:
-    """Every one of the numbers, none negative, and how often it is there, in order."""
+    """Every one of the numbers (N,), none negative, and how often it is there, in order."""
     counts = np.bincount(numbers)
     return [(z, int(counts[z])) for z in np.flatnonzero(counts).tolist()]
