@@ -100,3 +100,25 @@ def test_types_are_found_by_the_names_that_people_type():
             interface_type(name, "srv")
     with pytest.raises(UnknownTypeError, match="write package/msg/Name"):
         interface_type("Status", "msg")
+
+
+@pytest.mark.parametrize(
+    ("message_type", "text", "sentence"),
+    [
+        (PlanOptions, "{seed: 1, seed: 2}", 'field "seed" stands twice, in line 1'),
+        (SetLoad.Request, "mass: 1\nload: a\nmass: 2", 'field "mass" stands twice, in line 1 and line 3'),
+        (SetLoad.Request, "{center_of_mass: {x: 1, y: 2, x: 1}}", 'field "x" stands twice, in line 1'),
+        (SetLoad.Request, '{mass: 1, "mass": 1}', 'field "mass" stands twice, in line 1'),
+    ],
+)
+def test_a_field_that_stands_twice_is_refused_by_its_name(
+    message_type: type, text: str, sentence: str
+) -> None:
+    with pytest.raises(MessageTextError) as refused:
+        message_from_yaml(message_type, text)
+    assert str(refused.value) == sentence
+
+
+def test_fields_of_one_name_in_several_places_are_several_fields() -> None:
+    text = "{reference: {points: [{positions: [1]}, {positions: [2]}]}}"
+    assert len(message_from_yaml(PlanTrajectory.Request, text).reference.points) == 2

@@ -27,13 +27,29 @@ _TRUE = frozenset({"true", "yes", "on", "1"})
 _FALSE = frozenset({"false", "no", "off", "0"})
 
 
+class _Text(yaml.BaseLoader):
+    """Text alone, no guesses of its type. A field that stands twice is refused: one would not count."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """The fields of a mapping."""
+        seen: dict[str, int] = {}
+        for key, _ in node.value:
+            name, line = str(key.value), key.start_mark.line + 1
+            if name in seen:
+                where = f"line {seen[name]} and line {line}" if seen[name] != line else f"line {line}"
+                raise MessageTextError(f'field "{name[:60]}" stands twice, in {where}')
+            seen[name] = line
+        return super().construct_mapping(node, deep)
+
+
 def message_from_yaml(message_type: Any, text: str) -> Any:
     """Message of this type; missing fields keep their defaults, "" is the default message.
 
-    Raises MessageTextError naming the field: unknown (lists the known ones), of a wrong kind or out of range.
+    Raises MessageTextError naming the field: unknown (lists the known ones), of a wrong kind, out of range or
+    there twice.
     """
     try:
-        content = yaml.load(text, Loader=yaml.BaseLoader)  # only text
+        content = yaml.load(text, Loader=_Text)
     except yaml.YAMLError as error:
         raise MessageTextError(f"the text is not YAML: {' '.join(str(error).split())}") from error
     message = message_type()
