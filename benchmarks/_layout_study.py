@@ -10,13 +10,14 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 
+from _layout_variants import grid_claims
 from _results import Claim, at_least, at_most, line_of
 
 from ir_studies import LayoutSettings, Means, run_layout
 from ir_studies.layout import Layouts
 from ir_studies.layout.summary import ends
 
-LAYOUT_PARTS = ("grid", "timed_grid", "demonstration", "speed")
+LAYOUT_PARTS = ("grid", "timed_grid", "grids", "demonstration", "speed")
 EVERYTHING = 1000.0  # a margin that excludes nothing
 STATIONS = (
     "infeed_pick",
@@ -59,6 +60,7 @@ def layout_claims(cell: str, parts: Collection[str], out: Path | None, *, quick:
         "timed_grid": lambda folder: bounded_against_exhaustive(
             in_cycle(timed, folder), "cycle time", folder
         ),
+        "grids": lambda folder: grid_claims(folder / "grids", quick=quick),
         "demonstration": lambda folder: [] if quick else demonstration(folder),
         "speed": lambda folder: speed(small, folder, 6 if quick else 24),
     }

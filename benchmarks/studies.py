@@ -9,9 +9,9 @@ seeds; Coal looks at its answers every 0.0005 rad, at so many per planner and ce
 cells with one request per run, is killed with SIGKILL once it has made a third, and goes on; its table is
 held against that of an arena which ran through, without the columns of times and without planners that can't
 promise the same bytes. Layout studies of the demonstration: the bounds against an exhaustive grid, free and
-in a cycle time; at least 1,000 placements against the given one; and how many programs one, two and four
-processes plan per second. --only runs one of these parts; a layout study that was interrupted goes on where
-it ended when the same --out is given.
+in a cycle time, and again on variants of bundled cells; at least 1,000 placements against the given one; and
+how many programs one, two and four processes plan per second. --only runs one of these parts; a layout study
+that was interrupted goes on where it ended when the same --out is given.
 """
 
 from __future__ import annotations

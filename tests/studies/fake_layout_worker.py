@@ -15,7 +15,7 @@ for line in sys.stdin:
     coarse = 1000.0 + 400.0 * ((x - 0.15) ** 2 + (y + 0.2) ** 2)
     if words["stage"] == "look":
         row = {"solved": True, "coarse": [coarse for _ in words["payloads"]]}
-        if x > 0.4:
+        if x > 0.4 or "nowhere" in sys.argv:
             row = {"solved": False, "kind": "out of reach", "message": "station infeed_pick is too far"}
         print(json.dumps(row), flush=True)
         continue

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -96,6 +98,28 @@ def test_what_reaches_into_each_other_and_below_the_floor_is_named() -> None:
         ("outfeed_belt", "cabinet"),
         ("gauge_table", "floor"),
     }
+
+
+def test_a_door_needs_its_place_in_every_state() -> None:
+    lathe = DEMO.machine("lathe")
+    up = next(body for body in lathe.bodies if body.name == "lathe_door_up")
+    wide = replace(up, pose=up.pose @ shifted(-1.0), name="lathe_door_down")
+    bodies = tuple(wide if body.name == wide.name else body for body in lathe.bodies)
+    cell = replace(
+        DEMO,
+        equipment=tuple(replace(m, bodies=bodies) if m is lathe else m for m in DEMO.equipment),
+    )
+    closed = cell.with_equipment("lathe", state="door_closed")
+    places = {"equipment.gauge.x": -1.7, "equipment.gauge.y": 0.1, "equipment.gauge.z": 1.2}
+    opened, shut = (Placing().cell(one, places) for one in (cell, closed))
+    assert overlaps(opened) == overlaps(shut)
+    assert any("lathe_door_down" in pair for pair in overlaps(opened))
+
+
+def shifted(x: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[0, 3] = x
+    return pose
 
 
 @settings(max_examples=50)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from ir_description import load_cell
+from ir_description import cell_to_yaml, load_cell
 from ir_studies import LayoutSettings, Means, read_layout, run_layout
 from ir_studies.errors import FolderError, StoppedError
 from ir_studies.layout import Layouts
@@ -149,3 +150,80 @@ def test_where_nothing_is_possible_the_study_says_why(laid: Laid) -> None:
     assert found.finals[0][0].is_given
     assert "None of the others is possible" in found.summary
     assert "out of reach 5" in found.summary
+
+
+def test_where_the_given_placement_is_the_best_the_study_says_so(laid: Laid) -> None:
+    said = laid(replace(SPREAD, base={"x": (-0.9, -0.5)}, placements=20)).summary
+    assert "The given placement is the best of those that were planned" in said
+    assert "Best of the others (" in said
+    assert "It takes more: 1" in said
+    assert "zero lies in it" not in said
+
+
+def test_only_the_given_placement(laid: Laid) -> None:
+    assert "No other was looked at: the given placement stays." in laid(replace(SPREAD, placements=1)).summary
+
+
+def test_why_the_others_were_not_planned(laid: Laid) -> None:
+    by_bound = laid(replace(GRID, plans=100), "a").summary
+    assert re.search(r"each of the \d\d that were planned, by more than 1 % of these", by_bound)
+    assert "at most 16 plans were asked for" in laid(replace(GRID, plans=16), "b").summary
+
+
+def test_what_stands_as_given_is_no_part_of_a_job(laid: Laid) -> None:
+    known = laid(replace(GRID, steps=5)).known
+    assert known[0].placement.values == {}
+    assert known[0].placement.plan(GRID.conditions[0]).words["values"] == {}
+    beside = [one.placement.values for one in known if len(one.placement.values) == 1]
+    assert len(beside) == 8
+
+
+def test_rounds_go_on_over_all_ranges_while_nothing_is_possible(laid: Laid, tmp_path: Path) -> None:
+    far = cell_to_yaml(replace(load_cell("demo"), name="far"))
+    (tmp_path / "far.yaml").write_text(far)
+    settings = replace(SPREAD, cell=str(tmp_path / "far.yaml"), base={"x": (0.45, 0.9), "y": (0.0, 0.5)})
+    found = laid(replace(settings, placements=60), "out", "nowhere")
+    assert len(found.known) == 60
+    assert "No placement is possible." in found.summary
+
+
+def test_the_cell_of_a_study_is_the_one_that_it_began_with(laid: Laid, tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(cell_to_yaml(load_cell("demo")))
+
+    def edited(*_: object) -> None:
+        path.write_text("format: ir_cell/1\nname: half saved")
+
+    found = laid(replace(SPREAD, cell=str(path), placements=20), progress=edited)
+    assert load_cell(str(tmp_path / "out" / "best_1.yaml")).name == "demo_best_1"
+    assert "placements looked at" in found.summary
+
+
+def test_a_study_that_keeps_fewer_leaves_no_cell_of_one_that_kept_more(laid: Laid, tmp_path: Path) -> None:
+    laid(replace(SPREAD, keep=3))
+    mine = tmp_path / "out" / "best_9.yaml"
+    mine.write_text(cell_to_yaml(load_cell("demo")))
+    laid(replace(SPREAD, keep=1))
+    assert sorted(path.name for path in (tmp_path / "out").glob("*.yaml")) == ["best_1.yaml", "best_9.yaml"]
+
+
+@pytest.mark.parametrize("name", ["base", "tool", "a.b"])
+def test_a_machine_may_be_called_like_what_else_moves(laid: Laid, tmp_path: Path, name: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(cell_to_yaml(load_cell("demo")).replace("name: gauge\n", f"name: {name}\n"))
+    moved = {"base": {"x": (-0.2, 0.2)}, "equipment": {name: {"x": (-0.3, 0.3)}}}
+    laid(replace(SPREAD, cell=str(path), placements=20, **moved))
+    page = (tmp_path / "out" / "index.html").read_text()
+    at = [re.findall(r'class="given" d="M(\S+) ', view)[0] for view in page.split('class="plan"')[1:]]
+    assert len(set(at)) == 2  # the base stands somewhere else than the machine
+
+
+def test_no_mark_lies_outside_its_picture(laid: Laid, tmp_path: Path) -> None:
+    laid(replace(SPREAD, base={"x": (-8.0, 0.3), "y": (-9.0, 0.2)}, placements=40))
+    page = (tmp_path / "out" / "index.html").read_text()
+    view = page.split('class="plan"')[1].split("</svg>")[0]
+    width, height = (float(one) for one in re.findall(r'viewBox="0 0 (\S+) (\S+)"', view)[0])
+    marks = re.findall(r'(?:cx="|class="cross" d="M)(-?[\d.]+)(?:" cy="| )(-?[\d.]+)', view)
+    assert len(marks) > 30
+    assert all(0.0 <= float(x) <= width and 0.0 <= float(y) <= height for x, y in marks)
+    assert height <= 1.6 * width

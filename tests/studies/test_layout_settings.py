@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 import yaml
 
+from ir_description import cell_to_yaml, load_cell
 from ir_studies import SettingsError, read_layout, study_of
 from ir_studies.layout import EXAMPLE
 
@@ -46,6 +49,8 @@ def test_the_example_is_read_and_names_every_key() -> None:
         (MOVES + "stations: [nowhere]\n", "stations: 'nowhere' is unknown"),
         (MOVES + "payloads: {gear: [0]}\n", "payloads: gear is 0: it must be a number in 0.001 .. 2000"),
         (MOVES + "payloads: {gear: []}\n", "make 0 conditions"),
+        (MOVES + f"payloads: {{gear: {list(range(1, 52))}}}\n", "make 51 conditions: 1 to 50"),
+        (MOVES + f"cycle_times: {list(range(20_000))}\n", "cycle_times has 20000 values: at most 1000"),
         (MOVES + "cycle_times: [-1]\n", "cycle_times is -1"),
         (MOVES + "cycle_times: []\n", "make 0 conditions"),
         (MOVES + "cycle_times: [0, 0]\n", "cycle_times names one twice"),
@@ -80,3 +85,50 @@ def test_the_goal_in_the_documentation_carries_the_settings_as_they_are(tmp_path
     shown = 'ir() { printf %s "${@: -1}"; }\n' + command
     goal = subprocess.run(["bash", "-c", shown], cwd=tmp_path, capture_output=True, check=True).stdout
     assert study_of(yaml.safe_load(goal)["settings"]) == study_of(EXAMPLE)
+
+
+PERMUTED = """\
+keep: 5
+cycle_times: [0]
+equipment:
+  outfeed: {y: [-0.3, 0.3], x: [-0.2, 0.3]}
+  gauge: {turn_deg: [-20, 20], y: [-0.4, 0.4], x: [-0.3, 0.2]}
+park: {a2_deg: [-5, 30], a1_deg: [-40, 40]}
+base: {turn_deg: [-20, 20], z: [-0.1, 0.2], y: [-0.3, 0.3], x: [-0.3, 0.3]}
+cell: demo
+format: ir_layout/1
+"""
+
+
+def test_the_order_of_keys_says_nothing() -> None:
+    one, other = study_of(PERMUTED).settings, study_of(EXAMPLE).settings
+    assert one == other
+    assert json.dumps(asdict(one)) == json.dumps(asdict(other))
+    assert one.variables == other.variables
+
+
+def test_stations_may_be_visited_again_and_postures_between() -> None:
+    asked = "stations: [infeed_pick, home, infeed_pick, park]\n"
+    assert study_of(MOVES + asked).settings.stations == ("infeed_pick", "home", "infeed_pick", "park")
+
+
+def test_conditions_that_differ_a_little_are_known_apart() -> None:
+    asked = "cycle_times: [2017.281, 2017.284, 13]\npayloads: {gear: [10, 10.000001]}\n"
+    texts = [condition.text for condition in study_of(MOVES + asked).settings.conditions]
+    assert texts[0] == "2017.281 s gear 10 kg"
+    assert texts[2] == "13 s gear 10 kg"
+    assert len(set(texts)) == 6
+
+
+def test_many_masses_of_many_parts_are_counted_before_they_are_combined(tmp_path: Path) -> None:
+    cell = load_cell("demo")
+    load = replace(cell.part("gear").load, capsules=())
+    others = tuple(
+        replace(cell.part("gear"), load=replace(load, name=f"gear_{k}"), station="", bodies=())
+        for k in range(8)
+    )
+    (tmp_path / "many.yaml").write_text(cell_to_yaml(replace(cell, parts=(*cell.parts, *others))))
+    masses = ", ".join(f"gear_{k}: {list(range(1, 101))}" for k in range(8))
+    asked = f"format: ir_layout/1\ncell: {tmp_path}/many.yaml\nbase: {{x: [0, 1]}}\npayloads: {{{masses}}}\n"
+    with pytest.raises(SettingsError, match="make 10000000000000000 conditions"):
+        study_of(asked)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeVar
@@ -15,6 +16,33 @@ from ..errors import InputError
 from .output import ProgressLine
 
 Made = TypeVar("Made")
+
+
+class TimeLeft:
+    """How long the rest of a phase takes when it goes on as since its first job of this run."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._phase, self._of, self._first, self._done = "", 0, 0, 0
+        self._begun = clock()
+
+    def words(self, phase: str, done: int, of: int) -> str:
+        """The time left, or nothing where it isn't known yet."""
+        now = self._clock()
+        if (phase, of) != (self._phase, self._of) or done < self._done:
+            self._phase, self._of, self._first, self._begun = phase, of, done, now
+        self._done = done
+        if done in (self._first, of):
+            return ""
+        return f", about {_rounded((now - self._begun) * (of - done) / (done - self._first))} for the others"
+
+
+def _rounded(seconds: float) -> str:
+    """A duration as people say it."""
+    for unit, name in ((3600.0, "h"), (60.0, "min")):
+        if seconds >= 1.5 * unit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{max(seconds, 1.0):.0f} s"
 
 
 def add_study(parser: argparse.ArgumentParser, folder: str) -> None:
@@ -37,13 +65,13 @@ def settings_of(arguments: argparse.Namespace, command: str) -> str:
 
 def studied(arguments: argparse.Namespace, make: Callable[[Means], Made]) -> Made:
     """What `make` returns, with a line that says how far it is."""
-    made = [0, 0]
+    made, left = [0, 0], TimeLeft()
     if not 0 <= arguments.workers <= MOST_WORKERS:
         raise InputError(f"--workers is {arguments.workers}: it must be in 1 .. {MOST_WORKERS}")
 
     def show(phase: str, done: int, of: int, best: str) -> None:
         made[:] = done, of
-        line.show(f"{best}; {phase}" if best else phase, done, of, 0.0)
+        line.show(f"{best}; {phase}" if best else phase, done, of, 0.0, left.words(phase, done, of))
 
     try:
         with ProgressLine() as line:

@@ -36,8 +36,8 @@ class Variable:
 
     @property
     def owner(self) -> str:
-        """What moves: base, park, tool, or a machine's name."""
-        return self.name.removeprefix("equipment.").rpartition(".")[0]
+        """What moves: base, park, tool, or equipment. and a machine's name."""
+        return self.name.rpartition(".")[0]
 
     @property
     def part(self) -> str:

@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
-from ir_description import cell_to_yaml, load_cell
+from ir_description import Cell, cell_to_yaml
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder.report.files import write_output
 from ir_recorder.report.step_table import write_columns
@@ -27,29 +28,51 @@ _BEST_HEADS = (
     "rank,placement,condition,energy_j,low_j,high_j,spread_j,duration_s,moving_j,"
     "saved_j,saved_low_j,saved_high_j"
 )
-Cell = str | float | int
+Value: TypeAlias = "str | float | int"
 
 
 def write_outputs(
-    known: Sequence[Known], finals: Sequence[Sequence[Final]], settings: LayoutSettings, folder: Path
+    known: Sequence[Known],
+    finals: Sequence[Sequence[Final]],
+    settings: LayoutSettings,
+    given: Cell,
+    folder: Path,
 ) -> tuple[tuple[Path, ...], str]:
-    """Write table.csv, best_1.yaml and so on, index.html; the files, and the best as CSV.
+    """Write table.csv, best_1.yaml and so on, index.html; the files, and the best as CSV. given: the cell as
+    it was when the study began.
 
     Raises RecorderError for files that can't be written, or replaced.
     """
     rows = [_row(k, one, c, settings) for k, one in enumerate(known) for c in settings.conditions]
     columns = {name: [row[name] for row in rows] for name in rows[0]}
     written = [write_columns(columns, folder / "table.csv", _TABLE_START, ANYWHERE)]
-    given = load_cell(settings.cell)
-    for rank, own in enumerate((own for own in finals if not own[0].is_given), start=1):
+    others = [own for own in finals if not own[0].is_given]
+    for rank, own in enumerate(others, start=1):
         cell = settings.placing.cell(given, own[0].placement.values)
         content = cell_to_yaml(replace(cell, name=f"{cell.name}_best_{rank}")).encode()
         written.append(write_output(folder / f"best_{rank}.yaml", content, _CELL_START, ANYWHERE))
-    written.append(write_page(known, finals, settings, folder / "index.html"))
+    _remove_best(folder, given.name, len(others))
+    written.append(write_page(known, finals, settings, given, folder / "index.html"))
     return tuple(written), best_table(finals)
 
 
-def _row(k: int, known: Known, condition: Condition, settings: LayoutSettings) -> dict[str, Cell]:
+def _remove_best(folder: Path, name: str, kept: int) -> None:
+    """Remove the best of a study in this folder that kept more; other cells stay."""
+    for path in folder.glob("best_*.yaml"):
+        rank = path.stem.removeprefix("best_")
+        if rank.isdecimal() and int(rank) > kept and _named(path, f"{name}_best_{rank}"):
+            path.unlink()
+
+
+def _named(path: Path, name: str) -> bool:
+    """Whether a file is a cell of that name, as it was written here."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    content = path.read_bytes()
+    return content.startswith(_CELL_START) and f"name: {name}".encode() in content.splitlines()
+
+
+def _row(k: int, known: Known, condition: Condition, settings: LayoutSettings) -> dict[str, Value]:
     plan = known.plans.get(condition, {})
     kind, sentence = known.reason
     state = "impossible" if known.cost == math.inf else "planned" if known.planned else "looked at"

@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import linprog
 
-from ir_description import Body, Cell
+from ir_description import Body, Cell, Equipment
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.report.shapes import body_mesh
 
@@ -21,8 +21,10 @@ Solid = tuple[str, FloatArray]  # a body's name, points (V, 3) of its surface
 
 
 def overlaps(cell: Cell) -> set[tuple[str, str]]:
-    """Names of bodies of different machines that reach into each other, or below the floor."""
-    machines = [[one for body in each.world_bodies() for one in _solid(body)] for each in cell.equipment]
+    """Names of bodies of different machines that reach into each other, or below the floor, in any of their
+    states: a door that opens needs its place too.
+    """
+    machines = [[one for body in _bodies(each) for one in _solid(body)] for each in cell.equipment]
     sunk = {(name, "floor") for each in machines for name, points in each if points[:, 2].min() < 0.0}
     return (sunk if cell.floor else set()) | {
         (name, other)
@@ -31,6 +33,10 @@ def overlaps(cell: Cell) -> set[tuple[str, str]]:
         for other, others in second
         if _near(points, others) and not separable(points, others)
     }
+
+
+def _bodies(machine: Equipment) -> tuple[Body, ...]:
+    return machine.bodies_in(*(state.name for state in machine.states))
 
 
 def _solid(body: Body) -> Iterator[Solid]:

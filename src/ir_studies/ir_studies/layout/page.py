@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description import Cell, load_cell
+from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder.report.files import write_output
@@ -22,13 +22,14 @@ from ir_recorder.report.words import DASH, joules, millimetres, percent, text
 from ir_studies.layout.finals import Final
 from ir_studies.layout.freedom import Variable
 from ir_studies.layout.placement import Known
-from ir_studies.layout.plan_view import PlanView, colour, estimates, legend, mark, shown_range
+from ir_studies.layout.plan_view import Mark, PlanView, colour, estimates, legend, mark, shown_range
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import LayoutSettings
 from ir_studies.layout.summary import ends, of_condition, sentences
 from ir_studies.page import page
 
 _CHART, _HIGH, _LEFT, _BELOW = 340.0, 190.0, 52.0, 30.0  # width, height and room for numbers
+_MACHINE = "equipment."  # before the name of an owner that is one
 _SENTENCE = 300  # characters of a reason
 _HEADS = (
     "placement", "for", ">joules per cycle", ">90 % interval", ">between seeds", ">less than given",
@@ -37,16 +38,21 @@ _HEADS = (
 
 
 def write_page(
-    known: Sequence[Known], finals: Sequence[Sequence[Final]], settings: LayoutSettings, path: Path
+    known: Sequence[Known],
+    finals: Sequence[Sequence[Final]],
+    settings: LayoutSettings,
+    cell: Cell,
+    path: Path,
 ) -> Path:
     """Write the page in place of another page; its absolute path. PathError when it can't be written."""
-    return write_output(path, page_html(known, finals, settings).encode(), PAGE_START, ANYWHERE)
+    return write_output(path, page_html(known, finals, settings, cell).encode(), PAGE_START, ANYWHERE)
 
 
-def page_html(known: Sequence[Known], finals: Sequence[Sequence[Final]], settings: LayoutSettings) -> str:
-    """The page as text."""
+def page_html(
+    known: Sequence[Known], finals: Sequence[Sequence[Final]], settings: LayoutSettings, cell: Cell
+) -> str:
+    """The page as text. cell: as given."""
     said = "".join(f"<li>{text(one)}</li>" for one in sentences(known, finals, settings))
-    cell = load_cell(settings.cell)
     parts = {
         "title": f"Layout of {text(cell.name)}",
         "subtitle": text(
@@ -92,25 +98,28 @@ def _maps(
     """One view from above for everything that moves along the floor."""
     _, best = ends(finals)
     star = settings.placing.cell(cell, best[0].placement.values) if best else None
-    view = PlanView(cell, star)
     limits, costs = shown_range(known), dict(zip(map(id, known), estimates(known), strict=True))
     owners = [v.owner for v in settings.variables if v.part in ("x", "y") and v.owner != "tool"]
+    drawings: list[tuple[str, list[Mark]]] = []
     for owner in dict.fromkeys(owners):
         at = place_of(owner, cell)
-        prefix = "base" if owner == "base" else f"equipment.{owner}"
-        marks = []
+        marks: list[Mark] = []
         for one in sorted(known, key=lambda one: _drawn_last(one, costs[id(one)])):
-            shift = [one.placement.values.get(f"{prefix}.{axis}", 0.0) for axis in "xy"]
+            shift = [one.placement.values.get(f"{owner}.{axis}", 0.0) for axis in "xy"]
             marks.append((at + shift, *_mark_of(one, costs[id(one)], limits)))
         marks.append((at, "given", "", "as given"))
         if star is not None:
             marks.append((place_of(owner, star), "best", "", "best"))
-        yield f"<div><h3>{text(owner)}</h3>{view.drawn(f'Where {owner} stands', marks)}</div>"
+        drawings.append((owner.removeprefix(_MACHINE), marks))
+    places = [place for _, marks in drawings for place, *_ in marks]
+    view = PlanView(cell, star, np.reshape(places, (-1, 2)))
+    for name, marks in drawings:
+        yield f"<div><h3>{text(name)}</h3>{view.drawn(f'Where {name} stands', marks)}</div>"
 
 
 def place_of(owner: str, cell: Cell) -> FloatArray:
     """Where the base or a machine stands (2,) m."""
-    pose = cell.base_pose if owner == "base" else cell.machine(owner).pose
+    pose = cell.base_pose if owner == "base" else cell.machine(owner.removeprefix(_MACHINE)).pose
     return np.array(pose[:2, 3])
 
 

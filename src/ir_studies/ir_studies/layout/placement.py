@@ -18,9 +18,13 @@ FIRST_SEED = 0
 
 @dataclass(frozen=True)
 class Placement:
-    """Where things stand, by variable."""
+    """Where things stand, by variable. What stands as given is left out: its jobs are those of the cell."""
 
     values: Values
+
+    def __post_init__(self) -> None:
+        moved = {name: value for name, value in sorted(self.values.items()) if value}
+        object.__setattr__(self, "values", moved)
 
     @cached_property
     def key(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -16,6 +17,10 @@ from ir_studies.layout.placement import Known
 
 WIDTH = 520.0  # of a drawing; its height follows
 _MARGIN = 12.0
+_TALLEST = 1.5  # height of a drawing in widths
+_LEAST_M = 0.1  # m across it
+Mark: TypeAlias = "tuple[FloatArray, str, str, str]"
+"""A place (2,) m, its kind, its colour, its words."""
 _COLOURS = ("#1a7f5a", "#5aa02c", "#b5a900", "#e08a00", "#d1495b")  # from least cost to most
 
 
@@ -49,22 +54,25 @@ def legend(low: float, high: float) -> str:
         f'<span><span class="key" style="background:{one}"></span>{text(joules(float(at)))} …</span>'
         for one, at in zip(_COLOURS, steps, strict=False)
     )
-    rest = ("○ looked at only: estimated", "× impossible", "◆ as given", "★ best")
+    rest = ("○ looked at only: estimated", "× impossible", "◆ as given", "★ best_1.yaml")
     return f'<p class="key-row">{"".join(keys)}{"".join(f"<span>{one}</span>" for one in rest)}</p>'
 
 
 class PlanView:
-    """Draws places (2,) m of the world; given and best: the cell as it is and as it should be."""
+    """Draws places (2,) m of the world; given and best: the cell as it is and as it should be; places (N, 2):
+    what else must be in sight.
+    """
 
-    def __init__(self, given: Cell, best: Cell | None) -> None:
+    def __init__(self, given: Cell, best: Cell | None, places: FloatArray) -> None:
         self._outlines = [("was", one) for one in outlines(given)]
         self._outlines += [("best", one) for one in (outlines(best) if best is not None else ())]
-        corners = np.concatenate([points for _, points in self._outlines])
+        corners = np.concatenate([places, *(points for _, points in self._outlines)])
         self._low, high = corners.min(axis=0), corners.max(axis=0)
-        self._scale = (WIDTH - 2 * _MARGIN) / float(high[0] - self._low[0])
-        self._height = self._scale * float(high[1] - self._low[1]) + 2 * _MARGIN
+        across, up = (float(one) for one in high - self._low)
+        self._scale = (WIDTH - 2 * _MARGIN) / max(across, up / _TALLEST, _LEAST_M)
+        self._height = self._scale * up + 2 * _MARGIN
 
-    def drawn(self, name: str, marks: Sequence[tuple[FloatArray, str, str, str]]) -> str:
+    def drawn(self, name: str, marks: Sequence[Mark]) -> str:
         """SVG with marks: place (2,), kind (dot, open, cross, given, best), colour, words."""
         shapes = [
             f'<polygon class="{kind}" points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in self._at(points))}"/>'

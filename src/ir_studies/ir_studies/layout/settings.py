@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from ir_description import Cell, DescriptionError, load_cell
+from ir_description.cell import POSTURES
 from ir_studies.errors import SettingsError
 from ir_studies.layout.example import EXAMPLE
 from ir_studies.layout.freedom import JOINTS, TURNS, Placing, Range, Variable, variables
@@ -27,7 +29,9 @@ FORMAT = "ir_layout/1"
 METHODS = ("spread", "grid")
 MOST_PLACEMENTS = 100_000
 MOST_CONDITIONS = 50
+MOST_NAMES = 1000
 Ranges: TypeAlias = "Mapping[str, Range]"
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,13 @@ class Condition:
     @property
     def text(self) -> str:
         """In words."""
-        cycle = f"{self.cycle_time:g} s" if self.cycle_time else "free"
-        return " ".join([cycle, *(f"{name} {mass:g} kg" for name, mass in self.payload)])
+        cycle = f"{shortest(self.cycle_time)} s" if self.cycle_time else "free"
+        return " ".join([cycle, *(f"{name} {shortest(mass)} kg" for name, mass in self.payload)])
+
+
+def shortest(value: float) -> str:
+    """The shortest decimal that no other number has: rows are known by it."""
+    return repr(float(value)).removesuffix(".0")
 
 
 @dataclass(frozen=True)
@@ -75,8 +84,11 @@ class LayoutSettings:
         checked_numbers(self, _WHOLE, _REAL)
         if self.method not in METHODS:
             raise SettingsError(f"method is {self.method!r:.60}: known are {', '.join(METHODS)}")
-        self._check_names()
+        cell = _cell(self.cell)
+        self._check_names(cell)
         self._check_conditions()
+        for name, value in _in_order(self, cell).items():
+            object.__setattr__(self, name, value)
         if not self.variables:
             raise SettingsError("nothing may move: give ranges to base, equipment, park or tool")
         if self.method == "grid" and self.steps ** len(self.variables) > MOST_PLACEMENTS:
@@ -90,7 +102,7 @@ class LayoutSettings:
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """What may move, in the order of the file."""
+        """What may move: base, park, tool, then machines in the order of the cell."""
         groups = {"base": self.base, "park": self.park, "tool": self.tool}
         machines = {f"equipment.{name}": ranges for name, ranges in self.equipment.items()}
         return variables({**groups, **machines})
@@ -98,9 +110,14 @@ class LayoutSettings:
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """All cycle times with all masses."""
-        masses = product(*self.payloads.values())
+        masses = product(*self.payloads.values())  # few: _check_conditions counts them first
         payloads = [tuple(zip(self.payloads, one, strict=True)) for one in masses]
         return tuple(Condition(cycle, payload) for payload in payloads for cycle in self.cycle_times)
+
+    @property
+    def in_cycles(self) -> bool:
+        """Whether joules in a cycle time count, which are not in the unit of coarse movements, J."""
+        return any(self.cycle_times)
 
     @property
     def budget(self) -> dict[str, Any]:
@@ -108,12 +125,12 @@ class LayoutSettings:
         names = ("carried", "stations", "time_value", "safety_distance", "max_iterations")
         return {name: getattr(self, name) for name in names}
 
-    def _check_names(self) -> None:
-        cell = _cell(self.cell)
+    def _check_names(self, cell: Cell) -> None:
         machines = [machine.name for machine in cell.equipment]
         checked_known("equipment", self.equipment, machines)
         checked_known("carried", self.carried, machines)
-        checked_known("stations", self.stations, [station.name for station in cell.stations])
+        stops = [*(one.name for one in (*cell.stations, *cell.paths)), *POSTURES]
+        checked_known("stations", self.stations, stops)
         checked_known("payloads", self.payloads, [part.name for part in cell.parts])
         checked_known("park", self.park, JOINTS[: cell.robot.n])
         for name in ("base", "tool"):
@@ -126,14 +143,33 @@ class LayoutSettings:
             raise SettingsError(f"the cell {cell.name} has no program: name its stations")
 
     def _check_conditions(self) -> None:
+        count = math.prod([len(self.cycle_times), *map(len, self.payloads.values())])
+        if not 0 < count <= MOST_CONDITIONS:
+            said = f"cycle_times and payloads make {count} conditions"
+            raise SettingsError(f"{said}: 1 to {MOST_CONDITIONS}")
         for cycle in self.cycle_times:
             checked_number("cycle_times", cycle, 0.0, 604_800.0)
         for part, masses in self.payloads.items():
             for mass in masses:
                 checked_number(f"payloads: {part}", mass, 0.001, 2000.0)
-        if not 0 < len(self.conditions) <= MOST_CONDITIONS:
-            count = len(self.conditions)
-            raise SettingsError(f"cycle_times and payloads make {count} conditions: 1 to {MOST_CONDITIONS}")
+
+
+def _in_order(settings: LayoutSettings, cell: Cell) -> dict[str, Any]:
+    """The names of settings in the order of the cell: in which order a file has them says nothing."""
+
+    def ordered(values: Mapping[str, _Value], names: Iterable[str]) -> dict[str, _Value]:
+        return {name: values[name] for name in dict.fromkeys(names) if name in values}
+
+    machines, turns = [one.name for one in cell.equipment], TURNS["equipment"]
+    equipment = ordered(settings.equipment, machines)
+    return {
+        "base": ordered(settings.base, TURNS["base"]),
+        "park": ordered(settings.park, JOINTS),
+        "tool": ordered(settings.tool, TURNS["tool"]),
+        "carried": tuple(name for name in machines if name in settings.carried),
+        "equipment": {name: ordered(own, turns) for name, own in equipment.items()},
+        "payloads": ordered(settings.payloads, [part.name for part in cell.parts]),
+    }
 
 
 _WHOLE = (
@@ -192,7 +228,9 @@ def _mapping(key: str, value: Any) -> dict[str, Any]:
 def _list(key: str, value: Any) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
         raise SettingsError(f"{key} is {value!r:.60}: it must be a list")
-    if any(value.count(one) > 1 for one in value):
+    if len(value) > MOST_NAMES:
+        raise SettingsError(f"{key} has {len(value)} values: at most {MOST_NAMES}")
+    if key != "stations" and any(value.count(one) > 1 for one in value):
         raise SettingsError(f"{key} names one twice")
     return tuple(value)
 

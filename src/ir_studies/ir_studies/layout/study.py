@@ -56,5 +56,5 @@ def run_layout(settings: LayoutSettings, folder: str | Path, means: Means | None
             known = Search(settings, results.rows, made).run()
             made(final_jobs(known, settings), "error bars of the best", "")
         best = finals(known, settings, results.rows)
-    files, table = write_outputs(known, best, settings, into)
+    files, table = write_outputs(known, best, settings, cell, into)
     return Layouts(settings, tuple(known), best, files, table)

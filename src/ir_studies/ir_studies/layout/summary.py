@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from ir_recorder.report.words import joules, percent
-from ir_studies.layout.finals import Final
+from ir_studies.layout.finals import Final, mean_cost
 from ir_studies.layout.placement import Known
 from ir_studies.layout.settings import LayoutSettings
 
@@ -25,25 +25,34 @@ def sentences(
         f"{planned} planned in full."
     )
     if planned and planned + len(impossible) < len(known):
-        yield bound_words(settings)
+        yield bound_words(sum(one.planned for one in known), settings)
     given, best = ends(finals)
     if given is None and best is None:
         yield "No placement is possible."
     if given is None:
         yield "The given placement is impossible itself: " + given_reason(known)
+    if given is not None and best is not None and mean_cost(given) <= mean_cost(best):
+        yield "The given placement is the best of those that were planned: none of the others costs less."
     for one in best or ():
         yield words(one, None if given is None else of_condition(given, one))
     if given is not None and best is None:
-        yield "None of the others is possible: the given placement stays."
+        others = "None of the others is possible" if len(known) > 1 else "No other was looked at"
+        yield f"{others}: the given placement stays."
 
 
-def bound_words(settings: LayoutSettings) -> str:
-    """Why the others were not planned."""
-    if settings.plans:
+def bound_words(planned: int, settings: LayoutSettings) -> str:
+    """Why the others were not planned. planned: how many were, the impossible among them."""
+    if settings.plans and planned >= settings.plans:
         return f"The others were not planned: at most {settings.plans} plans were asked for."
+    by = f", by more than {100 * settings.margin:g} % of these" if settings.margin > 0.0 else ""
+    if settings.in_cycles:
+        return (
+            "One of the others can be the best only if it lies further below the line of joules over what "
+            f"coarse movements cost than each of the {planned} that were planned{by}."
+        )
     return (
-        f"By their bound none of the others can be the best by more than {100 * settings.margin:g} % "
-        "(coarse movements plus the least difference to a plan that was seen)."
+        "One of the others can be the best only if its plan costs less above its coarse movements than each "
+        f"of the {planned} that were planned{by}."
     )
 
 
@@ -63,23 +72,30 @@ def of_condition(own: Sequence[Final], like: Final) -> Final:
 
 
 def words(best: Final, given: Final | None) -> str:
-    """The best under a condition, against the given one."""
+    """The best of the others under a condition, against the given one."""
     within = best.interval
-    text = (
-        f"Best ({best.placement.key}; {best.condition.text}): {joules(best.mean())} at the mains per cycle, "
-        f"predicted, 90 % interval {joules(within.low)} to {joules(within.high)}"
+    worse = given is not None and best.mean("cost_j") > given.mean("cost_j")
+    name = "Best of the others" if worse else "Best"
+    said = (
+        f"{name} ({best.placement.key}; {best.condition.text}): {joules(best.mean())} at the mains per "
+        f"cycle, predicted, 90 % interval {joules(within.low)} to {joules(within.high)}"
     )
     if len(best.rows) > 1:
-        text += f", {joules(best.spread())} between {len(best.rows)} seeds"
-    if given is None:
-        return f"{text}."
+        said += f", {joules(best.spread())} between {len(best.rows)} seeds"
+    return f"{said}." if given is None else f"{said}; {against(best, given)}"
+
+
+def against(best: Final, given: Final) -> str:
+    """What a placement saves, or takes more than the given one, with its interval."""
     less, saved = best.saving(given)
-    sure = "" if saved.low > 0.0 else "; zero lies in it: it is open whether anything is saved"
+    does, sign = ("saves", 1.0) if less >= 0.0 else ("takes more:", -1.0)
+    low, high = sorted((sign * saved.low, sign * saved.high))
+    sure = "" if low > 0.0 else "; zero lies in it: it is open whether anything is saved"
     moving = best.mean("moving_j") / given.mean("moving_j") - 1.0
     return (
-        f"{text}; the given one {joules(given.mean())}. It saves {joules(less)}, "
-        f"{percent(less / given.mean()).lstrip('+')} "
-        f"(90 % interval {joules(saved.low)} to {joules(saved.high)}{sure}); of the movements alone "
+        f"the given one {joules(given.mean())}. It {does} {joules(sign * less)}, "
+        f"{percent(sign * less / given.mean()).lstrip('+')} "
+        f"(90 % interval {joules(low)} to {joules(high)}{sure}); of the movements alone "
         f"{percent(moving)}. A cycle takes {best.mean('duration_s'):.2f} s instead of "
         f"{given.mean('duration_s'):.2f} s."
     )
