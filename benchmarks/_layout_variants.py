@@ -75,7 +75,7 @@ def _below_base(machine: Equipment, cell: Cell) -> bool:
     return any(body.name in pair for body in machine.bodies for pair in cell.base_contacts)
 
 
-def _moved(cell: Cell, rng: np.random.Generator) -> dict[str, object]:
+def _moved(cell: Cell, rng: np.random.Generator) -> dict[str, Any]:
     """Two things that may move, and how far: the base, a machine with stations, the posture, the tool."""
     far = max(float(np.linalg.norm((s.pose - cell.base_pose)[:2, 3])) for s in cell.stations)
     machines = sorted({station.equipment for station in cell.stations})
@@ -88,7 +88,7 @@ def _moved(cell: Cell, rng: np.random.Generator) -> dict[str, object]:
         most = PARK_DEG if owner == "park" else TURN_DEG if part.endswith("_deg") else REACH * far
         width = round(most * rng.uniform(0.5, 1.0), 2)
         found.setdefault(owner, {})[part] = (-width, width)
-    own: dict[str, object] = {name: found.pop(name) for name in ("base", "park", "tool") if name in found}
+    own: dict[str, Any] = {name: found.pop(name) for name in ("base", "park", "tool") if name in found}
     return {**own, "equipment": found}
 
 
@@ -101,7 +101,7 @@ def grid_claims(folder: Path, *, quick: bool) -> list[Claim]:
     if not rows:
         return [enough]
     total = {key: sum(row[key] for row in rows) for key in ("plans", "grid_plans", "below_bound")}
-    deepest = max(row["percent_below"] for row in rows)
+    deepest = max(0.0, *(row["percent_below"] for row in rows))
     print(line_of({**total, "percent_below": deepest}))
     worst = max(row["lost_percent"] - row["spread_percent"] for row in rows)
     name = f"layout, {len(rows)} generated grids"

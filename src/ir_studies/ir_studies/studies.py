@@ -88,8 +88,9 @@ KINDS = {
 
 def read_study(path: str | Path) -> Study:
     """The study that a YAML file asks for; cell files count from its folder. SettingsError names the key."""
+    content = read_text(path)
     try:
-        return study_of(read_text(path), placed=beside(path))
+        return study_of(content, placed=beside(path))
     except SettingsError as error:
         raise SettingsError(f"{path}: {error}") from error
 

@@ -113,8 +113,9 @@ _REAL = (
 
 def read_settings(path: str | Path) -> ArenaSettings:
     """The settings of a YAML file; cell files count from its folder. SettingsError names the key."""
+    content = read_text(path)
     try:
-        return arena_settings(read_text(path), beside(path))
+        return arena_settings(content, beside(path))
     except SettingsError as error:
         raise SettingsError(f"{path}: {error}") from error
 

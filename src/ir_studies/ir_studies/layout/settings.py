@@ -129,8 +129,8 @@ class LayoutSettings:
         machines = [machine.name for machine in cell.equipment]
         checked_known("equipment", self.equipment, machines)
         checked_known("carried", self.carried, machines)
-        stops = [*(one.name for one in (*cell.stations, *cell.paths)), *POSTURES]
-        checked_known("stations", self.stations, stops)
+        stations, paths = ([one.name for one in cell.stations], [one.name for one in cell.paths])
+        checked_known("stations", self.stations, [*stations, *paths, *POSTURES])
         checked_known("payloads", self.payloads, [part.name for part in cell.parts])
         checked_known("park", self.park, JOINTS[: cell.robot.n])
         for name in ("base", "tool"):
@@ -192,8 +192,9 @@ _REAL = (
 
 def read_layout(path: str | Path) -> LayoutSettings:
     """The settings of a YAML file; a cell file counts from its folder. SettingsError names the key."""
+    content = read_text(path)
     try:
-        return layout_settings(read_text(path), beside(path))
+        return layout_settings(content, beside(path))
     except SettingsError as error:
         raise SettingsError(f"{path}: {error}") from error
 
