@@ -5,9 +5,18 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
+from dataclasses import asdict
 from typing import Any
 
-from ir_studies.arena.processor_time import charged, processor_time
+import pytest
+
+from ir_planner.search.with_ompl import charge_to, missing
+from ir_studies.arena import ArenaSettings, Entry
+from ir_studies.arena.maker import maker, warm_up
+from ir_studies.arena.processor_time import charged, excuse, others_time, processor_time
+
+ENTRY = Entry("rrt_connect", "open", "home->p1", 0, "", "synchronous")
 
 
 def test_a_process_that_is_charged_counts_also_when_it_has_ended(wait_for: Any) -> None:
@@ -30,3 +39,32 @@ def test_a_process_that_is_gone_costs_nothing() -> None:
     with charged(gone.pid):
         passed = processor_time() - begin
     assert passed <= time.process_time() - own
+
+
+def test_what_it_takes_to_start_a_process_counts_for_nobody(wait_for: Any) -> None:
+    busy = subprocess.Popen([sys.executable, "-S", "-c", "while True: pass"])
+    begin = others_time()
+    excuse(0.1)
+    try:
+        with charged(busy.pid):
+            wait_for(lambda: others_time() > begin, what="it counts from then on")
+            used = time.clock_gettime((~busy.pid << 3) | 2)
+            assert used >= 0.1
+            assert others_time() - begin == pytest.approx(used - 0.1, abs=0.05)
+    finally:
+        excuse(0.0)
+        busy.kill()
+        busy.wait()
+
+
+@pytest.mark.skipif(bool(missing()), reason=missing())
+def test_a_question_without_work_costs_a_planner_of_ompl_next_to_nothing() -> None:
+    settings = ArenaSettings(cells=("open",), planners=("rrt_connect",))
+    assert warm_up(settings) >= 0.0
+    try:
+        start = maker(asdict(settings))({**asdict(ENTRY)})["start_s"]
+        assert start > 0.0
+        assert warm_up(settings) < 0.5 * start  # without it
+    finally:
+        excuse(0.0)
+        charge_to(lambda process: nullcontext())

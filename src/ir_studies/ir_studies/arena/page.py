@@ -68,7 +68,7 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
         "above": f"{_ABOVE:g}",
         "longest": seconds(longest(runs)),
         "cells": "".join(_cell_section(runs, cell, titles, settings.planners) for cell in settings.cells),
-        "bindings": text(_bindings(settings.planners)),
+        "bindings": text(_bindings(runs, settings.planners)),
         "settings": text(settings_text(settings)),
         "data": json.dumps(
             {"end": longest(shown), "axes": list(_curves(shown, titles, settings.planners))},
@@ -89,17 +89,27 @@ def _subtitle(runs: Sequence[Run], settings: ArenaSettings, missing: int) -> str
     )
 
 
-def _bindings(planners: Sequence[str]) -> str:
-    """What is not alike for planners of OMPL, where there are any."""
-    names = ", ".join(name for name in planners if name in SEARCHES and needs_ompl(SEARCHES[name]))
+def _bindings(runs: Sequence[Run], planners: Sequence[str]) -> str:
+    """What counts for planners of OMPL and what is not alike for them, where there are any."""
+    names = [name for name in planners if name in SEARCHES and needs_ompl(SEARCHES[name])]
     if not names:
         return ""
+    own = [run for run in runs if run.entry.planner in names]
+    paid = sum("start_s" not in run.row for run in own)
+    starts = f"Loading OMPL counts for nobody, nor does starting a process for each request{_least(own)}. "
+    if paid:
+        starts += f"In {paid} of these runs, of an earlier version, starting them counted. "
     return (
-        f"Not alike: OMPL's planners ({names}) ask for each check on its own, through Python; the project's "
-        "searches ask for many in one call, so they make more of them in the same seconds. Each request "
-        "starts anew: a roadmap (prm) is not kept for the next one, and aorrtc, which goes on improving its "
-        "path, answers when its checks are spent, not with its first path."
+        f"{starts}Not alike: OMPL's planners ({', '.join(names)}) ask for each check on its own, through "
+        "Python; the project's searches ask for many in one call, so they make more of them in the same "
+        "seconds. Each request starts anew: a roadmap (prm) is not kept for the next one, and aorrtc, which "
+        "goes on improving its path, answers when its checks are spent, not with its first path."
     )
+
+
+def _least(runs: Sequence[Run]) -> str:
+    known = [run.number("start_s") for run in runs if run.number("start_s") > 0.0]
+    return f" ({milliseconds(float(np.median(known)))} each)" if known else ""
 
 
 def _titles(cells: Sequence[str]) -> dict[str, str]:
