@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -61,6 +62,10 @@ def test_the_example_is_read_and_names_every_key() -> None:
         (MOVES + f"placements: {10**400}\n", "placements is 1000"),
         (MOVES + "a: &a [1]\nb: *a\n", "aliases are not read"),
         (MOVES + "x: 2026-99-99\n", "is no YAML"),
+        (MOVES + f"placements: 0x{'f' * 6_000}\n", "a number of 6002 characters: at most 1000"),
+        (MOVES + f"? 0x{'f' * 6_000}\n: 1\n", "a number of 6002 characters: at most 1000"),
+        (MOVES + f"margin: 1{':1' * 400}.5\n", "is no YAML"),
+        (MOVES + f"margin: 1{':1' * 40_000}.5\n", "a number of 80003 characters"),
         ("{" * 1_500, "is no YAML"),
         (MOVES + "#" * 1_000_001, "at most 1000000"),
     ],
@@ -70,6 +75,18 @@ def test_what_makes_no_sense_is_refused(content: str, said: str) -> None:
         study_of(content)
     assert said in str(refused.value)
     assert len(str(refused.value)) < 1000
+
+
+def test_many_keys_are_read_in_a_time_that_grows_as_their_number() -> None:
+    def seconds(keys: int) -> float:
+        content = HEAD + "".join(f"k{number}: 1\n" for number in range(keys))
+        begun = time.process_time()
+        with pytest.raises(SettingsError, match="k0 is unknown"):
+            study_of(content)
+        return time.process_time() - begun
+
+    few = min(seconds(1_000) for _ in range(3))
+    assert seconds(8_000) < 2.0 * 8.0 * few  # twice: others on the machine; comparing all with all was 30 times
 
 
 def test_a_file_is_named_in_its_refusal_and_its_cell_stands_beside_it(tmp_path: Path) -> None:

@@ -90,9 +90,9 @@ class ArenaSettings:
                 for load in filter(None, self.loads):
                     scene_with(cell, load, load_power_data())
             except (DescriptionError, PlannerError, OSError) as error:
-                raise SettingsError(f"cells: {name}: {error}") from error
+                raise SettingsError(f"cells: {name!r:.200}: {error}") from error
             if not cell.tasks:
-                raise SettingsError(f"cells: {name} has no tasks")
+                raise SettingsError(f"cells: {name!r:.200} has no tasks")
             known_tasks += tasks_of(cell)
         checked_known("tasks", self.tasks, known_tasks)
 

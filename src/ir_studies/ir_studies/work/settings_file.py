@@ -12,6 +12,7 @@ import yaml
 from ir_studies.errors import SettingsError
 
 MOST_CHARACTERS = 1_000_000  # of a settings file
+_MOST_DIGITS = 1_000  # of a number: few enough for a message, more than any float has
 Bounds: TypeAlias = "tuple[str, float, float]"
 """A key, its least and its largest value."""
 Placed = Callable[[str], str]
@@ -68,7 +69,8 @@ def _mapping(content: str) -> dict[Any, Any] | None:
         raise SettingsError(f"settings have {len(content)} characters: at most {MOST_CHARACTERS}")
     try:
         read = yaml.load(content, Loader=_PlainLoader)
-    except (yaml.YAMLError, RecursionError, ValueError) as error:  # ValueError: 2026-99-99 as a date
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:
+        # ValueError: 2026-99-99 as a date; OverflowError: 1:1:...:1.5, which YAML counts by sixties
         said = " ".join(str(error).split())
         raise SettingsError(f"this is no YAML: {said:.300}") from error
     return read if isinstance(read, dict) else None
@@ -111,10 +113,30 @@ class _PlainLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        keys: list[str] = []
+        keys: set[str] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode) and key.value in keys:
                 said = f"{key.value:.60} stands twice"
                 raise yaml.MarkedYAMLError(problem=said, problem_mark=key.start_mark)
-            keys.append(str(key.value))
+            keys.add(str(key.value))
         return super().construct_mapping(node, deep)
+
+    def whole(self, node: Any) -> int:
+        """A whole number that can be printed."""
+        _check_length(node)
+        return int(self.construct_yaml_int(node))
+
+    def real(self, node: Any) -> float:
+        """A float of a text that is read at once."""
+        _check_length(node)
+        return float(self.construct_yaml_float(node))
+
+
+def _check_length(node: Any) -> None:
+    if len(node.value) > _MOST_DIGITS:
+        said = f"a number of {len(node.value)} characters: at most {_MOST_DIGITS}"
+        raise yaml.MarkedYAMLError(problem=said, problem_mark=node.start_mark)
+
+
+_PlainLoader.add_constructor("tag:yaml.org,2002:int", _PlainLoader.whole)
+_PlainLoader.add_constructor("tag:yaml.org,2002:float", _PlainLoader.real)
