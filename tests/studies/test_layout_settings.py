@@ -86,7 +86,7 @@ def test_many_keys_are_read_in_a_time_that_grows_as_their_number() -> None:
         return time.process_time() - begun
 
     few = min(seconds(1_000) for _ in range(3))
-    assert seconds(8_000) < 2.0 * 8.0 * few  # twice: others on the machine; comparing all with all was 30 times
+    assert seconds(8_000) < 2.0 * 8.0 * few  # twice: others on the machine; it was 30 times
 
 
 def test_a_file_is_named_in_its_refusal_and_its_cell_stands_beside_it(tmp_path: Path) -> None:

@@ -8,6 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from ir_studies import WorkerError
 from ir_studies.work import Job, Task
 from ir_studies.work.pool import Pool
 
@@ -81,3 +84,26 @@ def test_a_worker_that_died_while_it_waited_is_replaced() -> None:
             rows = list(pool.rows([Job("a", {"die": 1}), Job("b")]))
             assert [job.key for job, _ in rows] == ["a", "b"]
             assert all(row["outcome"] == "answered" for _, row in rows)
+
+
+def test_why_a_worker_cannot_begin_is_said_at_once() -> None:
+    text = "the cell is not here"
+    refuses = f'input(); print(\'{{"refused": "{text}"}}\', flush=True)'
+    with (
+        Pool(TASK, 2, (sys.executable, "-S", "-c", refuses)) as pool,
+        pytest.raises(WorkerError, match=f"a worker can't begin: {text}"),
+    ):
+        list(pool.rows([Job("a"), Job("b")]))
+
+
+def test_workers_add_up_with_one_thread_whatever_the_environment_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    says = (
+        "import os; input(); print('{}', flush=True); input(); "
+        "print('{\"n\": ' + os.environ['OPENBLAS_NUM_THREADS'] + '}', flush=True)"
+    )
+    with Pool(TASK, 1, (sys.executable, "-S", "-c", says)) as pool:
+        [(_, row)] = pool.rows([Job("a")])
+    assert row["n"] == 1

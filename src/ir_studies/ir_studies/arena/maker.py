@@ -18,18 +18,23 @@ from ir_studies.arena.entries import Entry
 from ir_studies.arena.one_run import one_run
 from ir_studies.arena.processor_time import charged, excuse, others_time, processor_time
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
-from ir_studies.arena.tasks import tasks_of
+from ir_studies.arena.tasks import read_by, tasks_of
 from ir_studies.work import Row
+from ir_studies.work.read_files import refuse_others
 
 _STARTS = 2  # looks at what it takes to start a process of OMPL, after the first, which loads it
 
 
 def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
-    """Rows of entries, with everything loaded that is loaded once."""
+    """Rows of entries, with everything loaded that is loaded once; `read` of the settings: what must be the
+    same here. WorkerError where it is not.
+    """
     read: dict[str, Any] = {  # JSON knows no tuples
         key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()
     }
+    given = read.pop("read", {})
     arena = ArenaSettings(**read)
+    refuse_others(given, read_by(arena.cells) if given else {})
     charge_to(charged)
     excuse(0.0)
     warm_up(arena)

@@ -11,12 +11,12 @@ from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from ir_description import cell_hash, load_cell
 from ir_studies.arena.entries import Entry, entries
 from ir_studies.arena.figures import figures
 from ir_studies.arena.outputs import write_outputs, write_settings
 from ir_studies.arena.settings import ArenaSettings
 from ir_studies.arena.table import Run
+from ir_studies.arena.tasks import read_by
 from ir_studies.errors import StoppedError, StudyError, WorkerError
 from ir_studies.work import Means, Results, Task
 
@@ -59,9 +59,9 @@ def run_arena(
         raise StudyError("a Parquet file needs pyarrow: pip install pyarrow")
     means = means or Means()
     wanted = {entry.key: entry for entry in entries(settings)}
-    cells = {name: cell_hash(load_cell(name)) for name in settings.cells}
-    task = Task("arena", asdict(settings), settings.seconds + settings.hang_after)
-    with Results(Path(folder), "arena", settings.budget, cells) as results:
+    read = read_by(settings.cells)
+    task = Task("arena", {**asdict(settings), "read": read}, settings.seconds + settings.hang_after)
+    with Results(Path(folder), "arena", settings.budget, read) as results:
         kept = write_settings(settings, Path(folder))
         missing = [entry.job for entry in wanted.values() if entry.key not in results.rows]
         begin, before = time.monotonic(), len(wanted) - len(missing)

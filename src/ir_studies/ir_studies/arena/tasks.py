@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from ir_description import Cell
+from ir_description import Cell, cell_hash, load_cell
 from ir_msgs_py.arrays import FloatArray
+from ir_studies.work.read_files import task_digests
 
 
 def tasks_of(cell: Cell) -> Mapping[str, tuple[FloatArray, FloatArray]]:
@@ -18,4 +19,13 @@ def tasks_of(cell: Cell) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         first, _, last = task.name.partition("->")
         found[task.name] = start, goal
         found[f"{last}->{first}" if last else f"{task.name} back"] = goal, start
+    return found
+
+
+def read_by(names: Iterable[str]) -> dict[str, str]:
+    """Digests of the cells, and of their tasks."""
+    found: dict[str, str] = {}
+    for name in names:
+        cell = load_cell(name)
+        found |= {name: cell_hash(cell), **task_digests(name, cell)}
     return found

@@ -19,16 +19,21 @@ from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError, carried
 from ir_studies.errors import DrivingError
 from ir_studies.simulated_run import READING, SimulatedRun
-from ir_studies.statistics.places import Pair, pair_of, places_of
+from ir_studies.statistics.places import Pair, pair_of, places_of, read_by
 from ir_studies.statistics.settings import StatisticsSettings
 from ir_studies.work import Row
+from ir_studies.work.read_files import refuse_others
 
 AROUND = 0.5  # s after a movement that the filter of the indirect measurement may look at
 
 
 def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
-    """Rows of pairs by their numbers, with the cell and its places loaded once."""
-    asked = StatisticsSettings(**settings)
+    """Rows of pairs by their numbers, with the cell and its places loaded once; `read` of the settings: what
+    must be the same here. WorkerError where it is not.
+    """
+    given = settings.get("read", {})
+    asked = StatisticsSettings(**{key: value for key, value in settings.items() if key != "read"})
+    refuse_others(given, read_by(asked) if given else {})
     planner = Planner(time.monotonic)
     planner.set_cell("", asked.cell)
     places = places_of(planner, asked.load)

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_description import cell_hash, load_cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
+from ir_sim_driver.plant import plant_hash, plant_named
 from ir_studies.errors import StudyError
+from ir_studies.statistics.settings import StatisticsSettings
+from ir_studies.work.read_files import PLANT, digest_of_tasks
 
 NEAREST = 0.002  # m that a place keeps
 CANDIDATES = 8  # withdrawals of a station, in different configurations
@@ -55,6 +59,14 @@ def places_of(planner: Planner, load: str) -> tuple[Place, ...]:
     if len(kept) < 2:
         raise StudyError(f"the cell {cell.name} has no two places that keep {NEAREST * 1e3:g} mm")
     return kept
+
+
+def read_by(settings: StatisticsSettings) -> dict[str, str]:
+    """Digests of the cell, its tasks and the plant."""
+    cell = load_cell(settings.cell)
+    plant = plant_named(settings.plant, cell.robot, cell.robot.controller)
+    tasks = digest_of_tasks(settings.cell, cell)
+    return {settings.cell: cell_hash(cell), f"{PLANT}{settings.plant}": plant_hash(plant), **tasks}
 
 
 def _free(planner: Planner, name: str, q: FloatArray, load: str) -> Place:

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ir_description import cell_hash, load_cell
-from ir_sim_driver.plant import plant_hash, plant_named
 from ir_studies.statistics.figures import Findings, findings_of
 from ir_studies.statistics.outputs import write_outputs
+from ir_studies.statistics.places import read_by
 from ir_studies.statistics.settings import StatisticsSettings
 from ir_studies.statistics.verdict import sentences
 from ir_studies.work import Job, Means, Results, Row, Task
-from ir_studies.work.results import PLANT
 
 
 @dataclass(frozen=True)
@@ -45,10 +43,8 @@ def run_statistics(settings: StatisticsSettings, folder: str | Path, means: Mean
     """Make the pairs that the folder has no row of; interrupted, it goes on where it ended. StudyError."""
     means = means or Means()
     jobs = {str(number): Job(str(number), {"number": number}) for number in range(settings.pairs)}
-    cell = load_cell(settings.cell)
-    plant = plant_named(settings.plant, cell.robot, cell.robot.controller)
-    read = {settings.cell: cell_hash(cell), f"{PLANT}{settings.plant}": plant_hash(plant)}
-    task = Task("statistics", asdict(settings), settings.hang_after)
+    read = read_by(settings)
+    task = Task("statistics", {**asdict(settings), "read": read}, settings.hang_after)
     with Results(Path(folder), "statistics", settings.budget, read) as results:
         missing = [job for key, job in jobs.items() if key not in results.rows]
         done = len(jobs) - len(missing)

@@ -8,6 +8,8 @@ from typing import Any, TypeAlias
 
 Row: TypeAlias = "dict[str, Any]"
 """What JSON can hold: texts, numbers (NaN is one), booleans, lists and mappings of them."""
+REFUSED = "refused"
+"""Key of the sentence with which a worker says, before its first job, why it can make none."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from ir_studies.errors import StoppedError, WorkerError
-from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.job import REFUSED, Job, Row, Task
 from ir_studies.work.lifeline import VARIABLE
 
 COMMAND = (sys.executable, "-m", "ir_studies.work.worker")
@@ -23,6 +23,8 @@ _START_S = 600.0  # until a worker has loaded everything
 _CHUNK = 1 << 16
 _MOST_STARTS = 3  # workers in a row that don't start, until the study gives up
 _LOOK_S = 0.1  # between two looks whether somebody asks to stop
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Each core has a worker already; and how many threads add up a sum must not depend on the machine."""
 
 
 @dataclass
@@ -45,7 +47,7 @@ class _Worker:
                 bufsize=0,
                 process_group=0,
                 pass_fds=[held],
-                env={**os.environ, VARIABLE: str(held)},
+                env={**os.environ, **_ONE_THREAD, VARIABLE: str(held)},
             )
         except OSError as error:
             os.close(self._lifeline)
@@ -153,6 +155,8 @@ class Pool:
                 yield from self._replaced(worker, "died")
                 continue
             for row in rows:
+                if not worker.ready and REFUSED in row:
+                    raise WorkerError(f"a worker can't begin: {row[REFUSED]}")
                 turn, worker.ready, self._failed_starts = worker.turn, True, 0
                 self._give(worker)  # before the row is handed on: who takes it may not come back
                 if turn is not None:

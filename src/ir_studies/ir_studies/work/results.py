@@ -9,24 +9,24 @@ import fcntl
 import json
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from ir_studies.errors import FolderError
 from ir_studies.work.job import Job, Row
+from ir_studies.work.read_files import title
 
 NAME = "results.jsonl"
-PLANT = "plant "
-"""Before the name of a plant, whose content counts like that of a cell."""
 _TITLES = {"arena": "an arena", "layout": "a layout study", "statistics": "statistics"}
 
 
 class Results:
     """The file of a folder, for one program at a time; rows by the keys of their jobs.
 
-    kind: of the study. budget: settings that all rows depend on. cells: content hash by name, of plants too;
-    others may be added later, none may change.
+    kind: of the study. budget: settings that all rows depend on. cells: content hash by name, of plants and
+    tasks too; others may be added later, none may change.
     """
 
     def __init__(self, folder: Path, kind: str, budget: Mapping[str, Any], cells: Mapping[str, str]) -> None:
@@ -44,28 +44,27 @@ class Results:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._read(cells)
         except BlockingIOError as error:
-            self._file.close()
+            self._drop()
             raise FolderError(f"{folder} is in use by another study: wait, or name another folder") from error
+        except OSError as error:  # a file system without locks, a disk that can't be read
+            self._drop()
+            raise FolderError(f"{self.path} can't be used: {error.strerror}") from error
         except FolderError:
-            self._file.close()
+            self._drop()
             raise
 
     def _read(self, cells: Mapping[str, str]) -> None:
         content = self._file.read()
         whole = content[: content.rfind(b"\n") + 1]
         head = {"format": f"ir_{self._kind}_results/1", "budget": self._budget, "cells": {}}
-        lines = whole.splitlines()
-        try:
-            found = json.loads(lines[0]) if lines else head
-            begun = lines or json.dumps(head).encode().startswith(content)
-            if not (begun and isinstance(found, dict) and found.get("format") == head["format"]):
-                raise ValueError
-            rows = [json.loads(line) for line in lines[1:]]
-            self.rows = {row["key"]: row for row in rows if "key" in row}
-            known = dict(pair for row in rows for pair in row.get("cells", {}).items())
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            title = _TITLES[self._kind]
-            raise FolderError(f"{self.path} holds no results of {title}: name another folder") from error
+        lines = whole.split(b"\n")[:-1]
+        found = _mapping(lines[0]) if lines else head
+        begun = lines or json.dumps(head).encode().startswith(content)
+        if not (begun and found is not None and found.get("format") == head["format"]):
+            raise FolderError(f"{self.path} holds no results of {_TITLES[self._kind]}: name another folder")
+        rows = [self._row(number, line) for number, line in enumerate(lines[1:], start=2)]
+        self.rows = {row["key"]: row for row in rows if "key" in row}
+        known = dict(pair for row in rows for pair in row.get("cells", {}).items())
         self._check(found, known, cells)
         self._file.truncate(len(whole))
         self._file.seek(len(whole))
@@ -74,6 +73,18 @@ class Results:
         new = {name: digest for name, digest in cells.items() if name not in known}
         if new:
             self._write({"cells": new})
+
+    def _row(self, number: int, line: bytes) -> Row:
+        """A line that this class has written."""
+        row = _mapping(line)
+        if (
+            row is None
+            or not isinstance(row.get("key", ""), str)
+            or not isinstance(row.get("cells", {}), dict)
+        ):
+            said = "delete the line, and its job is made again"
+            raise FolderError(f"{self.path}: line {number} is damaged: {said}")
+        return row
 
     def _check(self, head: dict[str, Any], known: Mapping[str, str], cells: Mapping[str, str]) -> None:
         begun = head.get("budget", {})
@@ -85,7 +96,7 @@ class Results:
                 )
         for name, digest in cells.items():
             if known.get(name, digest) != digest:
-                raise FolderError(f"{self.path} holds results of another {_title(name)}: name another folder")
+                raise FolderError(f"{self.path} holds results of another {title(name)}: name another folder")
 
     def add(self, job: Job, row: Row) -> None:
         """Keep a row: it is on the disk when this returns."""
@@ -101,6 +112,11 @@ class Results:
         except OSError as error:
             raise FolderError(f"{self.path} can't be written: {error.strerror}") from error
 
+    def _drop(self) -> None:
+        """Close the file, whatever it says: what was not written is refused by who asks."""
+        with suppress(OSError):
+            self._file.close()
+
     def __enter__(self) -> Results:
         return self
 
@@ -114,5 +130,10 @@ class Results:
                 raise
 
 
-def _title(name: str) -> str:
-    return name if name.startswith(PLANT) else f"cell {name}"
+def _mapping(line: bytes) -> dict[str, Any] | None:
+    """What a line holds; None where it is no mapping."""
+    try:
+        read = json.loads(line)
+    except (ValueError, RecursionError):  # brackets by the thousand
+        return None
+    return read if isinstance(read, dict) else None

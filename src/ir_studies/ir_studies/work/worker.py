@@ -6,12 +6,13 @@ import json
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
-from ir_studies.work.job import Row
+from ir_studies.work.job import REFUSED, Row
 from ir_studies.work.lifeline import tie
 
 READY = {"ready": True}
@@ -39,7 +40,12 @@ def main() -> None:
     os.dup2(2, 1)
     with suppress(BrokenPipeError):
         task = json.loads(sys.stdin.readline())
-        make = maker_of(task["kind"], task["settings"])
+        try:
+            make = maker_of(task["kind"], task["settings"])
+        except Exception as error:  # whatever it is: who started this has a sentence for people, not a death
+            traceback.print_exc()
+            answers.write(json.dumps({REFUSED: str(error) or repr(error)}) + "\n")
+            return
         answers.write(json.dumps(READY) + "\n")
         for line in sys.stdin:
             answers.write(json.dumps(make(json.loads(line))) + "\n")
