@@ -183,14 +183,14 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
         run_layout(SETTINGS, tmp_path / "b", Means(scheduler=address))
     worker(processes, tmp_path, address)
     monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)
-    monkeypatch.setattr(cluster, "computed_with", lambda: "an abacus")
+    monkeypatch.setattr(cluster, "computed_with", lambda kind: "an abacus")
     with pytest.raises(WorkerError, match="not with an abacus"):
         run_layout(replace(SETTINGS, placements=2), tmp_path / "c", Means(scheduler=address))
 
 
 def pools() -> int:
     """In a worker of the cluster: how many pools it has."""
-    return len(cluster._pools)
+    return len(cluster._kept)
 
 
 def children_of(pid: int) -> list[int]:

@@ -8,29 +8,33 @@ from __future__ import annotations
 
 import asyncio
 import json
-import platform
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from itertools import islice
 from queue import Empty, Queue
 from types import ModuleType, TracebackType
 from typing import Any
+from uuid import uuid4
 
-import numpy as np
-import scipy
-
-from ir_kernels import compiled
 from ir_studies.errors import StoppedError, StudyError, WorkerError
+from ir_studies.work.build import computed_with
 from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.kept import Kept, Stopped
 from ir_studies.work.pool import Pool
 
 _CONNECT_S = 20.0
 _LOOK_S = 0.2  # between two looks whether somebody asks to stop
+_COUNT_S = (
+    1.0  # between two looks how many threads there are, and until a scheduler that is busy is left alone
+)
+_LEAVE_S = 10.0  # for the end of what a study leaves behind: who does not answer ends it without being asked
 _AHEAD = 4  # jobs that each thread has waiting: none waits for the next one to come over the network
+_MOST_TIMES = 3  # that Dask may give a job up because four workers died that had it, or had it waiting
 _GONE = "the scheduler is gone: the same command goes on when it is back"
 _MISSING = 'a Dask cluster needs Dask: pip install "ir_studies[cluster]", or pip install dask distributed'
 
@@ -42,13 +46,21 @@ def _distributed() -> ModuleType:
         raise WorkerError(_MISSING) from error
 
 
+@dataclass
+class _Turn:
+    job: Job
+    given_up: int = 0  # how often by Dask
+
+
 class Cluster:
     """Makes jobs by the workers of a scheduler; `stopped` as in Pool."""
 
-    def __init__(self, task: Task, address: str, stopped: Callable[[], bool] | None = None) -> None:
+    def __init__(self, task: Task, address: str, stopped: Stopped | None = None) -> None:
         """Connect. WorkerError where Dask is missing, nobody answers, or no worker is there."""
         self._dask, self._stopped = _distributed(), stopped
-        self._task = json.dumps(asdict(task))
+        self._task, self._build, self._study = json.dumps(asdict(task)), computed_with(task.kind), uuid4().hex
+        self._threads, self._counted = 1, -_COUNT_S
+        self._running: dict[Any, _Turn] = {}
         try:
             with ThreadPoolExecutor(1) as apart:  # here a loop may run, as in a notebook
                 apart.submit(asyncio.run, self._identity(address)).result()
@@ -71,30 +83,49 @@ class Cluster:
 
     def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
         """Each job with its row, as they are made."""
-        left, running, done = iter(jobs), dict[Any, Job](), Queue[Any]()
-        build = computed_with()
+        left, done = iter(jobs), Queue[Any]()
         try:
             while True:
-                for job in islice(left, self._free(len(running))):
-                    # not by its content: what is asked again is made again
-                    submitted = self._client.submit(made, self._task, dict(job.words), build, pure=False)
-                    running[submitted] = job
-                    submitted.add_done_callback(done.put)
-                if not running:
+                for job in islice(left, self._free()):
+                    self._submit(_Turn(job), done)
+                if not self._running:
                     return
                 future = self._next(done)
-                if future in running:
-                    yield running.pop(future), self._row(future)
+                if future is None:
+                    continue
+                turn = self._running.pop(future)
+                row = self._row(future, turn)
+                if row is None:
+                    self._submit(turn, done)
+                else:
+                    yield turn.job, row
         finally:
-            with suppress(OSError):  # a scheduler that is gone has nothing to cancel
-                self._client.cancel(list(running))
+            self._leave()
 
-    def _free(self, running: int) -> int:
+    def _submit(self, turn: _Turn, done: Queue[Any]) -> None:
+        words = dict(turn.job.words)
+        # not by its content: what is asked again is made again
+        future = self._client.submit(made, self._study, self._task, words, self._build, pure=False)
+        self._running[future] = turn
+        future.add_done_callback(done.put)
+
+    def _free(self) -> int:
+        """How many jobs more the cluster may have waiting."""
+        now = time.monotonic()
+        if now - self._counted >= _COUNT_S:
+            self._counted = now
+            with suppress(TimeoutError):  # busy, or stopped for a while: as many as before
+                self._threads = self._count()
+        return max(_AHEAD * max(self._threads, 1) - len(self._running), 0)
+
+    def _count(self) -> int:
         try:
-            threads = sum(int(count) for count in self._client.nthreads().values())
-        except OSError as error:
+            threads = self._client.sync(self._client.scheduler.ncores, callback_timeout=_COUNT_S)
+        except TimeoutError:
+            raise
+        except (AttributeError, OSError) as error:  # AttributeError: the client has given the scheduler up
             raise WorkerError(_GONE) from error
-        return max(_AHEAD * max(threads, 1) - running, 0)
+        return sum(int(count) for count in threads.values())
 
     def _next(self, done: Queue[Any]) -> Any:
         """What was done next; None where nothing was for a while."""
@@ -105,16 +136,22 @@ class Cluster:
         except Empty:
             return None
 
-    def _row(self, future: Any) -> Row:
-        """What a job gave; a row of its own where its workers died again and again."""
+    def _row(self, future: Any, turn: _Turn) -> Row | None:
+        """What a job gave; None where it is to be made again, since its workers died: it need not be why."""
         try:
             row: Row = future.result()
         except self._dask.KilledWorker as error:
+            turn.given_up += 1
+            if turn.given_up < _MOST_TIMES:
+                return None
             return {"outcome": "died", "solved": False, "message": f"workers died with it: {error!s:.200}"}
         except StudyError:
             raise
         except (self._dask.CancelledError, OSError) as error:
             raise WorkerError(_GONE) from error
+        except Exception as error:  # whatever is installed there, or is not
+            said = f"{type(error).__name__}: {error!s:.200}"
+            raise WorkerError(f"a worker of the cluster can't make jobs: {said}") from error
         return row
 
     def __enter__(self) -> Cluster:
@@ -123,50 +160,44 @@ class Cluster:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._client.status == "running":
+            _within(_LEAVE_S, lambda: self._client.run(end_study, self._study, on_error="ignore"))
         with suppress(OSError):
-            if self._client.status == "running":
-                self._client.run(end_pools, on_error="ignore")
-        with suppress(OSError):
-            self._client.close(timeout=_CONNECT_S)
+            self._client.close(timeout=_LEAVE_S)
+
+    def _leave(self) -> None:
+        """Cancel what was not waited for."""
+        left = list(self._running)
+        self._running.clear()
+        if left and self._client.status == "running":
+            _within(_LEAVE_S, lambda: self._client.cancel(left))
 
 
-def computed_with() -> str:
-    """What the bits of a result depend on beside its job."""
-    versions = f"python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
-    return f"{versions}, kernels {compiled.NAME}, {platform.machine()}"
+def _within(seconds: float, act: Callable[[], object]) -> None:
+    """Wait for an act so long at most: what has stopped at the other end must not hold who leaves."""
+
+    def acted() -> None:
+        with suppress(Exception):  # who leaves has no use for it: a worker without a study ends its processes
+            act()
+
+    thread = threading.Thread(target=acted, daemon=True)
+    thread.start()
+    thread.join(seconds)
 
 
-_pools: dict[int, tuple[str, Pool]] = {}  # by thread of a worker of the cluster
-_lock = threading.Lock()
+_kept = Kept()
 
 
-def made(task: str, words: Mapping[str, Any], build: str) -> Row:
+def made(study: str, task: str, words: Mapping[str, Any], build: str) -> Row:
     """In a worker of the cluster: the row of a job. WorkerError where it would compute other bits."""
-    if computed_with() != build:
-        raise WorkerError(f"a worker of the cluster computes with {computed_with()}, not with {build}")
-    [(_, row)] = _pool(task).rows([Job("", words)])
-    return row
+    read: Task = Task(**json.loads(task))
+    if computed_with(read.kind) != build:
+        raise WorkerError(
+            f"a worker of the cluster computes with {computed_with(read.kind)}, not with {build}"
+        )
+    return _kept.row(study, lambda stopped: Pool(read, 1, stopped=stopped), Job("", words))
 
 
-def _pool(task: str) -> Pool:
-    """The pool of this thread: one process, kept from job to job of the same task."""
-    own = threading.get_ident()
-    with _lock:
-        known = _pools.get(own)
-    if known is not None and known[0] == task:
-        return known[1]
-    if known is not None:
-        known[1].close()
-    pool = Pool(Task(**json.loads(task)), 1)
-    with _lock:
-        _pools[own] = (task, pool)
-    return pool
-
-
-def end_pools() -> None:
-    """In a worker of the cluster: end the processes of a study that has ended."""
-    with _lock:
-        known = list(_pools.values())
-        _pools.clear()
-    for _, pool in known:
-        pool.close()
+def end_study(study: str) -> None:
+    """In a worker of the cluster: end the processes of a study."""
+    _kept.end(study)
