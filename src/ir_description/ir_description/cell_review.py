@@ -119,8 +119,8 @@ def _base(cell: Cell) -> Iterator[Finding]:
             yield Finding(
                 "error",
                 body.name,
-                f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or name the pair in "
-                "base_contacts if the robot is mounted on it",
+                f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or write base_contacts: "
+                f"[[{capsule.name}, {body.name}]] if the robot is mounted on it",
             )
 
 
