@@ -39,7 +39,7 @@ SHOTS = (
     Shot("report_axes.png", (1400, 1500), at="#over-time"),
     Shot("report_tablet.png", (768, 1024), at="#motion", dark=True),
     Shot("report_phone.png", (390, 844), touch=True),
-    Shot("report_methods.png", (1400, 560), at="#methods"),
+    Shot("report_methods.png", (1400, 640), at="#methods"),
     Shot("report_print.png", PAPER, media="print"),
 )
 LIVE_SHOTS = (Shot("live.png", (1400, 1500)), Shot("live_phone.png", (390, 1500), dark=True, touch=True))

@@ -4,9 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from ir_cli.demo.story import LONGEST_PAUSE, Demonstration
+from ir_cli.errors import DemonstrationError
 from ir_cli.terminal import Progress
 from ir_description import load_cell
+from ir_msgs_py.errors import RequestRefusedError
+
+STORY = {
+    "_plan": RequestRefusedError("no path", -1),
+    "_tour": DemonstrationError("waited 30 s"),
+    "_drive": RequestRefusedError("the robot is not ready", -6),
+}
 
 
 def pauses(demonstration: Demonstration) -> list[float]:
@@ -23,3 +33,23 @@ def test_pauses_are_shortened_with_a_fact_that_says_so_and_real_ones_are_the_pro
     assert pauses(real) == full
     facts = [fact.partition("=")[0] for fact in real._facts()]
     assert facts == ["seed", "plant", "safety_distance"]
+
+
+@pytest.mark.parametrize("stage", ["_plan", "_tour", "_drive"])
+def test_a_demonstration_that_ends_early_says_why_and_is_reported(
+    stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demonstration = Demonstration("demo", tmp_path, 0, "nominal", Progress())
+    reached = []
+
+    def done(name: str) -> None:
+        reached.append(name)
+        if name == stage:
+            raise STORY[stage]
+
+    for name in STORY:
+        monkeypatch.setattr(demonstration, name, lambda *_, name=name: done(name))
+    assert demonstration._story(None) == str(STORY[stage])
+    assert reached[-1] == stage
+    monkeypatch.setattr(demonstration, stage, lambda *_: None)
+    assert demonstration._story(None) == ""

@@ -105,8 +105,8 @@ def _sentence(check: Finding) -> str:
 
 
 def examine(recording: Path, report: Path, picture: Path, loads: int, failed: str = "") -> Outcome:
-    """Analyse the recording, write report and picture; loads: how many the tour carried; failed: why there is
-    no plan.
+    """Analyse the recording, write report and picture; loads: how many the tour carried; failed: why the
+    demonstration ended early.
     """
     analysis = analyse(read_recording(recording))
     if failed:

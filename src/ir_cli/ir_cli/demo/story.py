@@ -107,14 +107,20 @@ class Demonstration:
         return outcome
 
     def _story(self, client: Client) -> str:
-        """Plan, visit the modes, drive; why there is no plan, "" where there is one."""
+        """Plan, visit the modes, drive; why that ended early, "" where it didn't: what was recorded till then
+        is reported.
+        """
         try:
             plan = self._plan(client)
         except RequestRefusedError as error:
             self._progress.end("no plan")
             return str(error)
-        self._tour(client)
-        self._drive(client, plan)
+        try:
+            self._tour(client)
+            self._drive(client, plan)
+        except (DemonstrationError, MsgsError) as error:
+            self._progress.end("ended early")
+            return str(error)
         return ""
 
     def _facts(self) -> list[str]:

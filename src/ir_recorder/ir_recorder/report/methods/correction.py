@@ -12,7 +12,7 @@ from ir_recorder.report.methods.view import HEIGHT, WIDTH, View, drawing
 from ir_recorder.report.methods.words import counted
 from ir_recorder.report.words import percent
 
-_CHART, _GAP = (250.0, 112.0), 12.0  # width and height of the chart; to the edges of the drawing
+_CHART, _GAP = (222.0, 92.0), 10.0  # width and height of the chart; to the edges of the drawing
 
 
 def sentence(log: CorrectionLog) -> str:
