@@ -8,10 +8,12 @@ Every planner is asked for every task of the cells, there and back, until it has
 seeds; Coal looks at its answers every 0.0005 rad, at so many per planner and cell. Then `ir arena` runs the
 cells with one request per run, is killed with SIGKILL once it has made a third, and goes on; its table is
 held against that of an arena which ran through, without the columns of times and without planners that can't
-promise the same bytes. Layout studies of the demonstration: the bounds against an exhaustive grid, free and
-in a cycle time, and again on variants of bundled cells; at least 1,000 placements against the given one; and
-how many programs one, two and four processes plan per second. --only runs one of these parts; a layout study
-that was interrupted goes on where it ended when the same --out is given.
+promise the same bytes. The statistics of `ir study statistics --example` are computed once more from their
+rows; robots drawn for each pair are held against the predicted interval, and asynchronous joints with the
+objective time against synchronous ones. Layout studies of the demonstration: the bounds against an exhaustive
+grid, free and in a cycle time, and again on variants of bundled cells; at least 1,000 placements against the
+given one; and how many programs one, two and four processes plan per second. --only runs one of these parts;
+a study that was interrupted goes on where it ended when the same --out is given.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from _regional_ours import asked, planner_of
 from _regional_tasks import Task, tasks_of
 from _results import Claim, at_least, at_most, command_line, finish, line_of
 from _second_opinion import SecondOpinion
+from _statistics_study import STATISTICS_PARTS, statistics_claims
 
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.planner import Planner
@@ -48,7 +51,7 @@ PLANNERS = (PORTFOLIO, "genetic", "tree", "sbl", "kpiece", "bkpiece", "lbkpiece"
             "aorrtc")  # fmt: skip
 CEILING_S = 60.0  # s of a request: the work ends it, not the clock, also on a machine that others use
 WAIT_S = 600.0
-PARTS = ("planners", "killed", *LAYOUT_PARTS)
+PARTS = ("planners", "killed", *STATISTICS_PARTS, *LAYOUT_PARTS)
 IN_BOTH = ("portfolio", "sbl", "kpiece", "bkpiece", "lbkpiece", "rrt_connect")  # of the arena that is killed
 
 
@@ -66,7 +69,10 @@ class Answer:
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = command_line(
-        __doc__, CELLS, 3, "2 answers per planner that Coal checks, 1 seed and 3 planners of the arena"
+        __doc__,
+        CELLS,
+        3,
+        "2 answers per planner that Coal checks, 1 seed and 3 planners of the arena, 8 pairs",
     )
     parser.add_argument("--only", action="append", choices=PARTS, metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--out", type=Path, help="where layout studies are kept; default: a folder for now")
@@ -192,6 +198,7 @@ def main() -> None:
     if "killed" in parts:
         both = [name for name in planners if name in IN_BOTH][: 3 if given.quick else None] or planners
         claims += killed_and_resumed(cells[:1], both, 1 if given.quick else given.seeds)
+    claims += statistics_claims(parts, given.out, quick=given.quick)
     claims += layout_claims("demo", parts, given.out, quick=given.quick)
     finish(given.json, rows, claims)
 

@@ -23,6 +23,7 @@ from ir_studies.statistics.places import NEAREST, pair_of, places_of
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
 from ir_studies.statistics.verdict import sentences
 
+ASKED = StatisticsSettings("open")
 shares = st.floats(-0.5, 0.5).map(lambda x: round(x, 4))
 
 
@@ -52,8 +53,10 @@ def test_means_and_intervals_are_those_of_students_t(values: list[float]) -> Non
     interval = expected.confidence_interval(0.90)
     assert energy.mean.value == pytest.approx(100.0 * np.mean(values), abs=1e-9)
     assert (energy.mean.low, energy.mean.high) == pytest.approx((interval.low, interval.high), abs=1e-6)
-    assert energy.less == np.mean(np.array(values) < 0.0)
-    assert energy.shown == bool(expected.pvalue < 0.10)
+    assert (energy.less, energy.more) == (sum(x < 0.0 for x in values), sum(x > 0.0 for x in values))
+    assert energy.outside == bool(expected.pvalue < 0.10)
+    assert energy.chance == pytest.approx(expected.pvalue, rel=1e-6, abs=1e-12)
+    assert energy.effect == pytest.approx(np.mean(values) / np.std(values, ddof=1), abs=1e-9)
 
 
 def test_the_interval_agrees_with_a_bootstrap() -> None:
@@ -83,7 +86,10 @@ def test_answers_that_are_the_synchronous_one_are_counted_apart() -> None:
     found = findings_of(rows)
     assert (found.pairs, found.solved, found.same, found.driven) == (4, 3, 1, 5)
     assert {each.count for each in found.comparisons if each.name == "duration"} == {2}
-    assert "1 of them the asynchronous answer is the synchronous one" in sentences(found)[0]
+    said = sentences(found, ASKED)
+    assert "1 of them the asynchronous answer is the synchronous one" in said[0]
+    assert "1 pair without both movements" in said[1]
+    assert "over all 3 pairs, where the same answer counts as 0, -10.00 %" in " ".join(said)
 
 
 def test_what_the_interval_holds_is_counted() -> None:
@@ -95,7 +101,8 @@ def test_nothing_solved_is_said_and_breaks_nothing() -> None:
     rows: list[dict[str, Any]] = [{"outcome": "cut", "message": "no answer"}, {}]
     found = findings_of(rows)
     assert found.solved == 0
-    assert sentences(found)[0].startswith("0 of 2 pairs")
+    assert sentences(found, ASKED)[0].startswith("0 of 2 pairs")
+    assert [(each.count, each.example) for each in found.failures] == [(2, "no answer")]
     assert "0 of 2 pairs" in page_html(found, StatisticsSettings("open"))
     assert columns(rows)["message"][0] == "no answer"
 
@@ -109,7 +116,8 @@ def test_nothing_solved_is_said_and_breaks_nothing() -> None:
         ("objective: cheap", "objective"),
         ("planner: magic", "planner"),
         ("plant: typical:-1", "plant"),
-        ("load: anvil", "cell"),
+        ("load: anvil", "load"),
+        ("plant: drawn:3", "or drawn: one per pair"),
         ("safety_distance: .inf", "safety_distance"),
         ("unknown: 1", "unknown"),
     ],
@@ -202,3 +210,14 @@ def test_a_study_leaves_table_and_page(tmp_path: Path) -> None:
     results.write_text(results.read_text().replace(digest, digest[::-1]))
     with pytest.raises(FolderError, match="results of another plant nominal"):
         study.run(tmp_path, Means(1))
+
+
+def test_a_cell_without_places_is_a_sentence(tmp_path: Path) -> None:
+    cell = tmp_path / "empty.yaml"
+    cell.write_text("format: ir_cell/1\nname: empty\nrobot: kr6_r900_2\n")
+    asked = StatisticsSettings(str(cell))
+    make = maker({"cell": str(cell)})
+    rows = [make({"number": number}) for number in range(2)]
+    said = " ".join(sentences(findings_of(rows), asked))
+    assert "2 pairs without both movements, since the cell empty has no two places that keep 2 mm" in said
+    assert said.endswith("Nothing follows from that.")

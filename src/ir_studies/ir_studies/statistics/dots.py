@@ -12,13 +12,13 @@ from ir_recorder.report.words import text
 from ir_studies.statistics.figures import Comparison
 
 WIDTH, LINE = 720.0, 34.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 170.0, 20.0, 8.0, 34.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 170.0, 20.0, 8.0, 48.0
 _INSIDE = (2.0, 98.0)  # percentiles that the axis holds; what lies outside is drawn at its edge
 _SPREAD = 9.0  # up and down that dots are moved apart
 
 
 def dots(comparisons: Sequence[Comparison], title: str) -> str:
-    """SVG; "" where nothing was compared."""
+    """SVG, its title below the axis; "" where nothing was compared."""
     kept = [each for each in comparisons if each.count]
     if not kept:
         return ""
@@ -35,7 +35,9 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     said = "; ".join(f"{each.name}: mean {each.mean.value:+.1f} %" for each in kept)
     return (
         f'<div class="figure scroll"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" role="img" '
-        f'aria-label="{text(title)}: {text(said)}">{_axis(low, high, height, at)}{lines}</svg></div>'
+        f'aria-label="{text(title)}: {text(said)}">{_axis(low, high, height, at)}{lines}'
+        f'<text x="{(_LEFT + WIDTH - _RIGHT) / 2:g}" y="{height - 12:g}" text-anchor="middle">'
+        f"{text(title)}</text></svg></div>"
     )
 
 
@@ -47,8 +49,12 @@ def _axis(low: float, high: float, height: float, at: Callable[[float], float]) 
         kind = "zero" if k == 0 else "grid"
         bottom = height - _BOTTOM
         found.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP:g}" y2="{bottom:g}"/>')
-        found.append(f'<text x="{x:.1f}" y="{height - 12:g}" text-anchor="middle">{k * step:+g} %</text>')
+        found.append(f'<text x="{x:.1f}" y="{height - 30:g}" text-anchor="middle">{_tick(k * step)} %</text>')
     return "".join(found)
+
+
+def _tick(percent: float) -> str:
+    return f"{percent:+g}" if percent else "0"
 
 
 def _line(each: Comparison, y: float, at: Callable[[float], float]) -> str:

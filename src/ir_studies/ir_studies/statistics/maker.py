@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from ir_recorder.analysis.indirect import IndirectMeter
 from ir_recorder.read.recording import JointSeries
 from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError, carried
-from ir_studies.errors import DrivingError
+from ir_studies.errors import DrivingError, StudyError
 from ir_studies.simulated_run import READING, SimulatedRun
 from ir_studies.statistics.places import Pair, pair_of, places_of, read_by
 from ir_studies.statistics.settings import StatisticsSettings
@@ -36,12 +37,19 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     refuse_others(given, read_by(asked) if given else {})
     planner = Planner(time.monotonic)
     planner.set_cell("", asked.cell)
-    places = places_of(planner, asked.load)
+    try:
+        places, why = places_of(planner, asked.load), ""
+    except (StudyError, PlannerError) as error:  # a row says so in words, a process that can't start does not
+        places, why = (), str(error)
 
     def row_of(words: Mapping[str, Any]) -> Row:
-        pair = pair_of(places, asked.seed, int(words["number"]), asked.safety_distance)
+        if why:
+            return {"message": why}
+        number = int(words["number"])
+        pair = pair_of(places, asked.seed, number, asked.safety_distance)
+        own = replace(asked, plant=asked.plant_of(number))
         row: Row = {"start": pair.names[0], "goal": pair.names[1]}
-        return row | {timing: one_timing(pair, timing, asked, planner) for timing in TIMINGS}
+        return row | {timing: one_timing(pair, timing, own, planner) for timing in TIMINGS}
 
     return row_of
 
@@ -88,7 +96,7 @@ def _planned(plan: MovementPlan) -> Row:
 def _driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> Row:
     """Joules by meter and by positions, peak power [W]; NaN, with a sentence, where it was not driven.
 
-    Each movement has a robot of its own, whose gears are as cold as before the other.
+    Each movement has a robot of its own, whose gears are as warm as before the other.
     """
     try:
         run = SimulatedRun(cell, plant, load)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ir_msgs_py.file_roots import ANYWHERE
+from ir_recorder.analysis.agreement import Mean
 from ir_recorder.report.files import write_output
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.step_table import write_columns
@@ -13,14 +15,9 @@ from ir_recorder.report.tables import table
 from ir_recorder.report.words import DASH, text
 from ir_studies.page import page
 from ir_studies.statistics.dots import dots
-from ir_studies.statistics.figures import (
-    ASYNCHRONOUS,
-    SYNCHRONOUS,
-    Comparison,
-    Findings,
-    number,
-)
+from ir_studies.statistics.figures import Comparison, Findings
 from ir_studies.statistics.settings import StatisticsSettings
+from ir_studies.statistics.sides import ASYNCHRONOUS, SYNCHRONOUS, number
 from ir_studies.statistics.verdict import sentences, signed
 from ir_studies.work import Row
 
@@ -30,7 +27,11 @@ _NUMBERS = (
     "peak_w", "path_m", "movement_cost", "torque_share",
 )  # fmt: skip
 _TEXTS = ("timing", "trajectory_id", "message")
-_HEADS = ("", ">pairs", ">mean", ">90 % interval", ">median", ">less in", ">effect d")
+_HEADS = ("", ">pairs", ">mean difference, 90 %", ">median, 90 %", ">less / equal / more", ">d")
+_SUMMED_UP = (
+    "comparison", "pairs", "values", "mean_percent", "low_percent", "high_percent", "median_percent",
+    "median_low_percent", "median_high_percent", "effect", "less", "more", "chance", "shown",
+)  # fmt: skip
 
 
 def write_outputs(
@@ -73,28 +74,70 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
             f"{settings.cell}: {found.pairs} random pairs, planner {settings.planner or 'portfolio'}, "
             f"objective {settings.objective}, plant {settings.plant}"
         ),
-        "said": "".join(f"<li>{text(sentence)}</li>" for sentence in sentences(found)),
-        "comparisons": _table(found.comparisons, "Asynchronous against synchronous"),
-        "comparison_dots": dots(found.comparisons, "Asynchronous against synchronous, pair by pair"),
-        "agreements": _table(found.agreements, "Energies of a movement"),
-        "agreement_dots": dots(found.agreements, "Against direct, movement by movement"),
+        "said": "".join(f"<li>{text(sentence)}</li>" for sentence in sentences(found, settings)),
+        "comparisons": _table(
+            found.comparisons, "Asynchronous against synchronous", (">asynchronous", ">synchronous")
+        ),
+        "left_out": _left_out(found),
+        "comparison_dots": dots(
+            found.comparisons, "asynchronous less synchronous, in percent of synchronous"
+        ),
+        "agreements": _table(found.agreements, "Energies of a movement", (">energy", ">direct")),
+        "agreement_dots": dots(found.agreements, "predicted or indirect less direct, in percent of direct"),
         "settings": text(settings.budget),
     }
     return page("statistics", parts)
 
 
-def _table(comparisons: Sequence[Comparison], caption: str) -> str:
-    return table(_HEADS, [_row(each) for each in comparisons], caption)
+def summed_up(found: Findings) -> str:
+    """A row of CSV per comparison; the differences are in percent of the second."""
+    lines = [
+        ",".join(
+            str(value)
+            for value in (
+                f'"{each.name}"', each.pairs, each.count, each.mean.value, each.mean.low, each.mean.high,
+                each.median.value, each.median.low, each.median.high, each.effect, each.less, each.more,
+                each.chance, int(each.shown),
+            )
+        )
+        for each in (*found.comparisons, *found.agreements)
+    ]  # fmt: skip
+    return "\n".join([",".join(_SUMMED_UP), *lines]) + "\n"
+
+
+def _table(comparisons: Sequence[Comparison], caption: str, sides: tuple[str, str]) -> str:
+    """sides: of what the means are. With a column of movements where these are more than the pairs."""
+    rows, heads = [_row(each) for each in comparisons], [*_HEADS[:2], *sides, *_HEADS[2:]]
+    if any(each.count != each.pairs for each in comparisons):
+        heads.insert(1, ">movements")
+        rows = [(row[0], str(each.count), *row[1:]) for row, each in zip(rows, comparisons, strict=True)]
+    return table(heads, rows, caption)
 
 
 def _row(each: Comparison) -> tuple[str, ...]:
-    interval = f"{signed(each.mean.low)} to {signed(each.mean.high)}" if each.count > 1 else DASH
+    equal = each.count - each.less - each.more
     return (
         text(each.name),
-        str(each.count),
-        f"<b>{signed(each.mean.value)}</b>" if each.shown else signed(each.mean.value),
-        interval,
-        signed(each.median),
-        f"{100.0 * each.less:.0f} %" if each.count else DASH,
-        f"{each.effect:+.2f}" if each.effect == each.effect else DASH,
+        str(each.pairs),
+        *(f"{level:.4g} {each.unit}" if math.isfinite(level) else DASH for level in each.levels),
+        _with_interval(each.mean, "b" if each.shown else "span"),
+        _with_interval(each.median, "span"),
+        f"{each.less} / {equal} / {each.more}" if each.count else DASH,
+        f"{each.effect:+.2f}" if math.isfinite(each.effect) else DASH,
     )
+
+
+def _with_interval(found: Mean, tag: str) -> str:
+    value = f"<{tag}>{signed(found.value)}</{tag}>"
+    if not math.isfinite(found.low):
+        return value
+    return f"{value} ({signed(found.low).removesuffix(' %')} to {signed(found.high).removesuffix(' %')})"
+
+
+def _left_out(found: Findings) -> str:
+    """A section with the reasons; "" where nothing was left out."""
+    if not found.failures:
+        return ""
+    rows = [(text(each.what), str(each.count), text(each.example)) for each in found.failures]
+    reasons = table(("", ">how many", "why, one of them in words"), rows, "What was left out")
+    return f'<section id="left_out"><h2>What was left out</h2>{reasons}</section>'

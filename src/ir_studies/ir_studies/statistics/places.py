@@ -64,7 +64,7 @@ def places_of(planner: Planner, load: str) -> tuple[Place, ...]:
 def read_by(settings: StatisticsSettings) -> dict[str, str]:
     """Digests of the cell, its tasks and the plant."""
     cell = load_cell(settings.cell)
-    plant = plant_named(settings.plant, cell.robot, cell.robot.controller)
+    plant = plant_named(settings.plant_of(0), cell.robot, cell.robot.controller)
     tasks = digest_of_tasks(settings.cell, cell)
     return {settings.cell: cell_hash(cell), f"{PLANT}{settings.plant}": plant_hash(plant), **tasks}
 

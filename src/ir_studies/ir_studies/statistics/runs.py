@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ir_msgs_py.options import TIMINGS
 from ir_studies.statistics.figures import Findings, findings_of
-from ir_studies.statistics.outputs import write_outputs
+from ir_studies.statistics.outputs import summed_up, write_outputs
 from ir_studies.statistics.places import read_by
 from ir_studies.statistics.settings import StatisticsSettings
+from ir_studies.statistics.sides import solved
 from ir_studies.statistics.verdict import sentences
 from ir_studies.work import Job, Means, Results, Row, Task
 
@@ -18,6 +19,7 @@ from ir_studies.work import Job, Means, Results, Row, Task
 class Finished:
     """Rows of all pairs in their order, what they say together, and the files that were written."""
 
+    settings: StatisticsSettings
     rows: tuple[Row, ...]
     findings: Findings
     files: tuple[Path, ...]
@@ -25,18 +27,12 @@ class Finished:
     @property
     def summary(self) -> str:
         """What follows, and what does not."""
-        return " ".join(sentences(self.findings))
+        return " ".join(sentences(self.findings, self.settings))
 
     @property
     def summed_up(self) -> str:
         """A row of CSV per comparison."""
-        head = "comparison,pairs,mean_percent,low_percent,high_percent,median_percent,effect,less_share"
-        lines = [
-            f"{each.name},{each.count},{each.mean.value},{each.mean.low},{each.mean.high},{each.median},"
-            f"{each.effect},{each.less}"
-            for each in self.findings.comparisons
-        ]
-        return "\n".join([head, *lines]) + "\n"
+        return summed_up(self.findings)
 
 
 def run_statistics(settings: StatisticsSettings, folder: str | Path, means: Means | None = None) -> Finished:
@@ -55,8 +51,11 @@ def run_statistics(settings: StatisticsSettings, folder: str | Path, means: Mean
                 means.progress(_words(row), done, len(jobs), "")
         rows = tuple(results.rows[key] for key in jobs)
     found = findings_of(rows)
-    return Finished(rows, found, write_outputs(rows, found, settings, Path(folder)))
+    return Finished(settings, rows, found, write_outputs(rows, found, settings, Path(folder)))
 
 
-def _words(row: Mapping[str, object]) -> str:
-    return f"{row.get('start', '?')} to {row.get('goal', '?')}: planned and driven"
+def _words(row: Row) -> str:
+    if "start" not in row:
+        return str(row.get("message", "no answer"))
+    moved = any(solved(row, timing) for timing in TIMINGS)
+    return f"{row['start']} to {row['goal']}: {'planned and driven' if moved else 'no movement'}"

@@ -11,22 +11,24 @@ from ir_planner import PlannerError
 from ir_planner.scene import scene_with
 from ir_planner.search import SEARCHES
 from ir_sim_driver import DriverError
-from ir_sim_driver.plant import plant_named
+from ir_sim_driver.plant import TYPICAL, plant_named
 from ir_studies.errors import SettingsError
 from ir_studies.work import Placed, checked_number, settings_values
 
 FORMAT = "ir_statistics/1"
 MOST_PAIRS = 100_000
+DRAWN = "drawn"
+"""The plant of a pair is typical:NUMBER: robots as they come, independent of each other."""
 
 EXAMPLE = """\
 format: ir_statistics/1
 cell: demo                   # bundled, or a file
-pairs: 40                    # of random places, each driven with both timings
+pairs: 60                    # of random places, each driven with both timings
 seed: 0                      # what the pairs are drawn from
 load: ""                     # what is attached: "" is the tool of the cell, none nothing
 planner: direct              # the straight PTP in either timing; "": the portfolio, the cheaper one
 objective: time_and_energy   # or time, energy, movement_cost
-plant: typical:0             # the simulated robot that drives: nominal, typical:SEED, or a file
+plant: typical:0             # the robot that drives: nominal, typical:SEED, a file; drawn: one per pair
 safety_distance: 0.02        # m; less where an end is nearer
 max_iterations: 0            # work of a request; 0: the planner's default
 hang_after: 300.0            # s after which a pair is cut
@@ -38,7 +40,7 @@ class StatisticsSettings:
     """EXAMPLE says what each means."""
 
     cell: str
-    pairs: int = 40
+    pairs: int = 60
     seed: int = 0
     load: str = ""
     planner: str = "direct"
@@ -69,17 +71,25 @@ class StatisticsSettings:
         kept = asdict(self)
         return {name: kept[name] for name in kept if name not in ("pairs", "hang_after")}
 
+    def plant_of(self, number: int) -> str:
+        """Which plant drives the pair of a number."""
+        return f"{TYPICAL}:{number}" if self.plant == DRAWN else self.plant
+
     def _check_cell(self) -> None:
         try:
             cell = load_cell(self.cell)
-            if self.load:
-                scene_with(cell, self.load, load_power_data())
-        except (DescriptionError, PlannerError, OSError) as error:
+        except (DescriptionError, OSError) as error:
             raise SettingsError(f"cell: {error}") from error
         try:
-            plant_named(self.plant, cell.robot, cell.robot.controller)
+            if self.load:
+                scene_with(cell, self.load, load_power_data())
+        except (DescriptionError, PlannerError) as error:
+            raise SettingsError(f"load: {error}") from error
+        try:
+            plant_named(self.plant_of(0), cell.robot, cell.robot.controller)
         except (DriverError, DescriptionError, OSError) as error:
-            raise SettingsError(f"plant: {error}") from error
+            other = "" if is_path(self.plant) else f"; or {DRAWN}: one per pair"
+            raise SettingsError(f"plant: {error}{other}") from error
 
 
 _WHOLE = (("pairs", 1, MOST_PAIRS), ("seed", 0, 2**32 - 1), ("max_iterations", 0, 2**32 - 1))

@@ -1,0 +1,141 @@
+"""Statistics for studies.py: the documented studies, judged by figures of their own from the rows alone."""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+from statistics import fmean, median, stdev
+from typing import Any
+
+import numpy as np
+from _results import Claim, at_least, at_most, line_of
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from ir_studies import Means, study_of
+from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
+from ir_studies.statistics.figures import Comparison
+from ir_studies.statistics.runs import Finished
+from ir_studies.statistics.settings import DRAWN
+from ir_studies.work.results import NAME
+
+STATISTICS_PARTS = ("statistics",)
+QUICK = 8  # pairs
+SAMPLES = 10_000
+COUNTS = (10, 20, 30, 60, 100)  # pairs of a sample
+COLUMNS = ("duration_s", "predicted_j", "direct_j", "indirect_j", "peak_w", "path_m", None, "torque_share")
+HELD = 80.0  # %: of robots drawn for 60 pairs 90 % +- 10 % lie in a 90 % interval
+
+
+def statistics_claims(parts: Collection[str], out: Path | None, *, quick: bool) -> list[Claim]:
+    """Claims about the study that `ir study statistics --example` asks for, the same with a robot of its own
+    for each pair, and one for the fastest; quick: the first alone, with few pairs.
+    """
+    if "statistics" not in parts:
+        return []
+    asked: StatisticsSettings = study_of(EXAMPLE).settings
+    asked = replace(asked, pairs=QUICK) if quick else asked
+    with tempfile.TemporaryDirectory() as place:
+        folder = (out or Path(place)) / "statistics"
+        one = made(asked, folder / "example")
+        if quick:
+            return recomputed(one, folder / "example")
+        drawn = made(replace(asked, plant=DRAWN), folder / "drawn")
+        fastest = made(replace(asked, objective="time", pairs=min(asked.pairs, 20)), folder / "time")
+        claims = [*recomputed(one, folder / "example"), *held(drawn), *never_slower(fastest)]
+    resampled(one)
+    return claims
+
+
+def made(settings: StatisticsSettings, folder: Path) -> Finished:
+    """Run a study and print what it says."""
+    finished = run_statistics(settings, folder, Means())
+    print(
+        f"{settings.objective}, plant {settings.plant}: {finished.summary}\n{finished.summed_up}", flush=True
+    )
+    return finished
+
+
+def recomputed(finished: Finished, folder: Path) -> list[Claim]:
+    """Figures of the study against those computed here from the lines of its results."""
+    rows = [json.loads(line) for line in (folder / NAME).read_text().splitlines()]
+    rows = sorted((row for row in rows if "key" in row), key=lambda row: int(row["key"]))
+    own = [row for row in rows if both(row) and row["asynchronous"]["timing"] == "asynchronous"]
+    off = [
+        largest(each, [percent(row["asynchronous"][name], row["synchronous"][name]) for row in own])
+        for each, name in zip(finished.findings.comparisons, COLUMNS, strict=True)
+        if name is not None
+    ]
+    for each, name in zip(finished.findings.agreements, ("predicted_j", "indirect_j"), strict=True):
+        by_pair = [[percent(one[name], one["direct_j"]) for one in movements(row)] for row in rows]
+        off.append(largest(each, [fmean(values) for values in by_pair if values]))
+    return [at_most("statistics: page against figures computed from its rows", max(off), "%", 1e-6)]
+
+
+def both(row: dict[str, Any]) -> bool:
+    """Whether both timings have a movement."""
+    return all(row.get(timing, {}).get("solved") for timing in ("synchronous", "asynchronous"))
+
+
+def movements(row: dict[str, Any]) -> list[dict[str, Any]]:
+    """The measured movements of a pair that are not the same one."""
+    found = {one["trajectory_id"]: one for one in row.values() if isinstance(one, dict) and one.get("solved")}
+    return [one for one in found.values() if math.isfinite(one["direct_j"])]
+
+
+def percent(first: float, second: float) -> float:
+    """By how much the first is more."""
+    return 100.0 * (first - second) / second
+
+
+def largest(each: Comparison, values: Sequence[float]) -> float:
+    """The largest difference [%] of a comparison's mean, interval and median from those of the values."""
+    if len(values) < 2 or max(values) - min(values) < 1e-6:
+        return 0.0
+    half = t_quantile(0.95, len(values) - 1) * stdev(values) / math.sqrt(len(values))
+    expected = (fmean(values), fmean(values) - half, fmean(values) + half, median(values))
+    found = (each.mean.value, each.mean.low, each.mean.high, each.median.value)
+    return max(abs(a - b) for a, b in zip(found, expected, strict=True))
+
+
+def t_quantile(level: float, freedom: int) -> float:
+    """Of Student's t, by integrating its density."""
+    scale = math.exp(math.lgamma((freedom + 1) / 2) - math.lgamma(freedom / 2)) / math.sqrt(freedom * math.pi)
+
+    def missing(x: float) -> float:
+        below = quad(lambda u: scale * (1 + u * u / freedom) ** (-(freedom + 1) / 2), 0.0, x, epsabs=1e-13)
+        return float(0.5 + below[0] - level)
+
+    return float(brentq(missing, 0.0, 100.0, xtol=1e-12))
+
+
+def held(finished: Finished) -> list[Claim]:
+    """How many movements of robots drawn for each pair lie in the predicted interval."""
+    share = 100.0 * finished.findings.covered
+    name = f"statistics: {finished.findings.driven} movements within the predicted 90 % interval"
+    return [at_least(f"{name}, each pair with a robot of its own", share, "%", HELD)]
+
+
+def never_slower(finished: Finished) -> list[Claim]:
+    """Law 4."""
+    slower = finished.findings.slower
+    return [at_most("statistics: slower with joints of their own laws, objective time", slower, "", 0.0)]
+
+
+def resampled(finished: Finished) -> None:
+    """How often the interval of the mean holds where pairs are drawn from the differences of a study."""
+    rng = np.random.default_rng(5)
+    for each in finished.findings.comparisons:
+        if each.name not in ("duration", "energy, direct") or each.pairs < 2 or math.isnan(each.mean.low):
+            continue
+        row: dict[str, object] = {"held of 90 %": each.name}
+        for count in COUNTS:
+            drawn = rng.choice(each.values, (SAMPLES, count))
+            half = t_quantile(0.95, count - 1) * drawn.std(axis=1, ddof=1) / math.sqrt(count)
+            inside = np.abs(drawn.mean(axis=1) - each.mean.value) <= half
+            row[f"{count} pairs"] = 100.0 * float(inside.mean())
+        print(line_of(row))

@@ -1,0 +1,229 @@
+"""What the statistics may say: how often intervals hold, what chance alone shows, which words."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from math import comb
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ir_studies.statistics.failures import NO_PAIR, NOT_DRIVEN, failures_of
+from ir_studies.statistics.figures import findings_of
+from ir_studies.statistics.intervals import chance_of, median_of, shown_together, skewed
+from ir_studies.statistics.outputs import page_html, summed_up
+from ir_studies.statistics.settings import DRAWN, StatisticsSettings
+from ir_studies.statistics.verdict import effect_words, sentences
+
+ASKED = StatisticsSettings("open")
+OFTEN = 2000  # samples, by which a share near 0.9 is known within 0.02 (three standard deviations)
+SIDES = ("synchronous", "asynchronous")
+
+
+def movement(timing: str, number: int, **figures: float) -> dict[str, Any]:
+    """A solved and driven movement."""
+    common = {"duration_s": 2.0, "direct_j": 100.0, "indirect_j": 95.0, "predicted_j": 95.0}
+    within = {"predicted_low_j": 95.0, "predicted_high_j": 120.0}
+    named = {"solved": True, "timing": timing, "trajectory_id": f"{timing}{number}", "message": ""}
+    return named | common | within | figures
+
+
+def pairs(*shares: float, column: str = "direct_j", number: int | None = None) -> list[dict[str, Any]]:
+    """Rows whose asynchronous movement takes so many shares more of a figure that is 100."""
+    return [
+        {
+            "start": "a",
+            "goal": "b",
+            "synchronous": movement("synchronous", k if number is None else number, **{column: 100.0}),
+            "asynchronous": movement(
+                "asynchronous", k if number is None else number, **{column: 100.0 * (1.0 + share)}
+            ),
+        }
+        for k, share in enumerate(shares)
+    ]
+
+
+def said(rows: list[dict[str, Any]], settings: StatisticsSettings = ASKED) -> str:
+    """All sentences."""
+    return " ".join(sentences(findings_of(rows), settings))
+
+
+def sample(kind: str, count: int) -> np.ndarray:
+    """(OFTEN, count) values of mean 0; skewed: three of four are alike, the others above."""
+    rng = np.random.default_rng(11)
+    if kind == "normal":
+        return rng.normal(0.0, 1.0, (OFTEN, count))
+    return rng.exponential(1.0, (OFTEN, count)) * (rng.random((OFTEN, count)) < 0.25) - 0.25
+
+
+@pytest.mark.parametrize("count", [5, 12, 40])
+def test_the_interval_of_the_mean_holds_nine_times_of_ten_where_pairs_are_normal(count: int) -> None:
+    held = np.mean([chance_of(values) > 0.10 for values in sample("normal", count)])
+    assert held == pytest.approx(0.90, abs=0.02)
+
+
+def test_where_few_pairs_carry_the_mean_its_interval_holds_less_often_and_that_is_recognised() -> None:
+    drawn = sample("skewed", 20)
+    held = np.mean([chance_of(values) > 0.10 for values in drawn])
+    assert held < 0.85
+    assert np.mean([skewed(values) for values in drawn]) > 0.9
+    assert np.mean([skewed(values) for values in sample("normal", 60)]) < 0.1
+
+
+@pytest.mark.parametrize("kind", ["normal", "skewed"])
+@pytest.mark.parametrize("count", [5, 12, 40])
+def test_the_interval_of_the_median_holds_at_least_nine_times_of_ten(kind: str, count: int) -> None:
+    truth = 0.0 if kind == "normal" else -0.25
+    found = [median_of(values) for values in sample(kind, count)]
+    assert np.mean([each.low <= truth <= each.high for each in found]) >= 0.88
+
+
+@given(st.integers(1, 60))
+def test_the_interval_of_the_median_is_the_shortest_with_its_level(count: int) -> None:
+    found = median_of(np.arange(count, dtype=float))
+
+    def level(k: int) -> float:  # of the interval from the k-th value to the k-th from above, by counting
+        return 1.0 - 2.0 * sum(comb(count, i) for i in range(k + 1)) / 2.0**count
+
+    if np.isnan(found.low):
+        assert level(0) < 0.90
+    else:
+        assert level(int(found.low)) >= 0.90 > level(int(found.low) + 1)
+        assert found.low + found.high == count - 1
+
+
+def test_a_difference_by_chance_alone_is_shown_in_one_study_of_ten() -> None:
+    rng = np.random.default_rng(4)
+    studies = 600
+    by_chance = sum(
+        any(shown_together([chance_of(values) for values in rng.normal(0.0, 1.0, (8, 40))]))
+        for _ in range(studies)
+    )
+    assert 0.06 < by_chance / studies < 0.13
+
+
+@given(st.lists(st.floats(0.0, 1.0) | st.just(float("nan")), max_size=5))
+def test_what_is_shown_together_is_shown_by_the_closed_test_of_all_intersections(
+    chances: list[float],
+) -> None:
+    tested = [k for k, chance in enumerate(chances) if chance == chance]
+
+    def refused(group: tuple[int, ...]) -> bool:  # Bonferroni
+        return min(chances[k] for k in group) * len(group) <= 0.10
+
+    groups = [group for n in range(1, len(tested) + 1) for group in itertools.combinations(tested, n)]
+    expected = [
+        k in tested and all(refused(group) for group in groups if k in group) for k in range(len(chances))
+    ]
+    assert shown_together(chances) == [bool(one) for one in expected] or any(
+        abs(chances[k] * n - 0.10) < 1e-9 for k in tested for n in range(1, 10)
+    )
+
+
+def test_one_difference_among_eight_that_chance_explains_is_not_shown() -> None:
+    shares = np.random.default_rng(8).normal(0.0, 0.02, 40)
+    shares += 0.0068 - shares.mean()  # its own interval leaves out zero, by little
+    rows = pairs(*shares.tolist())
+    for k, row in enumerate(rows):  # the other figures vary too
+        for name in ("duration_s", "predicted_j", "indirect_j", "peak_w"):
+            row["synchronous"][name], row["asynchronous"][name] = 100.0, 100.0 + (-1.0) ** k
+    found = findings_of(rows)
+    energy = next(each for each in found.comparisons if each.name == "energy, direct")
+    assert energy.outside
+    assert not energy.shown
+    assert "among so many comparisons none is shown" in said(rows)
+
+
+def test_no_difference_names_what_the_means_are_equal_within() -> None:
+    rows = pairs(*([0.01, -0.01] * 20))
+    assert "no difference is shown, the means are equal within 0.27 %" in said(rows)
+
+
+def test_figures_that_differ_by_rounding_are_alike() -> None:
+    rows = pairs(*(1e-14 * k for k in range(1, 40)), column="movement_cost")
+    found = findings_of(rows)
+    cost = next(each for each in found.comparisons if each.name.startswith("W "))
+    assert (cost.less, cost.more, cost.outside, cost.shown) == (0, 0, False, False)
+
+
+@pytest.mark.parametrize(
+    ("shares", "words"),
+    [
+        ((), "so 0 are compared"),
+        ((0.1,), "+10.00 % in 1 pair, which says nothing of others"),
+        ((0.1,), "With 1 pair this mean says little"),
+        ((0.1, 0.1), "+10.00 % in 2 pairs, all alike"),
+        ((0.0, 0.0), "energy, direct: 0.00 % in 2 pairs, all alike"),
+        ((0.1, -0.1), "no difference is shown"),
+    ],
+)
+def test_few_pairs_say_little(shares: tuple[float, ...], words: str) -> None:
+    assert words in said(pairs(*shares))
+    assert words.split(":")[0] in page_html(findings_of(pairs(*shares)), ASKED)
+
+
+def test_movements_that_were_drawn_again_are_counted() -> None:
+    assert "3 are compared, 1 of them different" in said(pairs(0.1, 0.1, 0.1, number=7))
+
+
+def test_all_coincide_and_nothing_is_compared() -> None:
+    rows = [{"synchronous": movement("synchronous", 0), "asynchronous": movement("synchronous", 0)}] * 3
+    found = findings_of(rows)
+    assert (found.solved, found.same, found.driven) == (3, 3, 3)
+    assert "in 3 of them the asynchronous answer is the synchronous one, so 0 are compared" in said(rows)
+    assert "candidate" not in said(rows)
+
+
+def test_reasons_are_counted_without_their_figures_and_movements_that_were_not_driven_apart() -> None:
+    def lost(clearance: float) -> dict[str, Any]:
+        message = f"on it t_f2 and lathe come to {clearance} mm at 11 % of it (tcp at 0.66, {clearance} m)"
+        return {timing: {"solved": False, "message": message} for timing in SIDES}
+
+    still = pairs(0.0)[0]
+    still["synchronous"] |= {"direct_j": float("nan"), "message": "axis 2: 99.1 % of its torque"}
+    found = failures_of([lost(18.5), still, lost(17.25)])
+    assert [(each.what, each.count) for each in found] == [(NO_PAIR, 2), (NOT_DRIVEN, 1)]
+    assert "18.5 mm" in found[0].example
+    words = said([lost(18.5), still, lost(17.25)])
+    assert "2 pairs without both movements, since on it t_f2" in words
+    assert "1 movement without a measurement, since axis 2" in words
+    page = page_html(findings_of([lost(18.5), still, lost(17.25)]), ASKED)
+    assert "What was left out" in page
+    assert "axis 2" in page
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (replace(ASKED, objective="time"), "none may be slower: a rule, no finding. Slower are 1 of 3"),
+        (ASKED, "1 of 3 take longer"),
+        (replace(ASKED, planner=""), "better by time_and_energy as predicted"),
+    ],
+)
+def test_what_a_rule_of_the_planner_makes_is_no_finding(asked: StatisticsSettings, words: str) -> None:
+    assert words in said(pairs(0.1, 0.0, -0.1, column="duration_s"), asked)
+
+
+def test_one_robot_says_little_of_the_predicted_interval() -> None:
+    assert "all of one robot" in said(pairs(0.1, 0.2))
+    assert "by a robot drawn for it" in said(pairs(0.1, 0.2), replace(ASKED, plant=DRAWN))
+
+
+def test_each_pair_has_a_robot_of_its_own() -> None:
+    assert [replace(ASKED, plant=DRAWN).plant_of(k) for k in (0, 7)] == ["typical:0", "typical:7"]
+    assert ASKED.plant_of(7) == "typical:0"
+
+
+def test_effects_have_the_usual_words() -> None:
+    words = [effect_words(d).split(" beside")[0] for d in (0.1, -0.2, 0.5, -0.8, 3.0)]
+    assert words == ["very small", "small", "medium", "large", "large"]
+
+
+def test_the_summary_has_every_comparison_and_agreement() -> None:
+    lines = summed_up(findings_of(pairs(0.1, 0.2, 0.3))).splitlines()
+    assert len(lines) == 1 + 8 + 2
+    assert lines[-1].startswith('"indirect against direct",3,6,')
