@@ -6,6 +6,7 @@ import csv
 import sqlite3
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -141,6 +142,18 @@ def test_a_folder_of_other_settings_is_refused(fought: Fought, tmp_path: Path) -
     other = ArenaSettings(cells=("open",), planners=("sbl",), seconds=2.0)
     with pytest.raises(FolderError, match=r"results with seconds 0.01, the settings have 2.0"):
         run_arena(other, tmp_path / "out")
+
+
+def test_a_folder_from_before_further_iterations_goes_on_with_none(
+    tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    settings = ArenaSettings(("open",), ("sbl",), tasks=("home->p1",), seconds=0.01, further_iterations=0)
+    first = run_arena(settings, tmp_path, Means(2, command=command))
+    kept = (tmp_path / NAME).read_text()
+    assert "further_iterations" not in kept
+    assert table(run_arena(settings, tmp_path, Means(2, command=("false",)))) == table(first)
+    with pytest.raises(FolderError, match="further_iterations"):
+        run_arena(replace(settings, further_iterations=7), tmp_path)
 
 
 def test_two_arenas_in_one_folder_are_one_too_many(fought: Fought) -> None:

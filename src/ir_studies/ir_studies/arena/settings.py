@@ -76,6 +76,8 @@ class ArenaSettings:
         """What the results of a run depend on beside the axes."""
         axes = ("cells", "planners", "tasks", "seeds", "loads", "timings", "hang_after")
         kept = {name: value for name, value in asdict(self).items() if name not in axes}
+        if not self.further_iterations:
+            del kept["further_iterations"]  # as results that were made before there was such a key
         return {**kept, "clock": "processor"}
 
     def work_of(self, request: int) -> int:
