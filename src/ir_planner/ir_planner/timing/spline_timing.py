@@ -42,12 +42,12 @@ def time_spline(
     if given is None:
         steps = _even(1.5 * natural_durations(points, limits.velocity))
         for _ in range(_ROUNDS):
-            use = spline_use(points, steps * GRID_S, limits, dynamics)
+            use = spline_use(points, np.asarray(steps * GRID_S), limits, dynamics)
             steps = _even(steps * GRID_S * np.clip(use, 0.6, 1.7) ** 0.6)
     else:
         steps = _even(given)
     for k in range(_STRETCHES):
-        worst = float(spline_use(points, steps * GRID_S, limits, dynamics).max())
+        worst = float(spline_use(points, np.asarray(steps * GRID_S), limits, dynamics).max())
         if worst <= 1.0:
             trajectory = _spline(points, steps, joint_names)
             worst = float(_interval_use(trajectory, len(points), limits, dynamics).max())
