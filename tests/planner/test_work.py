@@ -11,12 +11,13 @@ import pytest
 from asking import planned
 
 from ir_msgs_py.options import PlanOptions
+from ir_planner.checks import FreeSpace
 from ir_planner.program.parallel import mapped
 from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.search import SEARCHES
+from ir_planner.search import SEARCHES, Ends
 
 SceneOf = Callable[[str], PlanningScene]
 
@@ -42,3 +43,14 @@ def test_work_for_one_thread_is_done_by_the_thread_that_asks(demo_scene: Plannin
     context = Context(demo_scene, PlanOptions(), Journal(work, 0))
     found = mapped(lambda item, mine: threading.get_ident(), range(8), context, 0, [1] * 8)
     assert set(found) == {threading.get_ident()}
+
+
+def test_sbl_exceeds_its_work_nowhere(scene_of: SceneOf) -> None:
+    """Samples are charged by the forty, so it depends on the count whether the last ones still fit."""
+    scene = scene_of("table_columns")
+    task = scene.cell.task("tL->tR")
+    ends = Ends(np.array(task.start), np.array([task.goal]))
+    for allowed in range(1, 60):
+        space = FreeSpace.of(scene, 0.02, Work(allowed, 1.0, lambda: 0.0))
+        SEARCHES["sbl"].find(ends, space, allowed, space.work)
+        assert space.work.iterations <= allowed

@@ -98,10 +98,14 @@ class _Sbl:
         return np.asarray(q)
 
     def _free(self, q: FloatArray) -> BoolArray:
-        """Which of q (N, n) are free; charged to the work."""
-        before = self._states // _STATES_PER_EDGE
-        self._states += len(q)
-        self.space.work.spend(self._states // _STATES_PER_EDGE - before)
+        """Which of q (N, n) are free; charged to the work, and not looked at where that does not suffice."""
+        work, after = self.space.work, self._states + len(q)
+        edges = after // _STATES_PER_EDGE - self._states // _STATES_PER_EDGE
+        self._states = after
+        if edges > work.left:
+            work.spend(work.left)
+            return np.zeros(len(q), dtype=bool)
+        work.spend(edges)
         return self.space.states_free(q)
 
     def _expanded(self) -> int:
