@@ -1,8 +1,13 @@
-"""Asks OMPL's processes: starts the one that has loaded it, hands over problems, kills what is late."""
+"""Asks OMPL's processes: starts the one that has loaded it, hands over problems, kills what is late.
+
+Nothing here waits without an end: a process that is stopped, or that never answers, costs a request its time
+and no more.
+"""
 
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import socket
 import subprocess
@@ -13,6 +18,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from dataclasses import replace
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import send_handle
 
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
@@ -21,6 +27,7 @@ from ir_planner.search.with_ompl.problem import Outcome, Problem
 
 _LOOK_S = 0.005  # s between two looks whether the request was cancelled or its time is up
 _ATTEMPTS = 2  # a host that died since the last request is started again once
+_PATIENCE = 24_000  # looks, two minutes, until a host that answers nobody is ended: OMPL loads in seconds
 Charged = Callable[[int], AbstractContextManager[object]]
 _charged: Charged = lambda process: nullcontext()  # noqa: E731 - until somebody asks
 
@@ -30,6 +37,8 @@ class Host:
 
     def __init__(self) -> None:
         self._ours, theirs = socket.socketpair()
+        self._ours.setblocking(False)
+        self._looks = 0  # since it last answered
         module = __name__.rpartition(".")[0] + ".worker"
         command = f"from {module} import main; main({theirs.fileno()})"
         with theirs:
@@ -44,15 +53,31 @@ class Host:
         self.owner = os.getpid()
 
     def connection(self) -> Connection:
-        """To a new process, which waits for one problem. Raises OSError where the host is gone."""
+        """To a new process, which waits for one problem. Raises OSError where the host is gone, or stands."""
         ours, theirs = socket.socketpair()
-        with theirs:
+        with theirs, ours:
             socket.send_fds(self._ours, [b"."], [theirs.fileno()])
-        return Connection(ours.detach())
+            return Connection(ours.detach())
+
+    def process_of(self, connection: Connection, work: Work) -> int | None:
+        """Id of the process at the other end, once it is there; None where the work ended before.
+
+        Raises EOFError or OSError where the host is gone, or has answered nobody for too long.
+        """
+        while not connection.poll(_LOOK_S):
+            self._looks += 1
+            if self._looks > _PATIENCE:
+                raise EOFError("OMPL's process is silent")
+            work.check()
+            if work.exhausted:
+                return None
+        self._looks = 0
+        return int(connection.recv())
 
     def close(self) -> None:
-        """End the host; what was forked from it ends by itself."""
+        """End the host, also one that is stopped; what was forked from it ends with it."""
         self._ours.close()
+        self._process.kill()
         self._process.wait()
 
 
@@ -60,23 +85,50 @@ _lock = threading.Lock()
 _host: Host | None = None
 
 
-def _connected() -> tuple[Connection, int]:
-    """A connection to a new process, and its id."""
+def _current() -> Host:
     global _host  # one per process, whatever number of planners
-    for attempt in range(_ATTEMPTS):
-        with _lock:
-            if _host is None or _host.owner != os.getpid():
-                _host = Host()
-            host = _host
-        with suppress(OSError, EOFError):
+    with _lock:
+        if _host is None or _host.owner != os.getpid():
+            _host = Host()
+        return _host
+
+
+def _dropped(host: Host) -> None:
+    """The next request starts another one."""
+    global _host
+    with _lock:
+        if _host is host:
+            _host = None
+    host.close()
+
+
+@contextmanager
+def _connected(work: Work) -> Iterator[tuple[Connection, int] | None]:
+    """A connection to a new process, and its id; the process is killed with the context: it waits after its
+    answer. None where the work ended before it was there.
+    """
+    for _ in range(_ATTEMPTS):
+        host = _current()
+        try:
             connection = host.connection()
-            return connection, connection.recv()
-        with _lock:
-            if _host is host:
-                _host = None
-        host.close()
-        if attempt == _ATTEMPTS - 1:
-            break
+        except OSError:
+            _dropped(host)
+            continue
+        with connection:
+            try:
+                process = host.process_of(connection, work)
+            except (EOFError, OSError):
+                _dropped(host)
+                continue
+            if process is None:
+                yield None
+                return
+            try:
+                yield connection, process
+            finally:
+                with suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            return
     raise RequestError(StatusCode.FAILURE, "OMPL's process does not start")
 
 
@@ -93,16 +145,6 @@ def charge_to(charged: Charged) -> None:
     _charged = charged
 
 
-@contextmanager
-def _killed(process: int) -> Iterator[None]:
-    """Ended with the context: it waits after its answer."""
-    try:
-        yield
-    finally:
-        with suppress(ProcessLookupError):
-            os.kill(process, signal.SIGKILL)
-
-
 def check_installed(name: str) -> None:
     """Raise RequestError with how to install OMPL where it isn't."""
     if missing():
@@ -115,16 +157,30 @@ def asked(problem: Problem, work: Work) -> Outcome:
     Raises CancelledError when asked to stop.
     """
     work.check()
-    connection, process = _connected()
-    with connection, _killed(process), _charged(process):
+    with _connected(work) as connected:
+        if connected is None:
+            return Outcome(None, 0, "OMPL's process was not ready within planning_time")
+        connection, process = connected
+        with _charged(process):
+            outcome = _answer(connection, process, problem, work)
+    work.spend(outcome.edges)
+    return outcome
+
+
+def _answer(connection: Connection, process: int, problem: Problem, work: Work) -> Outcome:
+    """What the process says to the problem. Both go through a file in memory, which never blocks."""
+    with os.fdopen(os.memfd_create("problem"), "r+b") as sheet:
+        pickle.dump(replace(problem, scene=replace(problem.scene)), sheet)  # without what it has computed
+        sheet.flush()
         try:
-            connection.send(replace(problem, scene=replace(problem.scene)))  # without what it has computed
+            send_handle(connection, sheet.fileno(), process)
             while not connection.poll(_LOOK_S):
                 work.check()
                 if work.exhausted:
                     return Outcome(None)
-            outcome: Outcome = connection.recv()
+            connection.recv()
         except (EOFError, OSError):
             return Outcome(None, 0, "OMPL's process ended without an answer")
-    work.spend(outcome.edges)
-    return outcome
+        sheet.seek(0)
+        outcome: Outcome = pickle.load(sheet)
+        return outcome

@@ -7,11 +7,14 @@ edges of the same kernel that the project's searches use; what a planner may spe
 
 from __future__ import annotations
 
+import ctypes
 import os
+import pickle
 import select
 import signal
 import socket
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle
 
 import numpy as np
 
@@ -28,6 +31,7 @@ except ImportError as error:  # reported to whoever asks
 
 STATES_PER_EDGE = 40  # configurations that cost as much as one certified edge, as in the genetic search
 _LOOK = 64  # checks between two looks whether somebody still waits for the answer
+_PR_SET_PDEATHSIG = 1  # of prctl: the signal that a process gets when its parent ends
 _GRACE = 600.0  # s beyond the ceiling: who asks ends the process at the ceiling, this is for when nobody does
 _JOINTS_OF_CELLS = 3  # the first joints carry the arm
 
@@ -43,22 +47,33 @@ def main(descriptor: int) -> None:
             message, descriptors, _, _ = socket.recv_fds(requests, 1, 1)
             if not message:
                 os._exit(0)  # without the destructors of libraries, which complain
+            parent = os.getpid()
             if os.fork() == 0:
-                requests.close()
-                _answer(Connection(descriptors[0]))
-                os._exit(0)
+                try:
+                    requests.close()
+                    _answer(Connection(descriptors[0]), parent)
+                finally:
+                    os._exit(0)
             os.close(descriptors[0])
 
 
-def _answer(connection: Connection) -> None:
+def _answer(connection: Connection, parent: int) -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # also where this process is stopped
+    if os.getppid() != parent:
+        return
     connection.send(os.getpid())
-    problem: Problem = connection.recv()
-    signal.setitimer(signal.ITIMER_REAL, problem.seconds + _GRACE)
-    try:
-        outcome = Outcome(None, 0, _REASON) if _REASON else solved(problem, connection)
-    except Exception as error:  # goes to who asked, whatever it is: this process has no other voice
-        outcome = Outcome(None, 0, f"{type(error).__name__}: {error}")
-    connection.send(outcome)
+    with os.fdopen(recv_handle(connection), "r+b") as sheet:
+        sheet.seek(0)
+        problem: Problem = pickle.load(sheet)
+        signal.setitimer(signal.ITIMER_REAL, problem.seconds + _GRACE)
+        try:
+            outcome = Outcome(None, 0, _REASON) if _REASON else solved(problem, connection)
+        except Exception as error:  # goes to who asked, whatever it is: this process has no other voice
+            outcome = Outcome(None, 0, f"{type(error).__name__}: {error}")
+        sheet.seek(0)
+        pickle.dump(outcome, sheet)
+        sheet.flush()
+    connection.send(True)
     connection.poll(None)  # until who asked ends this, or is gone
 
 
