@@ -214,8 +214,9 @@ def test_a_machine_may_be_called_like_what_else_moves(laid: Laid, tmp_path: Path
     moved = {"base": {"x": (-0.2, 0.2)}, "equipment": {name: {"x": (-0.3, 0.3)}}}
     laid(replace(SPREAD, cell=str(path), placements=20, **moved))
     page = (tmp_path / "out" / "index.html").read_text()
-    at = [re.findall(r'class="given" d="M(\S+) ', view)[0] for view in page.split('class="plan"')[1:]]
-    assert len(set(at)) == 2  # the base stands somewhere else than the machine
+    titles = re.findall(r"<h3>(\S+), ([\d.]+) m from edge to edge", page)
+    assert [title[0] for title in titles] == ["base", name]
+    assert titles[0][1] != titles[1][1]  # each with its own places
 
 
 def test_no_mark_lies_outside_its_picture(laid: Laid, tmp_path: Path) -> None:

@@ -111,10 +111,10 @@ def _maps(
         if star is not None:
             marks.append((place_of(owner, star), "best", "", "best"))
         drawings.append((owner.removeprefix(_MACHINE), marks))
-    places = [place for _, marks in drawings for place, *_ in marks]
-    view = PlanView(cell, star, np.reshape(places, (-1, 2)))
     for name, marks in drawings:
-        yield f"<div><h3>{text(name)}</h3>{view.drawn(f'Where {name} stands', marks)}</div>"
+        view = PlanView(cell, star, np.array([place for place, *_ in marks]))
+        title = f"{name}, {view.across:.1f} m from edge to edge"
+        yield f"<div><h3>{text(title)}</h3>{view.drawn(f'Where {name} stands', marks)}</div>"
 
 
 def place_of(owner: str, cell: Cell) -> FloatArray:

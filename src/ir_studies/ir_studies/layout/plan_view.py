@@ -18,7 +18,8 @@ from ir_studies.layout.placement import Known
 WIDTH = 520.0  # of a drawing; its height follows
 _MARGIN = 12.0
 _TALLEST = 1.5  # height of a drawing in widths
-_LEAST_M = 0.1  # m across it
+_AROUND = 0.6  # of the extent of all places that is shown around them
+_LEAST_M = 0.3  # m, at least
 Mark: TypeAlias = "tuple[FloatArray, str, str, str]"
 """A place (2,) m, its kind, its colour, its words."""
 _COLOURS = ("#1a7f5a", "#5aa02c", "#b5a900", "#e08a00", "#d1495b")  # from least cost to most
@@ -53,23 +54,24 @@ def legend(low: float, high: float) -> str:
     keys = (
         f'<span><span class="key" style="background:{one}"></span>{text(joules(float(at)))} …</span>'
         for one, at in zip(_COLOURS, steps, strict=False)
+        if math.isfinite(low)
     )
     rest = ("○ looked at only: estimated", "× impossible", "◆ as given", "★ best_1.yaml")
     return f'<p class="key-row">{"".join(keys)}{"".join(f"<span>{one}</span>" for one in rest)}</p>'
 
 
 class PlanView:
-    """Draws places (2,) m of the world; given and best: the cell as it is and as it should be; places (N, 2):
-    what else must be in sight.
+    """Draws places (2,) m of the world; given and best: the cell as it is and as it should be, as far as it
+    lies around places (N, 2), which all are in sight. across: m from edge to edge.
     """
 
     def __init__(self, given: Cell, best: Cell | None, places: FloatArray) -> None:
         self._outlines = [("was", one) for one in outlines(given)]
         self._outlines += [("best", one) for one in (outlines(best) if best is not None else ())]
-        corners = np.concatenate([places, *(points for _, points in self._outlines)])
-        self._low, high = corners.min(axis=0), corners.max(axis=0)
-        across, up = (float(one) for one in high - self._low)
-        self._scale = (WIDTH - 2 * _MARGIN) / max(across, up / _TALLEST, _LEAST_M)
+        around = max(_AROUND * float(np.ptp(places, axis=0).max()), _LEAST_M)
+        self._low, high = places.min(axis=0) - around, places.max(axis=0) + around
+        self.across, up = (float(one) for one in high - self._low)
+        self._scale = (WIDTH - 2 * _MARGIN) / max(self.across, up / _TALLEST)
         self._height = self._scale * up + 2 * _MARGIN
 
     def drawn(self, name: str, marks: Sequence[Mark]) -> str:
