@@ -176,6 +176,7 @@ def test_all_coincide_and_nothing_is_compared() -> None:
     assert (found.solved, found.same, found.driven) == (3, 3, 3)
     assert "in 3 of them the asynchronous answer is the synchronous one, so 0 are compared" in said(rows)
     assert "candidate" not in said(rows)
+    assert "With 3 pairs these means say little" in said(rows)
 
 
 def test_reasons_are_counted_without_their_figures_and_movements_that_were_not_driven_apart() -> None:

@@ -101,9 +101,10 @@ def _measurements(found: Findings, settings: StatisticsSettings) -> Iterator[str
 
 def _limits(found: Findings, settings: StatisticsSettings) -> Iterator[str]:
     own = found.solved - found.same
-    if 0 < own < FEW:
-        few = "this mean says" if own == 1 else "these means say"
-        yield f"With {_some(own, 'pair')} {few} little, for few movements may carry them: ask for more pairs."
+    pairs = own or max((each.pairs for each in found.agreements), default=0)
+    if 0 < pairs < FEW:
+        few = "this mean says" if pairs == 1 else "these means say"
+        yield f"With {_some(pairs, 'pair')} {few} little, for few may carry them: ask for more pairs."
     elif any(each.skewed for each in found.comparisons if each.name in _SAID):
         yield "Where few pairs carry a mean its interval holds less often than 90 %: look at the dots."
     if own:
