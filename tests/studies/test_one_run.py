@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -60,3 +61,17 @@ def test_all_requests_may_be_given_the_same_work(planner: Planner, monkeypatch: 
     options, row = asked(planner, monkeypatch, requests=2, max_iterations=9_000, further_iterations=0)
     assert [one.max_iterations for one in options] == [9_000, 9_000]
     assert row["solved"]
+
+
+def test_what_comes_after_the_seconds_does_not_count(planner: Planner) -> None:
+    """Each look at the clock takes a third of the seconds: the second request's answer is late."""
+    instants = iter(range(1000))
+    settings = ArenaSettings((ENTRY.cell,), seconds=3.5, requests=0)
+    row = one_run(ENTRY, settings, planner, lambda: float(next(instants)))
+    assert row["requests"] == 2
+    assert [at for at, _ in row["progress"]] == [2.0]
+    assert row["final_s"] == 2.0
+
+    late = one_run(ENTRY, replace(settings, seconds=1.5), planner, lambda: float(next(instants)))
+    assert not late["solved"]
+    assert "after 2 s, over seconds 1.5" in late["message"]
