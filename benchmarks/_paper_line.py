@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from _paper_plots import finished, panels
-from _paper_result import HOLDS, Experiment, Row, Statement
+from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
 from _paper_statistics import interval
 from _regional_ours import planner_of
 
@@ -89,14 +89,15 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
 def follows(statements: Sequence[Statement]) -> str:
     """What the figures mean."""
     drives, line, left, mains, line_mains, _ = statements
-    worth = "more" if line.verdict == HOLDS else "not surely more"
+    worth = {HOLDS: "more", FAILS: "not more"}.get(line.verdict, "not surely more")
+    least, most = sorted((line.value, line_mains.value))
     return (
         f"Planned programs save {drives.value:.0f} % of the drives' energy and {mains.value:.0f} % of the "
         f"robot's at the mains. If Table I's {_shares()[ROBOT]:g} % are drives alone, a line saves "
         f"{line.value:.1f} % ({worth} than PLCs and network take) and the robots' share becomes "
-        f"{left.value:.1f} %; if they are whole robots, {line_mains.value:.1f} %. Half of a line's energy "
-        "is the hall: planning robots better is worth a few percent of the bill, and line stand-by (4.5 "
-        "%) is of the same order. That other consumers stay as they are is assumed, not measured."
+        f"{left.value:.1f} %; if they are whole robots, {line_mains.value:.1f} %. So planning robots "
+        f"better is worth {least:.0f} to {most:.0f} % of a line's energy, of which the hall takes half and "
+        "line stand-by 4.5 %. That other consumers stay as they are is assumed, not measured."
     )
 
 

@@ -38,8 +38,8 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
 def follows(statements: Sequence[Statement]) -> str:
     """What the figures mean."""
     return (
-        f"All values are met within {statements[0].value:.2f} %, because the watts of controller, drives "
-        "and tool were chosen so. That says that the model can hold these eight numbers, not that it is "
+        f"The values are met within {statements[0].value:.2g} %, and the watts of controller, drives and "
+        "tool were chosen for that. That says that the model can hold these eight numbers, not that it is "
         "right: at other postures, payloads and for the times of transitions the paper has no figures to "
         "hold it against."
     )

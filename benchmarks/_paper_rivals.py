@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -18,10 +19,10 @@ EDGES = 6000  # checks of a search, in certified edges: one that spends them cou
 SIZES = (0, 1, 3, 10, 30, MOST)
 FEW = 10  # zones up to which there are few
 KPIECE_SIZES = (1, 10, 30, MOST)
-KPIECE_PLACES, PLACES, TASKS = 32, 8, 3  # cells per type and seed of either claim, movements in each
+KPIECE_PLACES, PLACES, TASKS = 80, 8, 3  # cells per type and seed of either claim, movements in each
 CROWDED, RIVALS = 48, ("rrt", "genetic")  # cells among MOST zones alone, and who searches there
 _SEEDS = 1000  # between the cells of two seeds
-ONE_CELL = 100.0  # rad: larger than every joint's range
+ONE_CELL = math.inf  # rad: a finite one, however large, parts the joints at zero
 SUPERFLUOUS = 0.9  # of the checks without cells: less would be worth having them
 SLOWER = 1.2  # times the checks among one zone from which on a planner has slowed down
 COMPARED = ("rrt", "rrt_connect", "tree", "genetic")
@@ -62,7 +63,7 @@ def _ratios(rows: Sequence[Row], one: Row, other: Row, key: str = "edges") -> tu
 
 
 def measure_kpiece(seed: int, quick: bool) -> list[Row]:
-    """A row per search with cells of 0.3 rad, and with a grid of one cell per quadrant of the joints."""
+    """A row per search with cells of 0.3 rad, and with one cell alone."""
     rows = []
     for asked, question in _among_zones(seed, KPIECE_SIZES, range(KPIECE_PLACES), quick=quick):
         for draw in range(1 if quick else 2):
@@ -95,13 +96,20 @@ def judge_kpiece(rows: Sequence[Row]) -> list[Statement]:
 def follows_kpiece(statements: Sequence[Statement]) -> str:
     """What the figures mean."""
     few, many = statements
+    tenth = 1.0 - SUPERFLUOUS
     start = {
-        HOLDS: f"The paper is right: with few zones the cells save nothing ({few.value:.2f} of the checks)",
-        FAILS: f"Even with few zones the cells save checks ({few.value:.2f} of those without)",
+        HOLDS: f"The paper is right: with few zones the cells save less than {tenth:.0%} of the checks "
+        f"({few.value:.2f} of those without)",
+        FAILS: f"Even with few zones the cells save more than {tenth:.0%} of the checks ({few.value:.2f} of "
+        "those without)",
     }.get(few.verdict, f"With few zones the ratio is {few.value:.2f}, which doesn't decide it")
+    then = {HOLDS: "nor do they among more", FAILS: "among more they save more than that"}
+    if few.verdict != HOLDS:
+        then = {HOLDS: "among more they save less than that", FAILS: "among more they do save that much"}
+    rest = "costs no checks" if max(few.low, many.low) <= 1.0 else "costs checks"
     return (
-        f"{start}; among more it is {many.value:.2f} [{many.low:.2f}, {many.high:.2f}]. The grid costs no "
-        "checks, only memory: it stays as OMPL has it."
+        f"{start}; {then.get(many.verdict, 'whether they save that among more is open')} ({many.value:.2f} "
+        f"[{many.low:.2f}, {many.high:.2f}]). The grid {rest}: it stays as OMPL has it."
     )
 
 
@@ -152,23 +160,34 @@ def judge_rrt(rows: Sequence[Row]) -> list[Statement]:
 def follows_rrt(statements: Sequence[Statement]) -> str:
     """What the figures mean."""
     opened, semi, closed, rrt, connect, tree, genetic, time = (one.value for one in statements)
-    helps = {HOLDS: "", FAILS: ": there it does not help"}.get(
+    helps = {HOLDS: ": it is faster", FAILS: ": it is not faster"}.get(
         statements[-1].verdict, ", which decides nothing"
     )
-    return (
-        f"RRT needs {opened:.1f}, {semi:.1f} and {closed:.1f} times the checks among {MOST} open, "
-        f"semi-closed and closed zones ({rrt:.1f} over all). But this is no property of RRT alone: the "
-        f"genetic correction needs {genetic:.0f} times, the planner's own tree {tree:.0f} times, for "
-        "among one zone most straight movements are free and these two ask for that first; RRTConnect, "
-        f"two trees, needs {connect:.1f} times. How slow a search is follows from whether the straight "
-        f"movement is blocked and how narrow is what remains. Where both succeed or fail among {MOST} "
-        f"zones, the genetic correction takes {time:.1f} times the processor time of RRT{helps}."
+    slows = {HOLDS: "RRT does slow down", FAILS: "RRT hardly slows down"}.get(
+        statements[3].verdict, "Whether RRT slows down is open"
     )
+    compared = {"RRTConnect": statements[4], "the planner's own tree": statements[5],
+                "the genetic correction": statements[6]}  # fmt: skip
+    too = [name for name, one in compared.items() if one.low >= SLOWER]
+    others = f"{', '.join(too)} slow down too" if too else "none of the others surely slows down"
+    return (
+        f"{slows}: it needs {opened:.1f}, {semi:.1f} and {closed:.1f} times the checks among {MOST} open, "
+        f"semi-closed and closed zones ({rrt:.1f} over all). Of the others, RRTConnect needs {connect:.1f}, "
+        f"the planner's own tree {tree:.1f} and the genetic correction {genetic:.1f} times: {others}. Those "
+        "that ask for the straight movement first spend one check where it is free, as it is among few "
+        f"zones. Over all searches among {MOST} zones, solved or not, the genetic correction takes "
+        f"{time:.2f} times the processor time of RRT{helps}."
+    )
+
+
+def in_every_size(rows: Sequence[Row]) -> list[Row]:
+    """Rows of the cells where every planner searched in every size: the same movements."""
+    return [row for row in rows if row["place"] in range(PLACES)]
 
 
 def tables_rrt(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Median processor time and the share solved, by size."""
-    found = []
+    rows, found = in_every_size(rows), []
     for kind in KINDS:
         for size in SIZES:
             line: Row = {"type": kind.lower().replace("_", "-"), "zones": size}
@@ -182,7 +201,7 @@ def tables_rrt(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 def draw_rrt(rows: Sequence[Row], file: Path) -> None:
     """Time over the number of zones."""
-    figure, axes = panels(3, width=3.6, height=3.4)
+    rows, (figure, axes) = in_every_size(rows), panels(3, width=3.6, height=3.4)
     for panel, kind in zip(axes, KINDS, strict=True):
         for planner in COMPARED:
             mine = [row for row in rows if row["kind"] == kind and row["planner"] == planner]
@@ -203,8 +222,8 @@ KPIECE = Experiment(
     "KPIECE: are the cells superfluous with few zones?",
     "KPIECE divides the space into cells, which are superfluous where there are few forbidden zones.",
     "OMPL's KPIECE1 among 1 to 100 zones (open, semi-closed, closed; machines of 0.3 to 0.6 m at random "
-    "around the robot), with cells of 0.3 rad over the first three joints, and with cells larger than "
-    "the joints' range. Movements between free configurations, the same ones in every size, whose "
+    "around the robot), with cells of 0.3 rad over the first three joints, and with one cell "
+    "alone. Movements between free configurations, the same ones in every size, whose "
     f"straight movement is blocked in the largest; {KPIECE_PLACES} cells of each type and seed. "
     f"Counted: checks until the first path, at most {EDGES}. "
     f"Superfluous: at least {SUPERFLUOUS:.0%} of the checks that it takes without cells.",
@@ -218,13 +237,15 @@ RRT = Experiment(
     "RRT becomes slow as the number of forbidden zones grows.",
     f"Cells and movements drawn as for KPIECE, {PLACES} cells of each type and seed among 0 to 100 zones, "
     f"and for the last statement {CROWDED} further ones among {MOST}; OMPL's RRT and RRTConnect, the "
-    f"planner's own bidirectional tree and the genetic correction, at most {EDGES} checks each. Slower: "
+    f"planner's own bidirectional tree and the genetic correction, at most {EDGES} checks each. The clock of "
+    "OMPL's planners runs from their first check to their last, without what a process and its problem take "
+    "to be set up; their checks come one by one, those of the genetic correction in batches. Slower: "
     f"at least {SLOWER} times the checks among one zone.",
     measure_rrt,
     judge_rrt,
     follows_rrt,
     tables_rrt,
     draw_rrt,
-    "Mean processor time of one search over the number of zones, by type.",
+    "Mean processor time of one search over the number of zones, by type; the same movements in every size.",
 )
 EXPERIMENTS = (KPIECE, RRT)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from _paper_pairs import CELL, Pair, pairs
 from _paper_plots import bars, finished, panels
-from _paper_result import Experiment, Row, Statement
+from _paper_result import FAILS, HOLDS, OPEN, Experiment, Row, Statement
 from _paper_statistics import interval
 from _regional_ours import planner_of
 from scipy.interpolate import make_interp_spline
@@ -99,13 +99,24 @@ def follows(statements: Sequence[Statement]) -> str:
     cubic_vias, quintic_vias = (by[f"through {VIAS} vias the spline costs no more than the {name}"]
                                 for name in (CUBIC, QUINTIC))  # fmt: skip
     return (
-        f"Between two points the spline needs {100 * (quintic - 1):+.1f} % of the quintic's joules and "
-        f"{100 * (cubic - 1):+.1f} % of the cubic's; through {VIAS} vias {100 * (quintic_vias - 1):+.1f} "
-        f"% and {100 * (cubic_vias - 1):+.1f} %. What is cheaper than eq. (10) here is a single "
-        "polynomial: the cubic accelerates at once, with a jump that no controller drives, the quintic "
-        "needs none. So eq. (10) is kept as a curve, but the time scaling and the path that the planner "
-        "optimises decide the joules."
+        f"Between two points the spline takes {100 * (quintic - 1):+.1f} % joules against the quintic and "
+        f"{100 * (cubic - 1):+.1f} % against the cubic; through {VIAS} vias {100 * (quintic_vias - 1):+.1f} "
+        f"% and {100 * (cubic_vias - 1):+.1f} %. {_cheaper(statements)} The cubic accelerates at once, with "
+        "a jump of torque at either end, the others do not. Eq. (10) is kept as a curve; the planner "
+        "optimises path and time scaling for joules."
     )
+
+
+def _cheaper(statements: Sequence[Statement]) -> str:
+    """Which curves it costs more than, which not, and what is open."""
+    parts = []
+    for verdict, words in ((FAILS, "It costs more than"), (HOLDS, "It costs no more than"), (OPEN, "Open:")):
+        some = [
+            one.says.split(" the spline costs no more than ") for one in statements if one.verdict == verdict
+        ]
+        if some:
+            parts.append(f"{words} {'; '.join(f'{curve} {where}' for where, curve in some)}.")
+    return " ".join(parts)
 
 
 def draw(rows: Sequence[Row], file: Path) -> None:

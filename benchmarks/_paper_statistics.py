@@ -89,6 +89,21 @@ def share(successes: Sequence[float], groups: Sequence[Hashable] | None = None) 
     return wilson(round(found[0] * count), count)
 
 
+def mean_difference(
+    points: Sequence[float], groups: Sequence[Hashable] | None = None
+) -> tuple[float, float, float]:
+    """The mean of differences (N,) of two successes [percentage points] with its interval. Where all are
+    equal nothing can be resampled: as many groups without another difference leave a share of such by
+    Wilson possible, to either side.
+    """
+    found = interval(mean, points, groups=groups)
+    if not len(points) or found[1] < found[2]:
+        return found
+    count = len(set(groups)) if groups is not None else len(points)
+    other = 100.0 * wilson(0, count)[2]
+    return found[0], max(found[0] - other, -100.0), min(found[0] + other, 100.0)
+
+
 def percent(found: tuple[float, float, float]) -> tuple[float, float, float]:
     """The same in percent."""
     return 100.0 * found[0], 100.0 * found[1], 100.0 * found[2]

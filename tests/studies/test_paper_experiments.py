@@ -1,0 +1,130 @@
+"""The experiments on the claims of the paper do what the page says that they do."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import _paper_ccd
+import _paper_page
+import _paper_rivals
+import _paper_statistics as statistics
+import _paper_withdrawal
+import numpy as np
+import paper
+import pytest
+from _paper_peers import Clock
+from _paper_result import FAILS, Statement
+from _paper_stations import places
+
+from ir_planner.configurations.ccd_search import Descent
+
+
+def test_a_clock_runs_from_the_first_call_to_the_end_of_the_last() -> None:
+    ticks = iter([10.0, 11.0, 15.0])
+    clock = Clock(lambda: next(ticks))
+    assert clock.seconds == 0.0
+    check = clock.timed(lambda free: free)
+    assert [check(True), check(False)] == [True, False]
+    assert clock.seconds == 5.0
+
+
+def test_a_difference_that_never_varies_is_no_certainty() -> None:
+    value, low, high = statistics.mean_difference([0.0] * 60, list(range(30)) * 2)
+    assert value == 0.0
+    assert -13.0 < low < -8.0
+    assert high == -low
+    few = Statement("", "", value, low, high, 60, "", "points", 2.0)
+    assert few.alone != FAILS
+    many = Statement("", "", *statistics.mean_difference([0.0] * 200), 200, "", "points", 2.0)
+    assert many.alone == FAILS
+    assert all(map(math.isnan, statistics.mean_difference([])))
+
+
+def test_every_seed_of_the_withdrawal_can_decide_a_difference_that_never_varies() -> None:
+    cells = len(_paper_withdrawal.CELLS) * _paper_withdrawal.VARIANTS
+    assert 100.0 * statistics.wilson(0, cells)[2] < _paper_withdrawal.POINTS
+
+
+def test_no_reading_is_always_the_first_to_be_timed() -> None:
+    names = list(_paper_withdrawal.READINGS)
+    orders = [_paper_withdrawal.in_turn(names, k) for k in range(len(names))]
+    assert {order[0] for order in orders} == set(names)
+    assert all(sorted(order) == sorted(names) for order in orders)
+
+
+def test_seeds_draw_cells_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[tuple[int, str, int]] = []
+
+    def noted(kind: str, sizes: tuple[int, ...], count: int, seed: int) -> list[Any]:
+        drawn.append((len(sizes), kind, seed))
+        return []
+
+    monkeypatch.setattr(_paper_rivals, "questions", noted)
+    for seed in range(8):
+        _paper_rivals.measure_kpiece(seed, False)
+        _paper_rivals.measure_rrt(seed, False)
+    assert len(drawn) == len(set(drawn))
+
+
+def test_the_page_names_the_seeds_of_the_pilots() -> None:
+    assert f"pilots with seeds 0 to {paper.FIRST - 1}," in _paper_page.HEAD
+
+
+def test_sizes_are_compared_on_the_same_cells() -> None:
+    rows = [{"place": place} for place in (0, _paper_rivals.PLACES - 1, _paper_rivals.PLACES)]
+    assert _paper_rivals.in_every_size(rows) == rows[:2]
+
+
+def test_without_cells_there_is_one() -> None:
+    projected = np.array([-3.0, -0.0, 0.0, 3.0])  # rad; OMPL's cell is the floor of the quotient
+    assert not np.floor(projected / _paper_rivals.ONE_CELL).any()
+
+
+def test_every_reading_of_the_descent_is_asked_for_what_its_name_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[tuple[str, str, bool, bool]] = []
+
+    def noted(pose: Any, starts: Any, scene: Any, threshold: Any, settings: Any, work: Any) -> Descent:
+        free = bool((threshold < -100.0).all())
+        asked.append((settings.set_back, settings.distribution, settings.newton_steps > 0, free))
+        return Descent(starts[:0], 0)
+
+    monkeypatch.setattr(_paper_ccd, "descend", noted)
+    place = next(places(("cnc_door",), 4, 1))
+    for reading in _paper_ccd.READINGS.values():
+        _paper_ccd._row(place, reading, np.random.default_rng(1), 4)
+    normal = "truncated_normal"
+    assert dict(zip(_paper_ccd.READINGS, asked, strict=True)) == {
+        "as read": ("secant", normal, True, False),
+        "(5) literal": ("literal", normal, True, False),
+        "no set-back": ("secant", normal, True, True),
+        "no Newton finish": ("secant", normal, False, False),
+        "no Newton finish, (5) literal": ("literal", normal, False, False),
+        "no Newton finish, no set-back": ("secant", normal, False, True),
+        "(1) uniform": ("secant", "uniform", True, False),
+    }
+
+
+def test_the_printed_mean_is_d_for_every_joint_and_has_no_direction() -> None:
+    walker = object.__new__(_paper_withdrawal.PrintedMean)
+    walker.settings, walker.first_total = SimpleNamespace(step=0.12), 2.0  # type: ignore[assignment]
+    parents = SimpleNamespace(total=np.array([2.0, 4.0]), q=np.zeros((2, 6)))
+    mean = walker._mean(parents)  # type: ignore[arg-type]
+    assert mean == pytest.approx(np.repeat([[0.12], [0.24]], 6, axis=1))
+
+
+def test_readings_of_the_withdrawal_differ_in_what_their_names_say() -> None:
+    for name, reading in _paper_withdrawal.READINGS.items():
+        assert (reading.changed.get("weighting") == "inverse") == ("inverse" in name)
+        assert ("step" in reading.changed) == ("no drift" in name)
+        assert reading.printed == ("as printed" in name)
+        assert reading.tree == ("trees" in name)
+
+
+def test_figures_near_each_other_look_different() -> None:
+    near = Statement("", "", 99.97, 99.95, 99.98, 2521, "stations", "%", 95.0)
+    assert _paper_page.measured(near) == "99.97 [99.95, 99.98] %, 2521 stations"
+    assert _paper_page.numbers(0.0, 0.0, 0.0) == ["0", "0", "0"]

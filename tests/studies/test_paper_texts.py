@@ -1,0 +1,136 @@
+"""What the page concludes follows from the verdicts above it, whatever they are."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import _paper_claims
+import _paper_savings
+import numpy as np
+import pytest
+from _paper_result import FAILS, HOLDS, JUDGED, OPEN, Row, Statement, judged
+
+PAGE = (Path(__file__).parents[2] / "docs" / "reproduction.md").read_text()
+CLAIMS = [name for name in _paper_claims.EXPERIMENTS if name not in ("modes", "figures")]
+# A phrase, which statement of the experiment it is about, and the verdicts that it may stand beside.
+PHRASES: dict[str, tuple[tuple[str, int, tuple[str, ...]], ...]] = {
+    "kpiece_cells": (
+        ("The paper is right", 0, (HOLDS,)),
+        ("Even with few zones the cells save", 0, (FAILS,)),
+        ("doesn't decide it", 0, (OPEN,)),
+        ("nor do they among more", 1, (HOLDS,)),
+        ("among more they save more", 1, (FAILS,)),
+    ),
+    "rrt_zones": (
+        ("RRT does slow down", 3, (HOLDS,)),
+        ("RRT hardly slows down", 3, (FAILS,)),
+        ("it is faster", 7, (HOLDS,)),
+        ("it is not faster", 7, (FAILS,)),
+    ),
+    "prm_time": (("as much as it lasts;", 0, (HOLDS, OPEN)), ("less than it lasts", 0, (FAILS,))),
+    "ccd": (
+        ("The search works", 0, (HOLDS,)),
+        ("The search is not sure", 0, (FAILS,)),
+        ("it pays for its time", 7, (HOLDS,)),
+        ("it does not pay", 7, (FAILS,)),
+    ),
+    "withdrawal": (
+        ("cost less than those of trees", 12, (HOLDS,)),
+        ("cost no less than trees'", 12, (FAILS,)),
+        ("and it is sooner out", 11, (HOLDS,)),
+        ("it is not sooner out", 11, (FAILS,)),
+    ),
+    "w_and_joules": (
+        ("all movements 0.9 (the ranks agree)", 0, (HOLDS,)),
+        ("all movements 0.7 (they do not agree enough)", 0, (FAILS,)),
+    ),
+    "line": (("(more than PLCs", 1, (HOLDS,)), ("(not more than PLCs", 1, (FAILS,))),
+    "savings": (
+        ("the range of section V holds,", 0, (HOLDS,)),
+        ("the range of section V does not hold", 0, (FAILS,)),
+        ("neither of its ends occurs", 1, (FAILS,)),
+        ("neither of its ends occurs", 2, (FAILS,)),
+        ("both of its ends occur", 1, (HOLDS,)),
+    ),
+}
+
+
+def statements_of(name: str) -> list[Statement]:
+    """The statements of an experiment as the page has them; of `savings` from rows made up."""
+    experiment = _paper_claims.EXPERIMENTS[name]
+    if name == "savings":
+        rng = np.random.default_rng(1)
+        rows: list[Row] = []
+        for k in range(80):
+            row: Row = {"seed": k % 2, "load": "none", "direction": ("up", "down")[k % 2], "common_J": 2000.0}
+            rows.append(row | {f"{arm} J": rng.uniform(100.0, 2500.0) for arm in _paper_savings.ARMS})
+        return judged(experiment, rows)
+    chapter = PAGE.split(f"## {experiment.title}\n")[1].split("\n## ")[0]
+    found = []
+    for line in chapter.split("| --- | --- | --- | --- | --- |\n")[1].split("\n\n")[0].splitlines():
+        says, figure, ours, bound, _ = (part.strip() for part in line.strip("|").split(" | "))
+        value = float(ours.split()[0].rstrip(","))
+        limit = float(bound.split()[1]) if bound else float("nan")
+        ends = value - 1.0, value + 1.0, 10, "of them"
+        least = not bound.startswith("≤")
+        found.append(Statement(says, figure, value, *ends, bound=limit, at_least=least, verdict="measured"))
+    return found
+
+
+def as_found(one: Statement, verdict: str) -> Statement:
+    """The statement with a figure and an interval that give this verdict."""
+    if np.isnan(one.bound):
+        return one
+    side = {HOLDS: 1.0, FAILS: -1.0, OPEN: 0.0}[verdict] * (1.0 if one.at_least else -1.0)
+    value = one.bound + 0.1 * side
+    changed = replace(one, value=value, low=value - 0.05, high=value + 0.05, verdict="")
+    assert changed.alone == verdict
+    return replace(changed, verdict=verdict)
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_what_follows_says_nothing_that_its_verdicts_deny(name: str) -> None:
+    experiment, statements = _paper_claims.EXPERIMENTS[name], statements_of(name)
+    rng = np.random.default_rng(5)
+    mixed = [rng.choice(JUDGED, len(statements)).tolist() for _ in range(40)]
+    seen = set()
+    for verdicts in itertools.chain(([one] * len(statements) for one in JUDGED), mixed):
+        text = experiment.follows([as_found(one, v) for one, v in zip(statements, verdicts, strict=True)])
+        assert not re.search(r"\bnan\b|\binf\b|  |\.\.|: \.|; \.", text), text
+        for phrase, k, allowed in PHRASES.get(name, ()):
+            if phrase in text:
+                assert verdicts[k] in allowed, (phrase, verdicts[k], text)
+                seen.add((phrase, k))
+    assert len(seen) == len(PHRASES.get(name, ())), set(PHRASES[name]) - seen
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_opposite_verdicts_have_different_conclusions(name: str) -> None:
+    experiment, statements = _paper_claims.EXPERIMENTS[name], statements_of(name)
+    words = [
+        re.sub(r"[-+]?\d+(\.\d+)?", "", experiment.follows([as_found(one, verdict) for one in statements]))
+        for verdict in (HOLDS, FAILS)
+    ]
+    assert words[0] != words[1]
+
+
+def test_the_spline_names_what_it_costs_more_than() -> None:
+    statements = statements_of("spline")
+    verdicts = [HOLDS, FAILS, *[HOLDS] * (len(statements) - 2)]
+    found = [as_found(one, v) for one, v in zip(statements, verdicts, strict=True)]
+    text = _paper_claims.EXPERIMENTS["spline"].follows(found)
+    assert "It costs more than quintic between two points." in text
+    assert "It costs no more than cubic between two points; " in text
+
+
+def test_prm_is_compared_by_verdict() -> None:
+    statements = statements_of("prm_time")
+    verdicts = [FAILS, HOLDS, FAILS, OPEN, *[HOLDS] * (len(statements) - 4)]
+    found = [as_found(one, v) for one, v in zip(statements, verdicts, strict=True)]
+    text = _paper_claims.EXPERIMENTS["prm_time"].follows(found)
+    assert "more than that of kpiece, " in text
+    assert "less than that of bkpiece;" in text
+    assert "open against lbkpiece." in text
