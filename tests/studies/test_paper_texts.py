@@ -122,8 +122,8 @@ def test_the_spline_names_what_it_costs_more_than() -> None:
     verdicts = [HOLDS, FAILS, *[HOLDS] * (len(statements) - 2)]
     found = [as_found(one, v) for one, v in zip(statements, verdicts, strict=True)]
     text = _paper_claims.EXPERIMENTS["spline"].follows(found)
-    assert "It costs more than quintic between two points." in text
-    assert "It costs no more than cubic between two points; " in text
+    assert "It costs more than the quintic between two points." in text
+    assert "It costs no more than the cubic between two points; " in text
 
 
 def test_prm_is_compared_by_verdict() -> None:
