@@ -71,3 +71,16 @@ def test_searches_that_nobody_has_are_errors_with_their_line(
     line = next(k for k, row in enumerate(text.splitlines(), 1) if "planner: gentic" in row)
     assert f"cell.yaml:{line}: error: step 4: planner 'gentic' is unknown: known are " in out
     assert "genetic" in out
+
+
+def test_a_step_s_planner_that_is_not_installed_is_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Law 9: what the check calls fine is not refused later for want of OMPL."""
+    path = tmp_path / "cell.yaml"
+    path.write_text(cell_to_yaml(load_cell("demo")).replace("planner: genetic", "planner: kpiece"))
+    assert main(["cell", "check", str(path)]) == 0
+    monkeypatch.setattr("ir_planner.search.with_ompl.host.find_spec", lambda name: None)
+    capsys.readouterr()
+    assert main(["cell", "check", str(path)]) == 1
+    assert "step 4: planner 'kpiece': OMPL is missing: pip install" in capsys.readouterr().out
