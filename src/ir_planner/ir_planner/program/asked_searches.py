@@ -7,7 +7,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.regional import Searches
 from ir_planner.request import chosen
-from ir_planner.search.with_ompl import missing, needs_ompl
+from ir_planner.search import not_installed
 from ir_planner.service import EXIT_SEARCHES
 
 
@@ -15,8 +15,8 @@ def unknown_searches(cell: Cell, steps: Sequence[ProgramStep], searches: Searche
     """Steps, and stations that they visit, with the name of a search that is not known or not installed."""
     for k, step in enumerate(steps, start=1):
         yield from _unknown(f"step {k}", step.planner, searches, "planner")
-        if step.planner in searches and needs_ompl(searches[step.planner]) and missing():
-            yield Finding("error", f"step {k}", f"planner {step.planner!r}: {missing()}")
+        if step.planner in searches and (how := not_installed(searches[step.planner])):
+            yield Finding("error", f"step {k}", f"planner {step.planner!r}: {how}")
     visited = {step.target for step in steps}
     for station in cell.stations:
         if station.name in visited:

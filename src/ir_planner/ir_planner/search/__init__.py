@@ -3,7 +3,7 @@
 from ir_planner.search.correction_log import correction_log
 from ir_planner.search.guesses import guesses
 from ir_planner.search.port import Ends, Found, Search, quick, repeatable
-from ir_planner.search.registry import SEARCHES, registered
+from ir_planner.search.registry import SEARCHES, not_installed, registered
 from ir_planner.search.shortcuts import fewest_corners, pulled, straight_along
 from ir_planner.search.tree import connect, joint_scale
 from ir_planner.search.variety import COARSE, EXIT, apart, at_nine_shares, first_different
@@ -23,6 +23,7 @@ __all__ = [
     "first_different",
     "guesses",
     "joint_scale",
+    "not_installed",
     "pulled",
     "quick",
     "registered",

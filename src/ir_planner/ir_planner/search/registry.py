@@ -10,7 +10,17 @@ from ir_planner.search.port import Search
 from ir_planner.search.retract import Retract
 from ir_planner.search.sbl import Sbl
 from ir_planner.search.tree import Tree
-from ir_planner.search.with_ompl import Aorrtc, Bkpiece, Kpiece, Lbkpiece, Prm, Rrt, RrtConnect
+from ir_planner.search.with_ompl import (
+    Aorrtc,
+    Bkpiece,
+    Kpiece,
+    Lbkpiece,
+    Prm,
+    Rrt,
+    RrtConnect,
+    missing,
+    needs_ompl,
+)
 
 SEARCHES: dict[str, Search] = {
     "direct": Direct(),
@@ -32,3 +42,8 @@ SEARCHES: dict[str, Search] = {
 def registered() -> Mapping[str, Search]:
     """The searches as they are registered now, with their default settings; a copy that stays as it is."""
     return MappingProxyType(dict(SEARCHES))
+
+
+def not_installed(search: Search) -> str:
+    """How to install what a search needs; "" where it is there."""
+    return missing() if needs_ompl(search) else ""
