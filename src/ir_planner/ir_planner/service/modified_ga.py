@@ -173,8 +173,8 @@ class _Walker:
 
     def _mean(self, parents: ExitPopulation) -> FloatArray:
         """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
-        counted = self.area.pairs > 0  # a zone without bodies has no D
-        ratio = parents.total / self.first_total if counted else np.ones(len(parents))
+        has_bodies = self.area.pairs > 0  # a zone without bodies has no D
+        ratio = parents.total / self.first_total if has_bodies else np.ones(len(parents))
         grown = np.minimum(np.maximum(ratio, _MEAN_LEAST), _MEAN_MOST)
         out = self._straight_out(parents.q) * self.settings.step
         last = parents.step
