@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ir_description import Cell, InvalidValueError, cell_from_yaml, cell_to_yaml, load_cell
 from ir_studies.layout.freedom import Placing, Variable
-from ir_studies.layout.overlap import overlaps, separable
+from ir_studies.layout.overlap import deeper, overlaps, separable
 
 DEMO = load_cell("demo")
 METRES = st.floats(-2.0, 2.0)
@@ -89,15 +89,80 @@ def test_values_are_what_people_can_set_up_and_within_the_range(share: float) ->
 
 
 def test_machines_of_the_bundled_cells_stand_apart() -> None:
-    assert overlaps(DEMO) == set()
+    assert set(overlaps(DEMO)) == {("base", "floor")}  # the capsule of the base is round below
 
 
 def test_what_reaches_into_each_other_and_below_the_floor_is_named() -> None:
     cell = moved({"equipment.cabinet.x": 0.5, "equipment.cabinet.y": -1.2, "equipment.gauge.z": -0.1})
-    assert overlaps(cell) == {
+    assert set(deeper(overlaps(cell), overlaps(DEMO))) == {
         ("outfeed_belt", "cabinet"),
         ("gauge_table", "floor"),
     }
+
+
+CUBE = """
+  - name: {name}
+    pose: {{xyz: [{x}, {y}, {z}], abc_deg: [{turn}, 0, 0]}}
+    bodies: [{{name: {name}_cube, kind: box, size: [1, 1, 1]}}]
+    zone: OPEN
+"""
+WALL = """
+  - name: wall
+    pose: {xyz: [0, 4, 0]}
+    zone: {kind: OPEN, size: [1, 1, 1]}
+    bodies: [{name: wall_face, kind: plane, abc_deg: [0, 0, 90]}]
+"""
+
+
+def of_machines(*machines: str) -> Cell:
+    """A cell of nothing else."""
+    head = "format: ir_cell/1\nname: cubes\nrobot: kr210_r2700_extra\nequipment:"
+    return cell_from_yaml(head + "".join(machines))
+
+
+def cube(name: str, x: float, y: float, z: float, turn: float = 0.0) -> str:
+    """A machine that is a cube of 1 m."""
+    return CUBE.format(name=name, x=x, y=y, z=z, turn=turn)
+
+
+@settings(max_examples=20)
+@given(drawn=st.floats(0.01, 0.4), more=st.floats(0.01, 0.4), turn=DEGREES)
+def test_an_overlap_as_drawn_may_not_grow(drawn: float, more: float, turn: float) -> None:
+    """Cubes turned together overlap along their own x axis: the depth is what they were moved."""
+    x, y, _ = about_vertical(turn)[:, 0] * (1.0 - drawn)
+    given_ = of_machines(cube("a", 3.0, 3.0, 1.0, turn), cube("b", 3.0 + x, 3.0 + y, 1.0, turn))
+    assert overlaps(given_)["a_cube", "b_cube"] == pytest.approx(drawn, abs=1e-9)
+    assert deeper(overlaps(given_), overlaps(given_)) == {}
+    dx, dy, _ = -about_vertical(turn)[:, 0] * more
+    moved_ = Placing().cell(given_, {"equipment.b.x": dx, "equipment.b.y": dy})
+    found = deeper(overlaps(moved_), overlaps(given_))
+    assert found["a_cube", "b_cube"] == pytest.approx(more, abs=1e-9)
+    apart = Placing().cell(given_, {"equipment.b.x": -dx, "equipment.b.y": -dy})
+    assert deeper(overlaps(apart), overlaps(given_)) == {}
+
+
+def test_a_machine_that_is_drawn_below_the_floor_sinks_no_further() -> None:
+    given_ = of_machines(cube("a", 3.0, 3.0, 0.48))
+    sunk = Placing().cell(given_, {"equipment.a.z": -0.3})
+    assert deeper(overlaps(sunk), overlaps(given_)) == pytest.approx({("a_cube", "floor"): 0.3})
+
+
+def test_the_base_sinks_neither_into_the_floor_nor_into_its_pedestal() -> None:
+    sunk = moved({"base.z": -0.05})
+    assert deeper(overlaps(sunk), overlaps(DEMO)) == pytest.approx({("base", "floor"): 0.05})
+    bench = load_cell("kr6_bench")
+    lower = {"base.z": -0.1}
+    found = deeper(overlaps(Placing().cell(bench, lower)), overlaps(bench))
+    assert found == pytest.approx({("base", "pedestal"): 0.1})
+    for free in ({"base.z": 0.1}, {"base.turn_deg": 33.0}, {"base.x": 0.05}):
+        assert deeper(overlaps(Placing().cell(bench, free)), overlaps(bench)) == {}
+
+
+def test_a_wall_that_is_a_plane_is_no_place_for_a_machine() -> None:
+    given_ = of_machines(cube("a", 3.0, 3.0, 1.0), WALL)
+    assert overlaps(given_).get(("a_cube", "wall_face")) is None
+    through = Placing().cell(given_, {"equipment.a.y": 0.7})
+    assert overlaps(through)["a_cube", "wall_face"] == pytest.approx(0.2)
 
 
 def test_a_door_needs_its_place_in_every_state() -> None:

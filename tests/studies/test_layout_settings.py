@@ -111,7 +111,7 @@ equipment:
   outfeed: {y: [-0.3, 0.3], x: [-0.2, 0.3]}
   gauge: {turn_deg: [-20, 20], y: [-0.4, 0.4], x: [-0.3, 0.2]}
 park: {a2_deg: [-5, 30], a1_deg: [-40, 40]}
-base: {turn_deg: [-20, 20], z: [-0.1, 0.2], y: [-0.3, 0.3], x: [-0.3, 0.3]}
+base: {turn_deg: [-20, 20], z: [0, 0.2], y: [-0.3, 0.3], x: [-0.3, 0.3]}
 cell: demo
 format: ir_layout/1
 """

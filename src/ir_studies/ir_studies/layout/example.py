@@ -6,7 +6,7 @@ cell: demo                   # bundled, or a file beside this one
 
 # What may move, and how far from where it stands in the cell file. x, y, z: m along the axes of the cell;
 # turn_deg: about its own vertical. A key that is left out does not move.
-base: {x: [-0.3, 0.3], y: [-0.3, 0.3], z: [-0.1, 0.2], turn_deg: [-20, 20]}
+base: {x: [-0.3, 0.3], y: [-0.3, 0.3], z: [0, 0.2], turn_deg: [-20, 20]}
 carried: []                  # machines that move with the base, as the pedestal below it
 equipment:
   gauge: {x: [-0.3, 0.2], y: [-0.4, 0.4], turn_deg: [-20, 20]}

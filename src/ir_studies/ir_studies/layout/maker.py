@@ -22,7 +22,7 @@ from ir_planner import PlannerError, PlannerSettings, ProgramPlan, RequestError
 from ir_planner.program import ProgramRequest, Spreads, outlook, plan_program, with_intervals
 from ir_planner.request import Work
 from ir_studies.layout.freedom import Placing
-from ir_studies.layout.overlap import overlaps
+from ir_studies.layout.overlap import deeper, overlaps
 from ir_studies.work import Row
 
 NEVER = 1e9  # s: work ends a plan, not the clock
@@ -65,10 +65,11 @@ class Maker:
         costs = []
         for payload in payloads:
             cell = self._placing.cell(self._given, values, payload)
-            new = sorted(overlaps(cell) - self._overlapping)
+            new = sorted(deeper(overlaps(cell), self._overlapping).items())
             if new:
-                said = ", ".join(f"{one} and {other}" for one, other in new[:3])
-                return {"solved": False, "kind": "overlap", "message": f"machines overlap: {said}"}
+                pairs = [f"{one} and {other} by {1e3 * depth:.1f} mm" for (one, other), depth in new[:3]]
+                said = f"machines overlap more than as given: {', '.join(pairs)}"
+                return {"solved": False, "kind": "overlap", "message": said}
             request = self._request(cell, PlanOptions())
             found = outlook(request, work_of(request))
             if not found.status.ok:
