@@ -170,6 +170,12 @@ def test_plan_trajectory_passes_the_reference_points(call: Call) -> None:
     trajectory = trajectory_from_msg(answer.trajectory)
     for q in points:
         assert np.abs(trajectory.positions - q).max(axis=1).min() < 1e-9
+    options = PlanOptions(planner_id="genetic")
+    notes = [
+        s.note
+        for s in call(PlanTrajectory, "plan_trajectory", reference=reference, options=options).info.stages
+    ]
+    assert "planner_id genetic is not used: nothing is searched between given points" in notes
 
 
 def test_evaluate_trajectory_names_the_first_violation(call: Call) -> None:
@@ -573,6 +579,19 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
     ("unknown program", GetProgram, "get_program", {"program_id": "feedbeef"}, -19, "feedbeef"),
     ("no trajectory", EvaluateTrajectory, "evaluate_trajectory", {}, -16, "exactly one"),
     ("empty reference", PlanTrajectory, "plan_trajectory", {}, -2, "joint names"),
+    (
+        "unknown planner of a reference",
+        PlanTrajectory,
+        "plan_trajectory",
+        {
+            "reference": JointTrajectory(
+                joint_names=list(JOINT_NAMES), points=[JointTrajectoryPoint(positions=HOME)] * 2
+            ),
+            "options": PlanOptions(planner_id="magic"),
+        },
+        -16,
+        "rrt_connect",
+    ),
     (
         "nan in reference",
         PlanTrajectory,

@@ -158,6 +158,25 @@ def no_descent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Descents, "improved", lambda *args, **options: None)
 
 
+def test_a_planner_that_had_nothing_to_search_is_said_to_be_unused(
+    detour: JointTrajectory, scene: PlanningScene
+) -> None:
+    plan = optimized(detour, scene, replace(OPTIONS, planner_id="tree"))
+    assert plan.status.ok
+    said = [stage.note for stage in plan.info.stages if stage.name == "options"]
+    assert said == ["planner_id tree is not used: no new path had to be searched"]
+
+
+@pytest.mark.usefixtures("no_descent")
+def test_a_repair_is_searched_by_the_planner_that_is_named(scene_of: SceneOf) -> None:
+    scene = scene_of("table_columns")
+    options = replace(OPTIONS, planner_id="tree", max_iterations=400_000)
+    plan = optimized(quintic(ends_of(scene, "tL->side1"), 6.0, scene), scene, options)
+    assert plan.status.ok, plan.status.message
+    assert plan.info.planner_id == "tree"
+    assert "options" not in [stage.name for stage in plan.info.stages]
+
+
 @pytest.mark.usefixtures("no_descent")
 def test_where_pushing_fails_a_path_around_is_found_and_noted(scene_of: SceneOf) -> None:
     scene = scene_of("table_columns")

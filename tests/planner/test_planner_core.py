@@ -180,6 +180,26 @@ def test_a_reference_beyond_a_limit_names_the_point(planner: Planner) -> None:
     assert caught.value.code == StatusCode.INVALID_MOTION_PLAN
 
 
+@pytest.mark.parametrize("name", ["genetic", "kpiece", ""])
+def test_a_planner_named_for_a_trajectory_through_points_is_said_to_be_unused(
+    planner: Planner, name: str
+) -> None:
+    points = np.stack([HOME, HOME + 0.1, HOME + 0.05])
+    plain = planner.plan_trajectory(Reference(points), PlanOptions())
+    plan = planner.plan_trajectory(Reference(points), PlanOptions(planner_id=name))
+    assert plan.status.ok
+    assert plan.trajectory == plain.trajectory
+    said = [stage.note for stage in plan.info.stages if stage.name == "options"]
+    assert said == (
+        [f"planner_id {name} is not used: nothing is searched between given points"] if name else []
+    )
+
+
+def test_an_unknown_planner_of_a_trajectory_through_points_is_refused(planner: Planner) -> None:
+    with pytest.raises(RequestError, match=r"planner_id 'rrt_conect' is unknown.*rrt_connect"):
+        planner.plan_trajectory(Reference(np.stack([HOME, HOME + 0.1])), PlanOptions(planner_id="rrt_conect"))
+
+
 def test_a_state_that_is_not_free_names_the_pair(planner: Planner) -> None:
     check = planner.check_state(np.radians([0.0, -20, 60, 0, 0, 0]), 0.02, 3, "", "")
     assert not check.valid

@@ -97,6 +97,7 @@ class _Optimization:
         self.context = Context(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
         self.space = FreeSpace.of(scene, options.safety_distance, work, self.context.station)
         self.descents = Descents(self.context)
+        self.rerouting = False
         if self.context.station:
             self.journal.note("station", f"allowed contacts of {self.context.station} hold in its zone")
         with self.journal.stage("before") as notes:
@@ -169,6 +170,7 @@ class _Optimization:
 
     def _rerouted(self) -> tuple[Status, Movement | None]:
         """A new movement between the same end points."""
+        self.rerouting = True
         self.journal.note("repair", "no descent from the original was certified: new paths are searched")
         self.journal.planner_id = ""
         start, goal = self.path[0], self.path[-1]
@@ -214,6 +216,9 @@ class _Optimization:
     ) -> OptimizationPlan:
         if best is not None and best is not self.original:  # nobody knows of a given one
             self.journal.timing = best.timing
+        if self.options.planner_id and not self.rerouting:
+            sentence = f"planner_id {self.options.planner_id} is not used: no new path had to be searched"
+            self.journal.note("options", sentence)
         info = self.journal.info(self.path[0], self.scene.cell.robot.joint_names)
         before = self.original.report
         if best is None:

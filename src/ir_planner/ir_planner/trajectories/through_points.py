@@ -55,6 +55,9 @@ def plan_through(
     """
     _check_points(reference, scene)
     context = Context.of(scene, options, work)
+    if options.planner_id:
+        sentence = f"planner_id {options.planner_id} is not used: nothing is searched between given points"
+        context.journal.note("options", sentence)
     start = reference.points[0]
     space = FreeSpace.of(scene, options.safety_distance, work)
     blocked = end_in_collision(start, reference.points[-1], space, options.safety_distance)
