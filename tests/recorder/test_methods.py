@@ -130,10 +130,20 @@ def test_the_chart_of_the_fitness_lies_where_it_hides_least(analysis: Analysis) 
 
 
 def test_figures_that_are_left_out_are_counted(analysis: Analysis) -> None:
-    html = section(analysis, *[CORRECTION] * 30)
+    html = section(analysis, *[replace(CORRECTION, goal=f"goal {k}") for k in range(30)])
     assert html.count("<figure>") == 24
     assert "24 of 30 are shown" in html
     assert "are shown" not in section(analysis, CORRECTION)
+
+
+def test_what_was_the_same_at_several_visits_is_said_once_with_their_number(analysis: Analysis) -> None:
+    other = replace(WITHDRAWAL, load="gripper", candidates=90)
+    html = section(analysis, WITHDRAWAL, other, WITHDRAWAL, CORRECTION, WITHDRAWAL, CORRECTION)
+    first, second, third = re.findall(r"<figcaption>(.*?)</figcaption>", html)
+    assert html.count("<svg") == 3
+    assert first.endswith("Entering is the same path reversed. This holds for 3 visits.")
+    assert second.endswith("Entering is the same path reversed.")
+    assert third.endswith("This holds for 2 movements.")
 
 
 def test_a_recording_without_logs_has_no_such_section(analysis: Analysis) -> None:

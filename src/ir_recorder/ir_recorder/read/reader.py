@@ -43,6 +43,7 @@ from ir_recorder.read.search_logs import search_logs
 
 _T = TypeVar("_T")
 _OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PROGRAM_STATE)
+_CALLS = f"{names.PLANNER}/{names.CALLS}"
 _WARN = 30  # rcl_interfaces/Log
 # action_msgs/GoalStatus
 _OUTCOMES = {1: "accepted", 2: "executing", 3: "canceling", 4: "succeeded", 5: "canceled", 6: "aborted"}
@@ -105,13 +106,13 @@ class _Reader:
             urdf=self._attached(contents.URDF) or self._text(names.ROBOT_DESCRIPTION),
             power_yaml=self._attached(contents.POWER),
             plant_yaml=self._text(names.PLANT),
-            searches=search_logs(self._channel(f"{names.PLANNER}/{names.CALLS}")),
             facts=raw.facts,
             problems=tuple(map(one_line, self._problems)),
         )
+        found = replace(found, searches=search_logs(self._channel(_CALLS), found.events))
         if found.joints is not None or found.power is not None or found.events:
             return found
-        planned = planned_steps(self._channel(f"{names.PLANNER}/{names.CALLS}"))
+        planned = planned_steps(self._channel(_CALLS))
         missing = {f"{self._prefix}{name} isn't in the recording" for name in _OF_A_RUN}
         kept = tuple(problem for problem in found.problems if problem not in missing)
         return replace(found, planned=planned, problems=kept) if planned else found

@@ -1,36 +1,75 @@
-"""What the searches of the last planned program did, from the planner's answer that a recording holds."""
+"""What the searches of the driven programs did, from the planner's answers that a recording holds."""
 
 from __future__ import annotations
 
-from ir_msgs_py.search_log import SearchLog, log_of
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ir_msgs_py.search_log import CorrectionLog, SearchLog, log_of
 from ir_recorder.errors import ReadError
 from ir_recorder.read.cdr import Columns
-from ir_recorder.read.front import ACTION, answers, result_definition
-from ir_recorder.read.planned import SERVICE
+from ir_recorder.read.front import ACTION, MOST_POINTS, answers, result_definition
+from ir_recorder.read.planned import MOST_STEPS, SERVICE
 from ir_recorder.read.raw import RawChannel
+from ir_recorder.read.recording import ProgramEvent
 
 MOST_STAGES = 2_000
 
 
-def search_logs(channel: RawChannel | None) -> tuple[SearchLog, ...]:
-    """Logs in the last answer on a planner's calls that has a program; empty where none has."""
+def search_logs(channel: RawChannel | None, events: Sequence[ProgramEvent] = ()) -> tuple[SearchLog, ...]:
+    """Logs of the programs that were driven, in the order in which they were, by the last answer on a
+    planner's calls that has them; of the last planned program where none was driven.
+
+    A program that was planned before the recording, or by nobody in it, has none. One of a front, or of what
+    is saved, has those of its answer.
+    """
     definition = result_definition()
     if channel is None or not definition:
         return ()
-    for answer in answers(channel, (ACTION, SERVICE)):
+    recorded = list(answers(channel, (ACTION, SERVICE)))
+    driven: dict[str, set[str]] = {}
+    for event in events:
+        driven.setdefault(event.program_id, set()).add(event.movement.trajectory_id)
+    if not driven:
+        return next((_logs_of(plan) for plan in _plans(recorded, definition)), ())
+    logs: list[SearchLog] = []
+    for program, trajectories in driven.items():
+        ids = {program} if program else trajectories - {""}  # steps that a client handed over have no name
+        named = [answer for answer in recorded if ids and all(each.encode() in answer for each in ids)]
+        plans = [plan for plan in _plans(named, definition) if ids <= _ids(plan)]
+        own = [plan for plan in plans if program in ("", plan.texts("program_id")[0])]
+        logs += _logs_of(own[0]) if own else map(_not_driven, _logs_of(plans[0])) if plans else ()
+    return tuple(logs)
+
+
+def _plans(recorded: Iterable[bytes], definition: str) -> Iterator[Columns]:
+    """Answers that have a program."""
+    for answer in recorded:
         try:
             columns = Columns([answer], f"{ACTION.replace('/action/', '/msg/')}_Result", definition)
         except ReadError:
             continue
         if columns.texts("program_id")[0]:
-            return tuple(_logs_of(columns))
-    return ()
+            yield columns
 
 
-def _logs_of(columns: Columns) -> list[SearchLog]:
-    logs: list[SearchLog] = []
-    for k in range(MOST_STAGES):
-        name = columns.texts(f"info.stages[{k}].name")[0]
-        log = log_of(name, columns.texts(f"info.stages[{k}].note")[0]) if name else None
-        logs += [log] if log is not None else []
-    return logs
+def _ids(plan: Columns) -> set[str]:
+    """Of the programs and trajectories in an answer."""
+    points = (f"front[{k}].program_id" for k in range(MOST_POINTS))
+    steps = (f"movements[{k}].trajectory_id" for k in range(MOST_STEPS))
+    return {plan.texts(name)[0] for name in ("program_id", "savings.program_id", *points, *steps)}
+
+
+def _logs_of(columns: Columns) -> tuple[SearchLog, ...]:
+    def of_stage(k: int, field: str) -> str:
+        return columns.texts(f"info.stages[{k}].{field}")[0]
+
+    found = (log_of(of_stage(k, "name"), of_stage(k, "note")) for k in range(MOST_STAGES))
+    return tuple(log for log in found if log is not None)
+
+
+def _not_driven(log: SearchLog) -> SearchLog:
+    """The log without the movement of another program."""
+    return replace(log, driven=np.zeros((0, 3))) if isinstance(log, CorrectionLog) else log

@@ -1,8 +1,8 @@
-"""The section of the page: one figure for each log, with its sentence."""
+"""The section of the page: one figure for each search, with its sentence; equal ones are counted."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ir_description import Cell
 from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog, WithdrawalLog
@@ -22,26 +22,42 @@ _KEY = (
 def methods_section(analysis: Analysis) -> str:
     """What the paper's methods did for the recorded program; "" where none was asked for."""
     logs, cell = analysis.recording.searches, analysis.cell
-    figures = "".join(_figures(logs[:_MOST], cell))
+    alike: dict[str, list[SearchLog]] = {}
+    for log in logs:
+        alike.setdefault(_sentence(log), []).append(log)
+    figures = "".join(_figures(list(alike.items())[:_MOST], cell))
     if not figures:
         return ""
-    if len(logs) > _MOST:
-        figures += f'<p class="hint">{_MOST} of {len(logs)} are shown.</p>'
+    if len(alike) > _MOST:
+        figures += f'<p class="hint">{_MOST} of {len(alike)} are shown.</p>'
     head = "<h2>What the paper's methods did</h2>"
     return f'<section id="methods">{head}{_KEY}<div class="methods">{figures}</div></section>'
 
 
-def _figures(logs: tuple[SearchLog, ...], cell: Cell | None) -> Iterator[str]:
-    for number, log in enumerate(logs):
-        words, drawn = _shown(log, cell, number)
+def _figures(alike: Sequence[tuple[str, Sequence[SearchLog]]], cell: Cell | None) -> Iterator[str]:
+    for number, (sentence, logs) in enumerate(alike):
+        drawn = _picture(logs[0], cell, number) if cell else ""
+        words = f"{sentence} {_times(logs)}".rstrip()
         yield f"<figure>{drawn}<figcaption>{text(words)}</figcaption></figure>"
 
 
-def _shown(log: SearchLog, cell: Cell | None, number: int) -> tuple[str, str]:
-    """Sentence and drawing of a log; no drawing without the cell."""
+def _times(logs: Sequence[SearchLog]) -> str:
+    """How often it was the same; "" for once."""
+    if len(logs) == 1:
+        return ""
+    what = {WithdrawalLog: "visits", ConfigurationLog: "programs", CorrectionLog: "movements"}
+    return f"This holds for {len(logs)} {what[type(logs[0])]}."
+
+
+def _sentence(log: SearchLog) -> str:
     if isinstance(log, WithdrawalLog):
-        return withdrawal.sentence(log), withdrawal.picture(log, cell, number) if cell else ""
+        return withdrawal.sentence(log)
+    return configurations.sentence(log) if isinstance(log, ConfigurationLog) else correction.sentence(log)
+
+
+def _picture(log: SearchLog, cell: Cell, number: int) -> str:
+    if isinstance(log, WithdrawalLog):
+        return withdrawal.picture(log, cell, number)
     if isinstance(log, ConfigurationLog):
-        return configurations.sentence(log), configurations.picture(log, cell, number) if cell else ""
-    assert isinstance(log, CorrectionLog)
-    return correction.sentence(log), correction.picture(log, cell, number) if cell else ""
+        return configurations.picture(log, cell, number)
+    return correction.picture(log, cell, number)

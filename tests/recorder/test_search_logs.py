@@ -1,0 +1,107 @@
+"""Searches on the page are those of the program that was driven, not of the last that was planned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap_ros2._dynamic import serialize_dynamic
+from rclpy.serialization import serialize_message
+
+from ir_msgs.action import Plan
+from ir_msgs.msg import (
+    PlannedMovement,
+    PlanningStage,
+    ProgramPoint,
+    ProgramState,
+    RecordedCall,
+)
+from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog, stage_of
+from ir_recorder import read_recording
+from ir_recorder.format.qos import QosOffer
+from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.read.front import ACTION
+from ir_recorder.write.session import RecordingSession
+from ir_recorder.write.writer import RecordingWriter
+
+CALLS, STATES = "/ir_planner/calls", "/ir_program_runner/program_state"
+STATE = "ir_msgs/msg/ProgramState"
+ROWS = np.array([[1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class Planned:
+    """An answer: a program, its trajectories, others that came with it."""
+
+    program: str
+    moves: tuple[str, ...] = ()
+    front: tuple[str, ...] = ()
+
+    def result(self) -> bytes:
+        """The answer with logs that carry the program's name."""
+        answer = Plan.Result(program_id=self.program)
+        answer.status.message = "a text that names point-of-a and t1"
+        answer.movements = [PlannedMovement(kind="regional", trajectory_id=each) for each in self.moves]
+        answer.front = [ProgramPoint(cycle_time=9.0, energy=9.0, program_id=each) for each in self.front]
+        driven = CorrectionLog(
+            *("a", self.program, 1, ((1.0,),), (1.0, 1.0)), *(ROWS, (), ROWS), met="", driven=ROWS
+        )
+        logs: tuple[SearchLog, ...] = (ConfigurationLog(self.program, 1, 1, 1, (), ()), driven)
+        stages = [stage_of(log) for log in logs]
+        answer.info.stages = [PlanningStage(name=each.name, note=each.note) for each in stages]
+        return bytes(serialize_message(answer))
+
+
+def record(path: Path, plans: list[Planned], driven: list[tuple[str, str]]) -> Path:
+    """Plans, then steps (program, trajectory) that started."""
+    session = RecordingSession(RecordingWriter(path), {}, 1)
+    session.open_topic(CALLS, "ir_msgs/msg/RecordedCall", [QosOffer()])
+    session.open_topic(STATES, STATE, [QosOffer()])
+    encode = serialize_dynamic(STATE, SchemaLibrary().schema(STATE).text)[STATE]
+    for k, plan in enumerate(plans):
+        call = RecordedCall(node="/ir_planner", service="plan", type=ACTION)
+        call.response = plan.result()
+        session.message(CALLS, serialize_message(call), k + 1)
+    for k, (program, trajectory) in enumerate(driven):
+        step = PlannedMovement(kind="regional", trajectory_id=trajectory)
+        state = ProgramState(program_id=program, index=k, total=len(driven), event="started", movement=step)
+        session.message(STATES, encode(state), len(plans) + k + 1)
+    return session.finish().path
+
+
+PLANS = [
+    Planned("program-a", ("t1", "t2"), ("point-of-a",)),
+    Planned("program-b", ("t2", "t3")),
+    Planned("program-c", ("t4",)),
+]
+
+
+@pytest.mark.parametrize(
+    ("driven", "shown"),
+    [
+        ([], ["program-c"]),  # the last that was planned
+        ([("program-a", "t1"), ("program-a", "t2")], ["program-a"]),
+        ([("program-b", "t2"), ("program-a", "t1"), ("program-b", "t2")], ["program-b", "program-a"]),
+        ([("elsewhere", "t9")], []),  # planned before the recording
+        ([("", "t2"), ("", "t3")], ["program-b"]),  # steps that a client handed over
+        ([("", "")], []),  # a pause that a client handed over
+        ([("point-of-a", "t7")], ["program-a"]),  # a point of the front
+    ],
+)
+def test_searches_are_those_of_the_programs_that_were_driven(
+    driven: list[tuple[str, str]], shown: list[str], tmp_path: Path
+) -> None:
+    searches = read_recording(record(tmp_path / "a.mcap", PLANS, driven)).searches
+    assert [log.station for log in searches if isinstance(log, ConfigurationLog)] == shown
+    assert len(searches) == 2 * len(shown)
+
+
+@pytest.mark.parametrize(("program", "points"), [("program-a", 2), ("point-of-a", 0)])
+def test_a_movement_of_another_program_is_not_shown_as_driven(
+    program: str, points: int, tmp_path: Path
+) -> None:
+    searches = read_recording(record(tmp_path / "a.mcap", PLANS, [(program, "t1")])).searches
+    (correction,) = [log for log in searches if isinstance(log, CorrectionLog)]
+    assert len(correction.driven) == points
