@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from ir_cli.errors import InputError
+from ir_cli.main import main
 from ir_cli.offline.measured import measured
 from ir_cli.offline.measured_options import between
+from ir_cli.offline.output import ProgressLine
 from ir_cli.offline.rows_of_robot import counted_turns
 from ir_cli.offline.today_trace import stretches_of
 from ir_cli.offline.trace_file import Rows, read_motion, write_trace
@@ -84,6 +86,47 @@ def trace_of(path: Path, rows: list[tuple[float, float]]) -> Path:
     lines = [f"{t},{a},-1.5,1.5,0,0.5,0" for t, a in rows]
     path.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
     return path
+
+
+SWING = [(0.01 * k, round(0.3 * np.sin(0.01 * k) ** 2, 6)) for k in range(200)]
+
+
+@pytest.mark.parametrize(("given", "total"), [((), 24), (("--bandwidth", "11"), 6)])
+@pytest.mark.parametrize("cut", [(), ("--between", "0.5", "1.5")])
+def test_a_trace_says_how_far_its_smoothing_is(
+    given: tuple[str, ...],
+    total: int,
+    cut: tuple[str, ...],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown: list[tuple[str, int, int]] = []
+    monkeypatch.setattr(
+        ProgressLine, "show", lambda line, phase, done, of, cost: shown.append((phase, done, of))
+    )
+    trace = trace_of(tmp_path / "t.csv", SWING)
+    main(["evaluate", "open", str(trace), *cut, *given])
+    smoothing = [("smooth", done, total) for done in range(total + 1)]
+    assert shown == [("read t.csv", 0, 1), *smoothing, ("evaluate", 0, 1)]
+    assert capsys.readouterr().err == ""  # nobody looks
+
+
+@pytest.mark.parametrize("command", ["optimize", "compare"])
+def test_other_commands_with_a_trace_say_so_too(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class EnoughError(Exception):
+        """The smoothing is done; what follows takes long."""
+
+    def show(line: ProgressLine, phase: str, done: int, of: int, cost: float) -> None:
+        if (phase, done) == ("smooth", of):
+            raise EnoughError
+
+    monkeypatch.setattr(ProgressLine, "show", show)
+    trace = trace_of(tmp_path / "t.csv", SWING)
+    with pytest.raises(EnoughError):
+        main([command, "open", str(trace)])
 
 
 def test_a_gap_in_which_the_robot_moved_is_refused(tmp_path: Path) -> None:

@@ -124,7 +124,7 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
     if arguments.stations:
         raise InputError("--stations are of PTP at 100 %: a program of yours has its own")
     if len(arguments.today) == 1 and endings <= set(TRACES):
-        today = today_of_trace(arguments, planner, arguments.today[0])
+        today = today_of_trace(arguments, planner, arguments.today[0], line.show)
         return before_after(planner, today, arguments.cycle_time, options, line.show)
     if not endings <= set(KRL):
         named = next(str(path) for path in arguments.today if path.suffix.lower() not in KRL)

@@ -9,7 +9,7 @@ from pathlib import Path
 from .asking import FAILED, add_cell, add_margin, add_parameters, planner_of, sentences
 from .measured_options import add_measured, measured_figures, motion_of
 from .move_command import figures_of, sentence_of
-from .output import add_formats, print_json
+from .output import ProgressLine, add_formats, print_json
 
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -31,10 +31,11 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluate and print; exit code 1 where a limit or the clearance is violated."""
-    with sentences():
+    with sentences(), ProgressLine() as line:
         planner = planner_of(arguments.cell, arguments.power_parameters)
         margin, load, station = arguments.safety_distance, arguments.load, arguments.station
-        known, trajectory = motion_of(arguments, planner)
+        known, trajectory = motion_of(arguments, planner, line.show)
+        line.show("evaluate", 0, 1, 0.0)
         found = planner.evaluate(trajectory, margin, load, station)
     verification = found.verification
     if arguments.json:

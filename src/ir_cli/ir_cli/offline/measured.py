@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.program import Progress, nobody
 
 from ..errors import InputError
 
@@ -26,6 +28,8 @@ _LOWEST, _HIGHEST = 5.0, 100.0  # Hz: below it the movement itself is smoothed a
 _DEGREE = 5
 _ROWS_PER_KNOT = 2.0  # at least: fewer leave the ends of the spline to the noise
 _REPEATS = 4
+_EVALUATIONS = 2 + _REPEATS  # of the energy, for each bandwidth
+_PHASE = "smooth"
 _LOST = 4.0  # times what smoothing loses the second time
 _LEAST = 0.0075  # share of an energy that positions leave open in any case
 _COARSE, _COARSE_SHARE = 0.02, 0.025  # s: rows that lie farther apart leave this share open
@@ -98,10 +102,27 @@ def measured(
     positions: FloatArray,
     joules: Joules,
     bandwidth: float = 0.0,
+    progress: Progress = nobody,
 ) -> Measured:
     """The motion of positions (N, n) at time (N,) [s] with the bandwidth [Hz] (0: the best of several) that
     leaves least open of its energy. InputError for too few or too many rows.
     """
+    _check(time, bandwidth)
+    tried = [bandwidth] if bandwidth > 0.0 else BANDWIDTHS
+    steps, total = count(1), len(tried) * _EVALUATIONS
+    progress(_PHASE, 0, total, 0.0)
+
+    def shown(motion: JointTrajectory) -> float:
+        found = joules(motion)
+        progress(_PHASE, next(steps), total, 0.0)
+        return found
+
+    found = [_worth(names, time, positions, shown, one) for one in tried]
+    return min(found, key=lambda one: one.bound)
+
+
+def _check(time: FloatArray, bandwidth: float) -> None:
+    """InputError for rows at time (N,) [s], or a bandwidth [Hz], that nothing can be smoothed with."""
     if not 8 <= len(time) <= _ROWS_MAX:
         raise InputError(
             f"{len(time)} rows of positions alone: 8 to {_ROWS_MAX} can be smoothed; --between takes one "
@@ -121,9 +142,6 @@ def measured(
         raise InputError(
             f"the bandwidth is {bandwidth:g} Hz: it must be 0, or {_LOWEST:g} to {_HIGHEST:g} Hz"
         )
-    tried = [bandwidth] if bandwidth > 0.0 else BANDWIDTHS
-    found = [_worth(names, time, positions, joules, one) for one in tried]
-    return min(found, key=lambda one: one.bound)
 
 
 def _worth(

@@ -11,6 +11,7 @@ import numpy as np
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
 from ir_planner.checks import movement_energy
+from ir_planner.program import Progress
 
 from ..errors import InputError
 from .measured import Measured, measured
@@ -30,10 +31,11 @@ def add_measured(parser: argparse.ArgumentParser) -> None:
 
 
 def motion_of(
-    arguments: argparse.Namespace, planner: Planner, path: Path | None = None
+    arguments: argparse.Namespace, planner: Planner, progress: Progress, path: Path | None = None
 ) -> tuple[Measured | None, JointTrajectory]:
     """The motion of a trace, and what is known of it where it was smoothed."""
     robot, file = planner.cell.robot, path or arguments.trace
+    progress(f"read {file.name}", 0, 1, 0.0)
     found = read_motion(file, robot.joint_names, arguments.mapping)
     if arguments.between is not None:
         found = between(file, found, *arguments.between)
@@ -48,6 +50,7 @@ def motion_of(
         positions,
         lambda one: movement_energy(one, scene).total,
         arguments.bandwidth,
+        progress,
     )
     return replace(known, notes=(*found.notes, *turned)), known.trajectory
 

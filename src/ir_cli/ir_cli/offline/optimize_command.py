@@ -9,7 +9,7 @@ from pathlib import Path
 from .asking import add_cell, add_options, add_parameters, failed, options_of, planner_of, sentences
 from .measured_options import add_measured, measured_figures, motion_of
 from .move_command import figures_of, sentence_of
-from .output import add_formats, print_json
+from .output import ProgressLine, add_formats, print_json
 from .today_trace import stretches_of
 from .trace_file import write_trace
 
@@ -36,12 +36,13 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run_optimize(arguments: argparse.Namespace) -> int:
     """Optimise and print; exit code 1 where nothing is found."""
-    with sentences():
+    with sentences(), ProgressLine() as line:
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        known, motion = motion_of(arguments, planner)
+        known, motion = motion_of(arguments, planner, line.show)
         moving = [one.trajectory for one in stretches_of(motion)[0] if one.trajectory is not None]
         if known is not None and len(moving) == 1:
             motion = moving[0]  # standstills around a measured movement are no part of it
+        line.show("optimise", 0, 1, 0.0)
         found = planner.optimize_trajectory(motion, options_of(arguments, arguments.duration))
     if known is not None and len(moving) > 1:
         sys.stderr.write(

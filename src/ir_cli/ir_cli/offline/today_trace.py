@@ -10,7 +10,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, Stretch, Today
-from ir_planner.program import Doors
+from ir_planner.program import Doors, Progress, nobody
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces import read_mapping, read_traces
 
@@ -27,9 +27,11 @@ _FALLING = 20  # steps: slower than `_MOVING` a movement begins and ends for so 
 _NEAR = 0.02  # s: points nearer to the ends of a movement are left out
 
 
-def today_of_trace(arguments: argparse.Namespace, planner: Planner, path: Path) -> Today:
+def today_of_trace(
+    arguments: argparse.Namespace, planner: Planner, path: Path, progress: Progress = nobody
+) -> Today:
     """Today's program of a trace; InputError where the robot doesn't move in it."""
-    known, motion = motion_of(arguments, planner, path)
+    known, motion = motion_of(arguments, planner, progress, path)
     stretches, lost = stretches_of(motion, recorded_doors(path, planner.cell))
     if not stretches:
         raise InputError(f"{path}: the robot does not move in it")
