@@ -23,6 +23,10 @@ AROUND = 0.03  # m that the straight movement keeps
 S_M = 0.02  # m
 REACH = (0.3, 2.0)  # rad: largest joint of a movement
 LEVEL_M = 0.15  # m: height of the tool's end over its start from which on a movement lifts or lowers
+DRAWN = (
+    "half with the 155 kg tool and half empty; from a random configuration in a random direction of the "
+    f"joint space, the joint that moves most by {REACH[0]:g} to {REACH[1]:g} rad"
+)
 _SAMPLES = 60
 ENERGY_STEP = 4e-3  # s: energies are compared to a percent, not to a joule
 
@@ -59,11 +63,11 @@ class Pair:
         """A request of its own."""
         return Context.of(self.scene, options, Work(100_000, np.inf, time.monotonic))
 
-    def common(self, duration: float = 0.0) -> JointTrajectory | None:
-        """The common S-curve PTP, the fastest one or that of `duration` [s]; None where no torque carries the
-        load.
+    def common(self, duration: float = 0.0, objective: str = "time") -> JointTrajectory | None:
+        """The common S-curve PTP: of `duration` [s], else slowed down as is best for the objective; None
+        where no torque carries the load.
         """
-        options = PlanOptions(objective="time", duration=duration, safety_distance=S_M)
+        options = PlanOptions(objective=objective, duration=duration, safety_distance=S_M)
         movement = baseline(self.q0, self.q1, self.context(options))
         return movement.trajectory if movement is not None else None
 

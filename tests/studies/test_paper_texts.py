@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import _paper_claims
+import _paper_cost
 import _paper_savings
 import numpy as np
 import pytest
@@ -66,7 +67,8 @@ def statements_of(name: str) -> list[Statement]:
         rows: list[Row] = []
         for k in range(80):
             row: Row = {"seed": k % 2, "load": "none", "direction": ("up", "down")[k % 2], "common_J": 2000.0}
-            rows.append(row | {f"{arm} J": rng.uniform(100.0, 2500.0) for arm in _paper_savings.ARMS})
+            arms = (*_paper_savings.ARMS, _paper_savings.SLOWED)
+            rows.append(row | {f"{arm} J": rng.uniform(100.0, 2500.0) for arm in arms})
         return judged(experiment, rows)
     chapter = PAGE.split(f"## {experiment.title}\n")[1].split("\n## ")[0]
     found = []
@@ -134,3 +136,24 @@ def test_prm_is_compared_by_verdict() -> None:
     assert "more than that of kpiece, " in text
     assert "less than that of bkpiece;" in text
     assert "open against lbkpiece." in text
+
+
+@pytest.mark.parametrize(("by", "says"), [(1.0, "together better."), (-1.0, "together worse.")])
+def test_what_the_load_does_to_the_ranks_follows_from_the_figures(by: float, says: str) -> None:
+    rng = np.random.default_rng(6)
+    rows: list[Row] = []
+    for k in range(60):
+        joules, noise = rng.uniform(1e3, 4e3), rng.normal(0.0, 1e3)
+        ranked = {"W": joules + (by > 0.0) * noise, _paper_cost.EMPTY: joules + (by < 0.0) * noise}
+        row: Row = {"kind": "movement", "joules": joules, "seconds": 1.0 + joules, **ranked}
+        row |= {"load": ("none", "tool")[k % 2], "direction": ("up", "down", "level")[k % 3]}
+        rows.append(row | {_paper_cost.PRINTED: joules})
+        rows.append(row | {"kind": "choice", "least": joules, "mean": joules, _paper_cost.PRINTED: joules})
+    text = _paper_cost.EXPERIMENT.follows(_paper_cost.judge(rows))
+    assert ("together better." in text, "together worse." in text) == (by > 0.0, by < 0.0)
+    assert says in text
+    assert {row["reading"] for row in list(_paper_cost.tables(rows).values())[1]} == {
+        "as read",
+        _paper_cost.EMPTY,
+        _paper_cost.PRINTED,
+    }
