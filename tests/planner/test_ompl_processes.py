@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,8 @@ from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends, Found, with_ompl
-from ir_planner.search.with_ompl import host
+from ir_planner.search.with_ompl import host, worker
+from ir_planner.search.with_ompl.problem import STOP, Parameters, Problem
 
 SceneOf = Callable[[str], PlanningScene]
 S_M = 0.02
@@ -194,6 +196,56 @@ def test_many_requests_leave_no_process_and_no_descriptor(
     assert until(lambda: all(gone(process) for process in seen))
 
 
+@pytest.mark.skipif(bool(host.missing()), reason=host.missing())
+def test_a_search_that_is_stopped_answers_what_it_has_found(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """AORRTC goes on improving its path until its checks are spent; here it is stopped long before."""
+    ours, theirs = Pipe()
+    affordable, stopped_at = worker._Counted._affordable, 3_000
+    sent: list[str] = []
+
+    def stopping(counted: worker._Counted, states: int) -> bool:
+        if not sent and counted.edges > stopped_at:
+            sent.append(STOP)
+            ours.send(STOP)
+        return affordable(counted, states)
+
+    monkeypatch.setattr(worker._Counted, "_affordable", stopping)
+    ends, space = a_task(scene_of("table_columns"), free_work())
+    parameters = Parameters("AORRTC", SEARCHES["aorrtc"].parameters())
+    goals = ends.goals
+    problem = Problem(space.scene, space.threshold, ends.start, goals, parameters, 1, 1_000_000, 60.0)
+    outcome = worker.solved(problem, theirs)
+    assert outcome.path is not None
+    assert stopped_at < outcome.edges < 2 * stopped_at
+
+
+def test_at_the_end_of_the_work_the_process_is_asked_for_its_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host, "_LAST_LOOKS", 24_000)  # two minutes, on a machine that is busy
+    ours, theirs = Pipe()
+    said: list[str] = []
+
+    def answering() -> None:
+        said.append(theirs.recv())
+        theirs.send(True)
+
+    thread = threading.Thread(target=answering, daemon=True)
+    thread.start()
+    assert host._answered(ours, Work(10, 0.0, lambda: 0.0))
+    thread.join(PATIENCE)
+    assert said == [STOP]
+
+
+def test_a_process_that_does_not_answer_at_the_end_is_waited_for_no_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ours, _theirs = Pipe()
+    assert not host._answered(ours, ticking())
+    monkeypatch.setattr(host, "_LAST_LOOKS", 3)
+    assert not host._answered(ours, Work(10, 0.0, lambda: 0.0))  # whose clock stands
+
+
 ASKING = """
 import sys
 from contextlib import contextmanager
@@ -202,7 +254,8 @@ from ir_planner import Planner
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, with_ompl
-from ir_planner.search.with_ompl import host
+from ir_planner.search.with_ompl import host, worker
+from ir_planner.search.with_ompl.problem import STOP, Parameters, Problem
 
 @contextmanager
 def charge(process):

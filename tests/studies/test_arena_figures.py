@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from dataclasses import replace
 
@@ -18,8 +19,9 @@ from ir_studies.arena.figures import (
     success_over_time,
 )
 from ir_studies.arena.page import verdict
+from ir_studies.arena.runs import Finished
 from ir_studies.arena.settings import ArenaSettings
-from ir_studies.arena.table import Run
+from ir_studies.arena.table import Run, asked_alike, columns
 
 
 def run(planner: str, task: str, cost: float, first: float, final: float) -> Run:
@@ -72,7 +74,16 @@ def test_a_run_that_died_is_listed_with_its_question() -> None:
     entry = Entry("b", "open", "1", 0, "", "synchronous")
     free = replace(RUNS[0], row={**RUNS[0].row, "free_ptp": True})
     lost = Run(entry, {"solved": False, "outcome": "died"})
-    assert blocked_and_free([free, lost, *RUNS[1::2]]) == ([RUNS[1], RUNS[3]], [free, lost])
+    blocked, free_ones = blocked_and_free(runs := asked_alike([free, lost, *RUNS[1::2]]))
+    assert (blocked, [one.entry for one in free_ones]) == ([RUNS[1], RUNS[3]], [free.entry, entry])
+    assert columns(runs)["free_ptp"] == [1, 1, 0, 0]
+
+
+def test_planners_are_summed_up_with_free_questions_apart() -> None:
+    free = replace(RUNS[0], row={**RUNS[0].row, "free_ptp": True})
+    rows = list(csv.DictReader(Finished((free, *RUNS[1:]), ()).summed_up.splitlines()))
+    found = [(row["free_ptp"], row["planner"], row["solved"], row["count"]) for row in rows]
+    assert found == [("0", "a", "1", "1"), ("0", "b", "1", "2"), ("1", "a", "1", "1")]
 
 
 def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:

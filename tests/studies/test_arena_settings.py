@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from ir_description import load_cell
+from ir_msgs_py.options import PlanOptions
+from ir_planner import RequestError
+from ir_planner.request import checked_options
 from ir_planner.search.with_ompl import host
 from ir_studies import SettingsError
 from ir_studies.arena import EXAMPLE, PORTFOLIO, ArenaSettings, read_settings
 from ir_studies.arena.entries import entries
+from ir_studies.arena.tasks import tasks_of
 
 HEAD = "format: ir_arena/1\n"
 
@@ -61,6 +68,12 @@ def test_the_example_is_read_and_names_every_key(tmp_path: Path) -> None:
         (HEAD + "cells: [open]\nseconds: -1\n", "seconds is -1"),
         (HEAD + "cells: [open]\nseconds: soon\n", "seconds is 'soon'"),
         (HEAD + "cells: [open]\nsafety_distance: 1e400\n", "safety_distance is"),
+        (HEAD + "cells: [open]\ntime_value: 2e6\n", "time_value is '2e6'"),
+        (
+            HEAD + "cells: [open]\ntime_value: 2.0e+6\n",
+            "time_value is 2000000.0: it must be a number in 0 .. 1e+06",
+        ),
+        (HEAD + "cells: [open]\nsafety_distance: 2\n", "safety_distance is 2: it must be a number in 0 .. 1"),
         (HEAD + "cells: [open]\n? [a]\n: 1\n", "is no YAML"),
     ],
 )
@@ -98,3 +111,24 @@ def test_what_is_no_file_is_not_read(tmp_path: Path) -> None:
     for path in (tmp_path / "pipe.yaml", Path("/dev/zero"), tmp_path):
         with pytest.raises(SettingsError, match="is no file with settings"):
             read_settings(path)
+
+
+@pytest.mark.parametrize(("key", "most"), [("time_value", 1e6), ("safety_distance", 1.0)])
+def test_the_planner_takes_what_the_settings_allow(key: str, most: float) -> None:
+    for beyond in (False, True):
+        value = most * 1.01 if beyond else most
+        with pytest.raises(SettingsError) if beyond else nullcontext():
+            ArenaSettings(cells=("open",), **{key: value})
+        with pytest.raises(RequestError) if beyond else nullcontext():
+            checked_options(PlanOptions(**{key: value}))
+
+
+def test_a_task_that_leads_back_by_another_path_keeps_its_name() -> None:
+    cell = load_cell("open")
+    there = cell.task("home->p1")
+    back = replace(cell.task("p1->p2"), name="p1->home")
+    for tasks in ((there, back), (back, there)):
+        found = tasks_of(replace(cell, tasks=tasks))
+        assert set(found) == {"home->p1", "home->p1 back", "p1->home", "p1->home back"}
+        assert tuple(found["p1->home"][0]) == tuple(back.start)
+        assert tuple(found["home->p1 back"][0]) == tuple(there.goal)

@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from ir_msgs_py.options import PlanOptions
-from ir_planner import Goal, MovementPlan, Planner
+from ir_msgs_py.status import StatusCode
+from ir_planner import Goal, MovementPlan, Planner, RequestError
 from ir_studies.arena.entries import Entry
-from ir_studies.arena.one_run import one_run
+from ir_studies.arena.one_run import one_run, planned_in
 from ir_studies.arena.settings import ArenaSettings
 
 FURTHER = 20_000
@@ -75,3 +76,31 @@ def test_what_comes_after_the_seconds_does_not_count(planner: Planner) -> None:
     late = one_run(ENTRY, replace(settings, seconds=1.5), planner, lambda: float(next(instants)))
     assert not late["solved"]
     assert "after 2 s, over seconds 1.5" in late["message"]
+
+
+def test_a_request_has_time_for_its_last_step_whatever_is_left() -> None:
+    assert planned_in(10.0) == pytest.approx(10.0 - 0.05)
+    assert planned_in(0.2) == pytest.approx(0.2 - 0.05)
+    assert planned_in(0.04) == pytest.approx(0.02)
+    assert planned_in(-1.0) == 0.001
+
+
+def test_a_request_that_is_refused_takes_no_answer_of_the_run_away(
+    planner: Planner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = planner.plan_regional
+    asked: list[int] = []
+
+    def refused(start: Any, goal: Goal, options: PlanOptions) -> MovementPlan:
+        asked.append(options.seed)
+        if len(asked) > 1:
+            raise RequestError(StatusCode.FAILURE, "OMPL's process does not start")
+        return plan(start, goal, options)
+
+    monkeypatch.setattr(planner, "plan_regional", refused)
+    settings = ArenaSettings((ENTRY.cell,), seconds=3600.0, further_iterations=0)
+    row = one_run(ENTRY, settings, planner, time.monotonic)
+    assert (row["solved"], row["message"], len(row["progress"])) == (True, "", 1)
+    row = one_run(ENTRY, settings, planner, time.monotonic)
+    assert (row["solved"], row["message"]) == (False, "OMPL's process does not start")
+    assert len(asked) == 3

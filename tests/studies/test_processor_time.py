@@ -9,8 +9,13 @@ from contextlib import nullcontext
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 import pytest
 
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.status import StatusCode
+from ir_planner import Goal, Planner, RequestError
 from ir_planner.search.with_ompl import charge_to, missing
 from ir_studies.arena import ArenaSettings, Entry
 from ir_studies.arena.maker import maker, warm_up
@@ -39,6 +44,20 @@ def test_a_process_that_is_gone_costs_nothing() -> None:
     with charged(gone.pid):
         passed = processor_time() - begin
     assert passed <= time.process_time() - own
+
+
+def test_a_process_that_dies_meanwhile_has_cost_what_it_had_run(wait_for: Any) -> None:
+    busy = subprocess.Popen([sys.executable, "-S", "-c", "while True: pass"])
+    begin = others_time()
+    try:
+        with charged(busy.pid):
+            wait_for(lambda: others_time() > begin, what="it counts")
+            busy.kill()
+            busy.wait()
+            counted = others_time()
+    finally:
+        busy.kill()
+    assert begin < counted == others_time()
 
 
 def test_what_it_takes_to_start_a_process_counts_for_nobody(wait_for: Any) -> None:
@@ -76,3 +95,25 @@ def test_what_ompls_processes_need_to_start_is_measured_and_counts_for_nobody(
     finally:
         excuse(0.0)
         charge_to(lambda process: nullcontext())
+
+
+def test_starting_is_measured_where_an_end_of_a_task_is_near_something(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first question asks for no safety distance, between the ends of the first task."""
+    planner = Planner(lambda: 0.0)
+    planner.set_cell("", "open")
+    task = planner.cell.tasks[0]
+    asked: list[PlanOptions] = []
+
+    def refuse(start: FloatArray, goal: Goal, options: PlanOptions) -> None:
+        asked.append(options)
+        assert goal.configuration is not None
+        share = (goal.configuration - start)[1] / (np.array(task.goal) - start)[1]
+        assert 0.0 < share < 0.01
+        raise RequestError(StatusCode.FAILURE, "seen")
+
+    monkeypatch.setattr(planner, "plan_regional", refuse)
+    monkeypatch.setattr("ir_studies.arena.maker.planner_of", lambda cell: planner)
+    assert warm_up(ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))) == 0.0
+    assert [one.safety_distance for one in asked] == [0.0, 0.0]

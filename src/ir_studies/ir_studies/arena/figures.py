@@ -150,14 +150,8 @@ def _median(values: Iterable[float]) -> float:
 
 
 def blocked_and_free(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
-    """Runs whose straight movement is blocked, and those whose is free. That is asked of the question: a run
-    that was cut or died does not know it.
-    """
-    free = {run.entry.question for run in runs if run.free_ptp}
-    return (
-        [run for run in runs if run.entry.question not in free],
-        [run for run in runs if run.entry.question in free],
-    )
+    """Runs whose straight movement is blocked, and those whose is free."""
+    return [run for run in runs if not run.free_ptp], [run for run in runs if run.free_ptp]
 
 
 def of_cell(runs: Iterable[Run], cell: str) -> list[Run]:

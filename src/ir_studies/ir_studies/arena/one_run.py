@@ -15,7 +15,7 @@ import numpy as np
 from ir_kernels.collision import FREE
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
-from ir_planner import Goal, MovementPlan, Planner
+from ir_planner import Goal, MovementPlan, Planner, PlannerError
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 from ir_studies.arena.entries import Entry
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
@@ -24,7 +24,7 @@ from ir_studies.work import Row
 
 SEEDS = 100_000  # between the first requests of two seeds
 _SHARE_OF_ENDS = 0.8  # of the clearance at start and goal, where that is smaller than the safety distance
-_OF_THE_REST = 0.95  # of the seconds left that a request may plan: it ends its last step after them
+_LAST_STEP = 0.05  # s that a request is left to end its last step: a descent and its proof take up to these
 _FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 
 
@@ -41,18 +41,13 @@ def one_run(entry: Entry, settings: ArenaSettings, planner: Planner, clock: Call
         left = settings.seconds - passed
         if requests and (left <= 0.0 or requests == settings.requests):
             break
-        options = PlanOptions(
-            planner_id="" if entry.planner == PORTFOLIO else entry.planner,
-            seed=entry.seed * SEEDS + requests,
-            max_iterations=settings.work_of(requests),
-            planning_time=max(_OF_THE_REST * left, 0.001),
-            safety_distance=margin,
-            time_value=settings.time_value,
-            timing=entry.timing,
-            load=entry.load,
-        )
-        plan = planner.plan_regional(start, Goal(configuration=goal), options)
+        options = _options(entry, settings, requests, left, margin)
         requests += 1
+        try:
+            plan = planner.plan_regional(start, Goal(configuration=goal), options)
+        except PlannerError as error:  # asked again, it would be refused again
+            said = str(error)
+            break
         truncated |= plan.info.truncated
         if math.isnan(first_path):
             first_path = passed + first_feasible(plan.info)
@@ -68,6 +63,25 @@ def one_run(entry: Entry, settings: ArenaSettings, planner: Planner, clock: Call
     row: Row = {"requests": requests, "truncated": truncated, "free_ptp": free_ptp(scene, ends, margin)}
     row |= {"safety_distance_m": margin, "first_path_s": first_path, "total_s": clock() - begin}
     return row | _figures(best, progress, settings.time_value) | {"message": "" if best else said}
+
+
+def _options(entry: Entry, settings: ArenaSettings, request: int, left: float, margin: float) -> PlanOptions:
+    """What a request of the run asks for, counted from 0, when so many seconds are left."""
+    return PlanOptions(
+        planner_id="" if entry.planner == PORTFOLIO else entry.planner,
+        seed=entry.seed * SEEDS + request,
+        max_iterations=settings.work_of(request),
+        planning_time=planned_in(left),
+        safety_distance=margin,
+        time_value=settings.time_value,
+        timing=entry.timing,
+        load=entry.load,
+    )
+
+
+def planned_in(left: float) -> float:
+    """How long a request may plan [s] so that it has answered when so many seconds more are over."""
+    return max(left - min(_LAST_STEP, 0.5 * left), 0.001)
 
 
 def _margin(scene: PlanningScene, ends: np.ndarray, safety_distance: float) -> float:

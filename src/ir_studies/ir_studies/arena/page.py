@@ -103,7 +103,7 @@ def _bindings(runs: Sequence[Run], planners: Sequence[str]) -> str:
         f"{starts}Not alike: OMPL's planners ({', '.join(names)}) ask for each check on its own, through "
         "Python; the project's searches ask for many in one call, so they make more of them in the same "
         "seconds. Each request starts anew: a roadmap (prm) is not kept for the next one, and aorrtc, which "
-        "goes on improving its path, answers when its checks are spent, not with its first path."
+        "goes on improving its path, answers when its checks or its time are spent, not with its first path."
     )
 
 

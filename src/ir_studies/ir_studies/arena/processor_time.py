@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 _SCHEDULED = 2  # Linux: the clock of a process counts what its threads ran
-_running: set[int] = set()
+_running: dict[int, float] = {}  # s that each had run when it was last looked at
 _ended = 0.0
 _start = 0.0  # s of each process that count for nobody
 
@@ -38,17 +38,16 @@ def excuse(seconds: float) -> None:
 def charged(process: int) -> Iterator[None]:
     """Count a process for as long as this lasts."""
     global _ended
-    _running.add(process)
+    _running[process] = 0.0
     try:
         yield
     finally:
         _ended += _used(process)
-        _running.discard(process)
+        del _running[process]
 
 
 def _used(process: int) -> float:
-    """Seconds that a process has run since it was started up; none where it is gone."""
-    try:
-        return max(time.clock_gettime((~process << 3) | _SCHEDULED) - _start, 0.0)
-    except OSError:
-        return 0.0
+    """Seconds that a process has run since it was started up; where it is gone, when it was last seen."""
+    with suppress(OSError):
+        _running[process] = max(time.clock_gettime((~process << 3) | _SCHEDULED) - _start, 0.0)
+    return _running[process]

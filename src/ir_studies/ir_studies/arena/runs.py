@@ -12,10 +12,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ir_studies.arena.entries import Entry, entries
-from ir_studies.arena.figures import figures
+from ir_studies.arena.figures import blocked_and_free, figures
 from ir_studies.arena.outputs import write_outputs, write_settings
 from ir_studies.arena.settings import ArenaSettings
-from ir_studies.arena.table import Run
+from ir_studies.arena.table import Run, asked_alike
 from ir_studies.arena.tasks import read_by
 from ir_studies.errors import StoppedError, StudyError, WorkerError
 from ir_studies.work import Means, Results, Task
@@ -37,11 +37,12 @@ class Finished:
 
     @property
     def summed_up(self) -> str:
-        """A row of CSV per planner."""
-        lines = [",".join(_COLUMNS)]
-        for planner in dict.fromkeys(run.entry.planner for run in self.runs):
-            found = figures(planner, self.runs)
-            lines.append(",".join(str(getattr(found, name)) for name in _COLUMNS))
+        """A row of CSV per planner: of the questions whose straight movement is blocked, then of the free."""
+        lines = [",".join(("free_ptp", *_COLUMNS))]
+        for free, own in enumerate(blocked_and_free(self.runs)):
+            for planner in dict.fromkeys(run.entry.planner for run in own):
+                found = figures(planner, own)
+                lines.append(",".join(str(value) for value in (free, *(getattr(found, n) for n in _COLUMNS))))
         return "\n".join(lines) + "\n"
 
 
@@ -67,7 +68,8 @@ def run_arena(
         begin, before = time.monotonic(), len(wanted) - len(missing)
 
         def write() -> Finished:
-            runs = tuple(Run(entry, results.rows[k]) for k, entry in wanted.items() if k in results.rows)
+            known = [Run(entry, results.rows[k]) for k, entry in wanted.items() if k in results.rows]
+            runs = asked_alike(known)
             if not runs:
                 return Finished((), (kept,))
             written = write_outputs(runs, settings, Path(folder), len(wanted) - len(runs), parquet=parquet)

@@ -107,8 +107,8 @@ _WHOLE = (
 )
 _REAL = (
     ("seconds", 0.01, 86_400.0),
-    ("safety_distance", 0.0, 10.0),
-    ("time_value", 0.0, 1e9),
+    ("safety_distance", 0.0, 1.0),
+    ("time_value", 0.0, 1e6),
     ("hang_after", 1.0, 86_400.0),
 )
 

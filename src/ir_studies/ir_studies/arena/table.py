@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from ir_studies.arena.entries import Entry
 from ir_studies.work import Row
@@ -46,6 +46,16 @@ class Run:
         """Seconds and J of each answer that was better than those before."""
         found = self.row.get("progress", [])
         return [(pair[0], pair[1]) for pair in found] if isinstance(found, list) else []
+
+
+def asked_alike(runs: Sequence[Run]) -> tuple[Run, ...]:
+    """The runs, where one that was cut or died knows from others of its question whether the straight
+    movement is free.
+    """
+    free = {run.entry.question for run in runs if run.free_ptp}
+    return tuple(
+        replace(run, row={**run.row, "free_ptp": True}) if run.entry.question in free else run for run in runs
+    )
 
 
 def columns(runs: Sequence[Run]) -> dict[str, list[Cell]]:

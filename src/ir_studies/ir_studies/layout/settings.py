@@ -184,8 +184,8 @@ _WHOLE = (
 )
 _REAL = (
     ("margin", 0.0, 1e3),
-    ("time_value", 0.0, 1e9),
-    ("safety_distance", 0.0, 10.0),
+    ("time_value", 0.0, 1e6),
+    ("safety_distance", 0.0, 1.0),
     ("hang_after", 1.0, 86_400.0),
 )
 

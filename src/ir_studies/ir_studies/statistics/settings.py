@@ -93,7 +93,7 @@ class StatisticsSettings:
 
 
 _WHOLE = (("pairs", 1, MOST_PAIRS), ("seed", 0, 2**32 - 1), ("max_iterations", 0, 2**32 - 1))
-_REAL = (("safety_distance", 0.0, 10.0), ("hang_after", 1.0, 86_400.0))
+_REAL = (("safety_distance", 0.0, 1.0), ("hang_after", 1.0, 86_400.0))
 
 
 def statistics_settings(content: str, placed: Placed) -> StatisticsSettings:

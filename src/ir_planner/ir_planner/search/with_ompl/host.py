@@ -23,10 +23,14 @@ from multiprocessing.reduction import send_handle
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Work
-from ir_planner.search.with_ompl.problem import Outcome, Problem
+from ir_planner.search.with_ompl.problem import STOP, Outcome, Problem
 
 _LOOK_S = 0.005  # s between two looks whether the request was cancelled or its time is up
 _ATTEMPTS = 2  # a host that died since the last request is started again once
+_LAST_S, _LAST_LOOKS = (
+    0.02,
+    400,
+)  # on the request's clock, and looks: for an answer that is asked for at its end
 _PATIENCE = 24_000  # looks, two minutes, until a host that answers nobody is ended: OMPL loads in seconds
 Charged = Callable[[int], AbstractContextManager[object]]
 _charged: Charged = lambda process: nullcontext()  # noqa: E731 - until somebody asks
@@ -174,13 +178,28 @@ def _answer(connection: Connection, process: int, problem: Problem, work: Work) 
         sheet.flush()
         try:
             send_handle(connection, sheet.fileno(), process)
-            while not connection.poll(_LOOK_S):
-                work.check()
-                if work.exhausted:
-                    return Outcome(None)
+            if not _answered(connection, work):
+                return Outcome(None)
             connection.recv()
         except (EOFError, OSError):
             return Outcome(None, 0, "OMPL's process ended without an answer")
         sheet.seek(0)
         outcome: Outcome = pickle.load(sheet)
         return outcome
+
+
+def _answered(connection: Connection, work: Work) -> bool:
+    """Whether the process has answered; when the work is over it is asked for what it has found so far."""
+    while not connection.poll(_LOOK_S):
+        work.check()
+        if work.exhausted:
+            connection.send(STOP)
+            break
+    end = work.clock() + _LAST_S
+    for _ in range(_LAST_LOOKS):
+        if connection.poll(_LOOK_S):
+            return True
+        work.check()
+        if work.clock() > end:
+            break
+    return False

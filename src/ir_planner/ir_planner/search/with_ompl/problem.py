@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import PlanningScene
 
+STOP = "stop"
+"""Sent after the problem, when the time is over: the answer is what was found so far."""
+
 
 @dataclass(frozen=True)
 class Parameters:

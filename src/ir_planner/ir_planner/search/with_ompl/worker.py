@@ -112,8 +112,16 @@ class _Counted:
         self._spent += states
         self._looks += 1
         if self._looks % _LOOK == 0 and select.select([self._connection], [], [], 0.0)[0]:
-            os._exit(1)  # nothing is sent after the problem: who asked has gone
+            self._stop()
         return True
+
+    def _stop(self) -> None:
+        """End the search; where nobody waits for its answer any more, the process."""
+        try:
+            self._connection.recv()
+        except (EOFError, OSError):
+            os._exit(1)
+        self.end.terminate()
 
 
 def solved(problem: Problem, connection: Connection) -> Outcome:
