@@ -6,6 +6,7 @@ import itertools
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,6 +39,22 @@ def test_without_ompl_a_sentence_says_how_to_install_it(
     ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
     with pytest.raises(RequestError, match="'kpiece': OMPL is missing: pip install"):
         SEARCHES["kpiece"].find(ends, space, 1, space.work)
+
+
+def test_ompl_that_is_installed_but_broken_is_no_search_that_found_nothing(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "ompl").mkdir()
+    (tmp_path / "ompl" / "__init__.py").write_text("raise ImportError('libompl.so is damaged')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(host, "_host", None)  # as it was, afterwards
+    ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
+    try:
+        with pytest.raises(RequestError, match=r"'rrt': OMPL is installed but can't be loaded: libompl.so"):
+            SEARCHES["rrt"].find(ends, space, 1, space.work)
+    finally:
+        if host._host is not None:
+            host._host.close()
 
 
 def test_at_the_ceiling_it_is_killed(scene_of: SceneOf) -> None:

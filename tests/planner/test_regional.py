@@ -14,9 +14,11 @@ from asking import planned
 from ir_description import cell_from_yaml, load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
+from ir_planner.checks import FreeSpace
 from ir_planner.errors import CancelledError
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
+from ir_planner.search import SEARCHES, Ends, Found
 
 SceneOf = Callable[[str], PlanningScene]
 TASKS = [
@@ -134,6 +136,24 @@ equipment:
       - {name: left, kind: box, size: [8, 0.2, 8], xyz: [0, 0.65, 2]}
       - {name: right, kind: box, size: [8, 0.2, 8], xyz: [0, -0.65, 2]}
 """
+
+
+def test_a_search_that_misses_a_free_straight_movement_is_named(scene_of: SceneOf, budget: Work) -> None:
+    class Blind:
+        """Finds nothing."""
+
+        def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+            return Found([], "looked away")
+
+    scene = scene_of("open")
+    task = scene.cell.task("home->p1")
+    options = PlanOptions(planner_id="blind")
+    searches = {**SEARCHES, "blind": Blind()}
+    plan = planned(np.array(task.start), np.array(task.goal), scene, options, budget, searches)
+    assert plan.status.code == StatusCode.PLANNING_FAILED
+    assert plan.status.message == (
+        "no path found, though the straight movement is free: tried: blind (nothing free, looked away)"
+    )
 
 
 def test_where_no_path_leads_the_pair_the_place_and_what_was_tried_are_named(

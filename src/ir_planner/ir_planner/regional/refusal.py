@@ -7,18 +7,20 @@ from ir_planner.checks import FreeSpace, pair_value
 from ir_planner.request import Journal
 
 
-def refusal(start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Journal) -> Status:
-    """The status for a movement from start to goal (n,), both free, that was not found."""
+def refusal(start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Journal, *, path: bool) -> Status:
+    """The status for a movement from start to goal (n,), both free, that was not found; path: one was."""
     found = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
+    tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
+    cut = " within planning_time" if journal.work.truncated else ""
     if found.verdict[0] == FREE:
         rejected = (f"{reason} ({count})" for reason, count in journal.rejected.items())
         reasons = "; ".join(rejected) or "max_iterations or planning_time ended before one was timed"
         return Status(
             StatusCode.PLANNING_FAILED,
-            f"the straight path is free but no movement could be certified: {reasons}",
+            f"the straight path is free but no movement could be certified: {reasons}"
+            if path
+            else f"no path found{cut}, though the straight movement is free: tried: {tried}",
         )
-    tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
-    cut = " within planning_time" if journal.work.truncated else ""
     share = float(found.t1[0])
     q = start + share * (goal - start)
     pair = pair_value(space.scene, q, int(found.pair[0]))

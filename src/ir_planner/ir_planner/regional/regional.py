@@ -71,7 +71,7 @@ def _search(
             return proved, None
     paths = paths or first_paths(ends, space, context, searches, briefly=False)
     if not paths:
-        return refusal(start, ends.goals[0], space, context.journal), None
+        return refusal(start, ends.goals[0], space, context.journal, path=False), None
     there = np.abs(ends.goals - start).max(axis=1).min() < STILL
     best, shortest = None, np.inf
     if not there and context.options.planner_id != DIRECT:
@@ -83,7 +83,7 @@ def _search(
             check_requested(shortest, context.options)
         best = _in_straight_steps(paths, Portfolio(space, Refinement(context)), context)
     if best is None:
-        return refusal(start, ends.goals[0], space, context.journal), None
+        return refusal(start, ends.goals[0], space, context.journal, path=True), None
     context.journal.planner_id, movement = best
     context.journal.timing = "synchronous"
     if context.options.objective == "movement_cost":  # W of its waypoints is asked for

@@ -3,7 +3,9 @@
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace
+from ir_planner.errors import RequestError
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.tree import connect
@@ -21,7 +23,7 @@ def found_by(
     """What OMPL's planner finds with `edges` checks at most; every step of its path is certified
     here: some of them smooth their paths without asking.
 
-    Raises RequestError where OMPL isn't installed, CancelledError when asked to stop.
+    Raises RequestError where OMPL isn't installed or can't be loaded, CancelledError when asked to stop.
     """
     check_installed(name)
     checks = min(edges, int(_SHARE * work.left))
@@ -30,6 +32,11 @@ def found_by(
     goals, seconds = ends.goals[:NEAREST_GOALS], work.deadline - work.clock()
     problem = Problem(space.scene, space.threshold, ends.start, goals, parameters, seed, checks, seconds)
     outcome = asked(problem, work)
+    if outcome.unusable:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"planner_id {name!r}: OMPL is installed but can't be loaded: {outcome.error}",
+        )
     if outcome.path is None:
         return Found([], outcome.error or f"OMPL found no path in {outcome.edges} checks")
     path = repaired(_between(outcome.path, ends), space, seed)

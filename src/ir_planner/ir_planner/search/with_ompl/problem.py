@@ -41,8 +41,11 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A path (M, n), None where none was found; checks in edges; error: why OMPL could not be asked."""
+    """A path (M, n), None where none was found; checks in edges; error: why OMPL could not be asked;
+    unusable: because it is installed but can't be loaded.
+    """
 
     path: FloatArray | None
     edges: int = 0
     error: str = ""
+    unusable: bool = False

@@ -67,7 +67,7 @@ def _answer(connection: Connection, parent: int) -> None:
         problem: Problem = pickle.load(sheet)
         signal.setitimer(signal.ITIMER_REAL, problem.seconds + _GRACE)
         try:
-            outcome = Outcome(None, 0, _REASON) if _REASON else solved(problem, connection)
+            outcome = Outcome(None, 0, _REASON, unusable=True) if _REASON else solved(problem, connection)
         except Exception as error:  # goes to who asked, whatever it is: this process has no other voice
             outcome = Outcome(None, 0, f"{type(error).__name__}: {error}")
         sheet.seek(0)
