@@ -16,6 +16,7 @@ from rclpy.node import Node
 
 from ir_cli.main import main
 from ir_msgs.action import RunProgram
+from ir_msgs_py.ros.testing import WaitFor
 
 ACTION = "/machine/run"
 
@@ -110,7 +111,10 @@ def test_nothing_to_cancel_is_said(machine: Machine, capsys: pytest.CaptureFixtu
 
 
 def test_a_misspelt_action_is_answered_with_the_one_that_was_meant(
-    machine: Machine, capsys: pytest.CaptureFixture[str]
+    machine: Machine, capsys: pytest.CaptureFixture[str], wait_for: WaitFor
 ) -> None:
-    assert main(["send_goal", "/machine/rum", "{}"]) == 1
-    assert f"did you mean {ACTION}?" in capsys.readouterr().err
+    def answered() -> bool:
+        assert main(["send_goal", "/machine/rum", "{}"]) == 1
+        return f"did you mean {ACTION}?" in capsys.readouterr().err
+
+    wait_for(answered, what="the name that was meant")

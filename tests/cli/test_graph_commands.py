@@ -87,10 +87,15 @@ def test_list_shows_names_with_types(
 
 
 def test_a_typo_is_answered_with_the_name_that_was_meant(
-    machine: Node, capsys: pytest.CaptureFixture[str]
+    machine: Node, capsys: pytest.CaptureFixture[str], wait_for: WaitFor
 ) -> None:
-    assert main(["call", "/machin/set", "{}"]) == 1
-    assert f"no service /machin/set: did you mean {SERVICE}?" in capsys.readouterr().err
+    """As soon as the graph is whole: a busy machine may find half of it, and nothing more for a second."""
+
+    def answered() -> bool:
+        assert main(["call", "/machin/set", "{}"]) == 1
+        return f"no service /machin/set: did you mean {SERVICE}?" in capsys.readouterr().err
+
+    wait_for(answered, what="the name that was meant")
 
 
 def test_another_type_than_the_services_is_refused_at_once(

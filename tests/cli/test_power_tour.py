@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -18,58 +17,74 @@ from ir_msgs_py.ros.client import Client
 
 NOW = 1000.0  # s on the node's clock, which stands: whatever the meter says, it is behind
 PATIENCE = 1.0  # s
+EVERY = 0.01  # s of real time
 
 
 class FakeMeter:
-    """A client of a meter whose readings are `step` s apart on its own clock, one every `every` s."""
+    """A client of a meter whose readings are `step` s apart on its own clock, and `EVERY` s of real time."""
 
-    def __init__(self, behind: float, step: float, every: float = 0.01) -> None:
+    def __init__(self, behind: float, step: float) -> None:
         now = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(NOW * 1e9)))
         self.node = SimpleNamespace(get_clock=lambda: now)
-        self._stamp, self._step, self._every = NOW - behind, step, every
+        self._stamp, self._step = NOW - behind, step
         self._take: Callable[[PowerState], None] = lambda state: None
-        self._end = threading.Event()
+        self.passed = 0.0
 
     def subscribe(self, topic: str, kind: type, take: Callable[[PowerState], None]) -> None:
         self._take = take
 
-    @contextmanager
-    def running(self) -> Iterator[None]:
-        thread = threading.Thread(target=self._run)
-        thread.start()
-        try:
-            yield
-        finally:
-            self._end.set()
-            thread.join()
+    def read(self) -> None:
+        """The next reading."""
+        self.passed += EVERY
+        self._stamp += self._step
+        state = PowerState(mode=PowerMode.STAND_ON_BRAKES)
+        state.header.stamp.sec = int(self._stamp)
+        state.header.stamp.nanosec = int(self._stamp % 1.0 * 1e9)
+        self._take(state)
 
-    def _run(self) -> None:
-        while not self._end.wait(self._every):
-            self._stamp += self._step
-            state = PowerState(mode=PowerMode.STAND_ON_BRAKES)
-            state.header.stamp.sec = int(self._stamp)
-            state.header.stamp.nanosec = int(self._stamp % 1.0 * 1e9)
-            self._take(state)
+
+class Turns(threading.Condition):
+    """Who waits gets the next reading of the meter, without a clock that could be slow."""
+
+    def __init__(self, meter: FakeMeter) -> None:
+        super().__init__()
+        self._meter = meter
+
+    def wait_for(self, predicate: Callable[[], Any], timeout: float | None = None) -> Any:
+        self._meter.read()
+        return predicate()
 
 
 def watch(meter: FakeMeter) -> PowerWatch:
     return PowerWatch(cast(Client, cast(Any, meter)), PATIENCE)
 
 
-def test_a_meter_that_lags_behind_is_waited_for_as_long_as_it_goes_on() -> None:
+@pytest.fixture
+def watched(monkeypatch: pytest.MonkeyPatch) -> Callable[[FakeMeter], PowerWatch]:
+    """Watches a meter that goes on, in real time that passes with its readings."""
+
+    def made(meter: FakeMeter) -> PowerWatch:
+        found = watch(meter)
+        monkeypatch.setattr(found, "_changed", Turns(meter))
+        monkeypatch.setattr(time, "monotonic", lambda: meter.passed)
+        return found
+
+    return made
+
+
+def test_a_meter_that_lags_behind_is_waited_for_as_long_as_it_goes_on(
+    watched: Callable[[FakeMeter], PowerWatch],
+) -> None:
     meter = FakeMeter(behind=3.0, step=0.02)
-    waiting = watch(meter)
-    with meter.running():
-        began = time.monotonic()
-        waiting.stay(0.1)
-    assert time.monotonic() - began > PATIENCE  # 155 readings, 10 ms apart
+    watched(meter).stay(0.1)
+    assert meter.passed > PATIENCE  # 155 readings
 
 
-def test_a_mode_that_does_not_come_is_waited_for_by_the_meter_s_time() -> None:
-    meter = FakeMeter(behind=1.0, step=0.5)
-    waiting = watch(meter)
-    waited = "waited 1 s for power mode"
-    with meter.running(), pytest.raises(DemonstrationError, match=waited):
+def test_a_mode_that_does_not_come_is_waited_for_by_the_meter_s_time(
+    watched: Callable[[FakeMeter], PowerWatch],
+) -> None:
+    waiting = watched(FakeMeter(behind=1.0, step=0.5))
+    with pytest.raises(DemonstrationError, match="waited 1 s for power mode"):
         waiting.wait_for_mode(PowerMode.HIBERNATION)
 
 

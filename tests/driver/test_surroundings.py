@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ir_description import Body, cell_hash, load_cell
-from ir_sim_driver.controller import Driver, PlannedCell
+from ir_sim_driver.controller import Driver, PlannedCell, surroundings
 from ir_sim_driver.controller.moving_in import take_offered_cell
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
@@ -122,7 +122,8 @@ def test_a_cell_of_another_robot_or_another_mounting_is_not_taken(make):
     assert simulation.cell is OPEN
 
 
-def test_a_trajectory_waits_for_its_cell_which_may_come_later(make, plan):
+def test_a_trajectory_waits_for_its_cell_which_may_come_later(make, plan, monkeypatch):
+    monkeypatch.setattr(surroundings, "PATIENCE", 60.0)  # s: a busy machine
     simulation = make()
     driver = Driver(simulation)
     trajectory = movement(plan, simulation)

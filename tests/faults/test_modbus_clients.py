@@ -14,10 +14,11 @@ from pymodbus.client import ModbusTcpClient
 from ir_msgs_py.plc import OperatingMode
 from ir_sim_driver import Driver, make_simulation
 from ir_sim_driver.plc import OpenLink
-from ir_sim_driver.plc.modbus import ModbusServer
+from ir_sim_driver.plc.modbus import Limits, ModbusServer
 from ir_sim_driver.plc.modbus_link import ModbusTcp
 from ir_sim_driver.plc.modbus_map import COILS, OPERATING_MODE
 from ir_sim_driver.plc.modbus_pdu import answered
+from ir_sim_driver.plc.modbus_tables import ControllerTables
 
 Opened = Callable[..., int]
 READ_ALL_COILS = struct.pack(">BHH", 1, 0, len(COILS))
@@ -98,22 +99,30 @@ def test_a_hundred_silent_clients_leave_a_place_and_no_line_in_the_log(
     assert "".join(capfd.readouterr()) == ""
 
 
-def test_who_asks_keeps_its_place_among_silent_ones(open_port: Opened) -> None:
-    port = open_port(modbus_connections=2)
-    plc, silent = connected(port), connected(port)
-    served = 0
-    for _ in range(100):
+def test_who_asks_keeps_its_place_among_silent_ones(driver: Driver) -> None:
+    """On a clock of the server's own: a busy machine would keep the PLC silent as well."""
+    server, now = (
+        ModbusServer("127.0.0.1", 0, ControllerTables(driver.plc, 2.0), Limits(connections=2)),
+        [0.0],
+    )
+    server._loop.time = lambda: now[0]  # type: ignore[method-assign]
+    plc, silent = connected(server.port), connected(server.port)
+
+    def asks() -> bool:
         plc.sendall(frame(READ_ALL_COILS))
-        assert len(received(plc, 11)) == 11
-        if is_served(port):
-            served += 1
-            break
-        threading.Event().wait(0.05)
-    assert served == 1, "the silent one has kept its place"
-    plc.sendall(frame(READ_ALL_COILS))
-    assert len(received(plc, 11)) == 11
-    plc.close()
-    silent.close()
+        return len(received(plc, 11)) == 11
+
+    try:
+        assert asks()
+        assert not is_served(server.port)  # nobody has been silent for a second
+        now[0] = 1.5
+        assert asks()
+        assert is_served(server.port), "the silent one has kept its place"
+        assert asks()
+    finally:
+        plc.close()
+        silent.close()
+        server.close()
 
 
 @pytest.mark.parametrize("said", [b"", frame(READ_ALL_COILS)[:5], frame(READ_ALL_COILS)[:9]])

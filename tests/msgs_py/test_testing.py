@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Float64
@@ -50,6 +48,4 @@ def test_a_coroutine_waits_for_a_condition_or_its_timeout(ros_node, ros_executor
     async def wait():
         return await waiting.until(lambda: bool(arrived), 60.0), await waiting.until(lambda: False, 0.01)
 
-    started = time.monotonic()
     assert ros_executor.run(wait) == (True, False)
-    assert time.monotonic() - started < 60.0

@@ -21,6 +21,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import report_from_msg, trajectory_from_msg
 from ir_msgs_py.ros.quality import COMMANDS, LATCHED
 from ir_planner.node.node import PlannerNode
+from ir_sim_driver.controller import surroundings
 from ir_sim_driver.node import SimDriver, announcements
 
 DEMO = load_cell("demo")
@@ -118,7 +119,7 @@ def test_a_signal_that_was_sent_before_the_driver_started_counts(
 
 @pytest.mark.usefixtures("planner_node")
 def test_a_machine_that_moves_makes_old_trajectories_void_and_new_ones_run(
-    make_driver: Any, client: Client
+    make_driver: Any, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make_driver()
     report, trajectory = planned(client)
@@ -132,7 +133,9 @@ def test_a_machine_that_moves_makes_old_trajectories_void_and_new_ones_run(
 
     again, new = planned(client)
     assert again.cell_hash == now.hash
-    client.execute(new, report=again)  # even where the cell comes later than the trajectory
+    with monkeypatch.context() as patient:
+        patient.setattr(surroundings, "PATIENCE", 60.0)  # s: a busy machine
+        client.execute(new, report=again)  # even where the cell comes later than the trajectory
     with pytest.raises(RequestRefusedError, match=report.cell_hash) as refused:
         client.execute(trajectory, report=report)
     assert now.hash in str(refused.value)

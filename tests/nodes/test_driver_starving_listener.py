@@ -16,7 +16,10 @@ from ir_msgs_py import names
 from ir_sim_driver.node import SimDriver
 
 COUNT = 1_500
-STARVED = 2.0  # s of real time: who is not heard for 5 s is forgotten
+STARVED = 2.0  # s of real time
+LONGEST = 3.0  # s: a busy machine may leave it stopped for longer, and who is not heard for 5 s is forgotten
+MOST = 1_800  # joint states that it may miss meanwhile: 2,000 are kept for it
+TRIES = 20
 LISTENER = """
 import rclpy
 from rclpy.qos import QoSProfile
@@ -34,7 +37,7 @@ def heard(msg):
 node.create_subscription(JointState, "joint_states", heard, QoSProfile(depth=4000))
 while len(stamps) < COUNT:
     rclpy.spin_once(node)
-print((stamps[-1] - stamps[0]) // 2_000_000 + 1 - len(stamps), flush=True)
+print(stamps[0], stamps[-1], len(stamps), flush=True)
 rclpy.shutdown()  # which takes its shared memory away
 """
 
@@ -42,6 +45,31 @@ rclpy.shutdown()  # which takes its shared memory away
 @pytest.fixture
 def ros_discovery_range():
     return "LOCALHOST"
+
+
+def stamp_of(msg):
+    return msg.header.stamp.sec * 1_000_000_000 + msg.header.stamp.nanosec
+
+
+def starve(listener, published, wait_for):
+    """What the listener says after two seconds without a processor; "" where it was too long without."""
+    with listener:
+        try:
+            assert listener.stdout is not None
+            assert listener.stdout.readline() == "hears\n"
+            listener.send_signal(signal.SIGSTOP)
+            begin, before = time.monotonic(), published[-1]
+            wait_for(lambda: time.monotonic() - begin >= STARVED)
+            listener.send_signal(signal.SIGCONT)
+            missed = sum(stamp > before for stamp in list(published))
+            assert missed > 0
+            if time.monotonic() - begin > LONGEST or missed > MOST:
+                return ""
+            said = listener.stdout.readline()
+            assert listener.wait(60.0) == 0
+            return said
+        finally:
+            listener.kill()
 
 
 def test_two_seconds_without_a_processor_lose_nothing(
@@ -56,18 +84,13 @@ def test_two_seconds_without_a_processor_lose_nothing(
         )
     )
     published = []
-    ros_node.create_subscription(JointState, names.JOINT_STATES, published.append, QoSProfile(depth=2000))
-    code = LISTENER.replace("COUNT", str(COUNT))
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as listener:
-        try:
-            assert listener.stdout is not None
-            assert listener.stdout.readline() == "hears\n"
-            listener.send_signal(signal.SIGSTOP)
-            begin, before = time.monotonic(), len(published)
-            wait_for(lambda: time.monotonic() - begin >= STARVED)
-            listener.send_signal(signal.SIGCONT)
-            assert len(published) > before
-            assert listener.stdout.readline() == "0\n"
-            assert listener.wait(60.0) == 0
-        finally:
-            listener.kill()
+    ros_node.create_subscription(
+        JointState, names.JOINT_STATES, lambda msg: published.append(stamp_of(msg)), QoSProfile(depth=20_000)
+    )
+    wait_for(lambda: published, what="the driver publishes")
+    words = [sys.executable, "-c", LISTENER.replace("COUNT", str(COUNT))]
+    tries = (subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(TRIES))
+    said = next(filter(None, (starve(listener, published, wait_for) for listener in tries)))
+    first, last, count = map(int, said.split())
+    wait_for(lambda: published[-1] >= last, what="what the listener has heard")
+    assert count == sum(first <= stamp <= last for stamp in published)

@@ -272,7 +272,12 @@ def test_plan_standby_takes_a_length_that_nobody_knows_and_postures(call: Call) 
 
 @pytest.fixture
 def plan_action(planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any) -> Any:
-    client = ros_executor.run(lambda: ActionClient(ros_node, Plan, "/ir_planner/plan"))
+    kept = QoSProfile(
+        depth=1000
+    )  # of the feedback: by default the eleventh that waits takes the first's place
+    client = ros_executor.run(
+        lambda: ActionClient(ros_node, Plan, "/ir_planner/plan", feedback_sub_qos_profile=kept)
+    )
     wait_for(client.server_is_ready, what="the action is offered")
     yield client
     ros_executor.run(client.destroy)
