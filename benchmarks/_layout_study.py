@@ -18,6 +18,7 @@ from ir_studies.layout import Layouts
 from ir_studies.layout.summary import ends
 
 LAYOUT_PARTS = ("grid", "timed_grid", "grids", "demonstration", "speed")
+QUICK_STEPS = 5  # more placements than the search plans before it has a bound
 EVERYTHING = 1000.0  # a margin that excludes nothing
 STATIONS = (
     "infeed_pick",
@@ -53,7 +54,7 @@ def layout_claims(cell: str, parts: Collection[str], out: Path | None, *, quick:
     """Claims of the named parts about layout studies, kept in `out` where it is given; quick: without the
     demonstration's, smaller grids and fewer programs.
     """
-    small = replace(SMALL, cell=cell, steps=3 if quick else SMALL.steps)
+    small = replace(SMALL, cell=cell, steps=QUICK_STEPS if quick else SMALL.steps)
     timed = replace(small, stations=STATIONS)
     asked: dict[str, Callable[[Path], list[Claim]]] = {
         "grid": lambda folder: bounded_against_exhaustive(small, "free", folder),
@@ -88,7 +89,7 @@ def bounded_against_exhaustive(settings: LayoutSettings, name: str, folder: Path
     bound = 1.0 + 100.0 * spread
     return [
         at_most(f"layout, {name}: best above an exhaustive grid's", lost, "%", bound),
-        at_most(f"layout, {name}: share planned of the grid", plans[0] / plans[1], "", 1.0),
+        at_most(f"layout, {name}: share planned of the grid", plans[0] / plans[1], "", 0.95),
     ]
 
 

@@ -170,6 +170,37 @@ def test_why_the_others_were_not_planned(laid: Laid) -> None:
     assert "at most 16 plans were asked for" in laid(replace(GRID, plans=16), "b").summary
 
 
+def test_where_the_bound_left_out_nothing_the_study_says_so(laid: Laid) -> None:
+    few = laid(replace(GRID, steps=3), "few").summary
+    assert (
+        "All that a look found possible were planned, the bound left out none: the first 16 are planned "
+        "before there is a bound." in few
+    )
+    every = laid(replace(GRID, steps=5, margin=1000.0), "every").summary
+    assert "the bound left out none." in every
+    for one, name in ((GRID, "bounded"), (replace(SPREAD, placements=1), "given")):
+        assert "left out none" not in laid(one, name).summary
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({}, "Placements are compared by J (energy of the drives + 500 W x seconds of the movements)."),
+        ({"cycle_times": (9.0,)}, "Placements are compared by joules at the mains per cycle."),
+        (
+            {"cycle_times": (0.0, 9.0), "time_value": 80.0},
+            "Placements are compared by J (energy of the drives + 80 W x seconds of the movements) without a "
+            "cycle time, by joules at the mains per cycle in one, mean over 2 conditions.",
+        ),
+    ],
+)
+def test_it_is_said_what_placements_are_compared_by(
+    laid: Laid, tmp_path: Path, asked: dict[str, Any], said: str
+) -> None:
+    assert said in laid(replace(SPREAD, placements=20, **asked)).summary
+    assert f'<p class="hint">{said}</p>' in (tmp_path / "out" / "index.html").read_text()
+
+
 def test_what_stands_as_given_is_no_part_of_a_job(laid: Laid) -> None:
     known = laid(replace(GRID, steps=5)).known
     assert known[0].placement.values == {}

@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_recorder.analysis.agreement import Mean
+from ir_studies.layout.search import BATCH
 from ir_studies.statistics.figures import findings_of
 from ir_studies.statistics.runs import Finished
 from ir_studies.statistics.settings import StatisticsSettings
@@ -42,6 +43,12 @@ def test_only_what_is_named_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(sys, "argv", words)
     studies.main()
     assert ran == [("grid", tmp_path), ("speed", tmp_path)]
+
+
+def test_every_grid_has_more_placements_than_are_planned_before_there_is_a_bound() -> None:
+    small = _layout_study.SMALL
+    for steps in (_layout_study.QUICK_STEPS, small.steps):
+        assert steps ** len(small.variables) > BATCH
 
 
 @given(st.lists(st.tuples(st.floats(-0.5, 0.5), st.floats(-0.1, 0.1)), min_size=3, max_size=12, unique=True))

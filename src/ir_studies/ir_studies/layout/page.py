@@ -15,6 +15,7 @@ import numpy as np
 from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE
+from ir_planner.checks import Interval
 from ir_recorder.report.files import write_output
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.tables import table
@@ -25,15 +26,15 @@ from ir_studies.layout.placement import Known
 from ir_studies.layout.plan_view import Mark, PlanView, colour, estimates, legend, mark, shown_range
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import LayoutSettings
-from ir_studies.layout.summary import ends, of_condition, sentences
+from ir_studies.layout.summary import cost_words, ends, of_condition, sentences
 from ir_studies.page import page
 
 _CHART, _HIGH, _LEFT, _BELOW = 340.0, 190.0, 52.0, 30.0  # width, height and room for numbers
 _MACHINE = "equipment."  # before the name of an owner that is one
 _SENTENCE = 300  # characters of a reason
 _HEADS = (
-    "placement", "for", ">joules per cycle", ">90 % interval", ">between seeds", ">less than given",
-    ">90 % interval", ">movements", ">duration", ">clearance",
+    "placement", "for", ">joules per cycle, 90 % interval", ">between seeds",
+    ">less than given, 90 % interval", ">movements", ">duration", ">clearance",
 )  # fmt: skip
 
 
@@ -61,6 +62,7 @@ def page_html(
         "verdict": f"<ul>{said}</ul>",
         "best": table(_HEADS, _rows(finals), "The best placements"),
         "map": "".join(_maps(known, finals, settings, cell)),
+        "cost": text(cost_words(settings)),
         "legend": legend(*shown_range(known)),
         "variables": "".join(_charts(known, finals, settings)),
         "impossible": _impossible(known),
@@ -79,17 +81,21 @@ def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:
             if not one.solved:
                 yield text(name), text(one.condition.text), *[DASH] * (len(_HEADS) - 2)
                 continue
-            within, less = one.interval, (DASH, DASH)
+            less = DASH
             if given is not None and not one.is_given:
                 saved, between = one.saving(like := of_condition(given, one))
-                share = percent(saved / like.mean())
-                less = f"{joules(saved)} ({share})", f"{joules(between.low)} … {joules(between.high)}"
+                share = percent(saved / like.mean()).lstrip("+")
+                less = _with_interval(f"{joules(saved)} ({share})", between)
             yield (
-                text(name), text(one.condition.text), joules(one.mean()),
-                f"{joules(within.low)} … {joules(within.high)}", joules(one.spread()), *less,
-                joules(one.mean("moving_j")), f"{one.mean('duration_s'):.2f} s",
-                millimetres(one.mean("clearance_m")),
+                text(name), text(one.condition.text), _with_interval(joules(one.mean()), one.interval),
+                joules(one.spread()), less, joules(one.mean("moving_j")),
+                f"{one.mean('duration_s'):.2f} s", millimetres(one.mean("clearance_m")),
             )  # fmt: skip
+
+
+def _with_interval(value: str, within: Interval) -> str:
+    """A value with its interval on a line of its own."""
+    return f"{value}<br><small>{joules(within.low)} … {joules(within.high)}</small>"
 
 
 def _maps(

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from ir_recorder.report.words import joules, percent
 from ir_studies.layout.finals import Final, mean_cost
 from ir_studies.layout.placement import Known
+from ir_studies.layout.search import BATCH
 from ir_studies.layout.settings import LayoutSettings
 
 SHOWN = 4  # reasons
@@ -26,6 +27,10 @@ def sentences(
     )
     if planned and planned + len(impossible) < len(known):
         yield bound_words(sum(one.planned for one in known), settings)
+        yield cost_words(settings)
+    elif planned and len(known) > 1:
+        yield all_words(sum(one.planned for one in known))
+        yield cost_words(settings)
     given, best = ends(finals)
     if given is None and best is None:
         yield "No placement is possible."
@@ -38,6 +43,22 @@ def sentences(
     if given is not None and best is None:
         others = "None of the others is possible" if len(known) > 1 else "No other was looked at"
         yield f"{others}: the given placement stays."
+
+
+def cost_words(settings: LayoutSettings) -> str:
+    """What placements are compared by."""
+    free = f"J (energy of the drives + {settings.time_value:g} W x seconds of the movements)"
+    timed = "joules at the mains per cycle"
+    kinds = [free] * (not all(settings.cycle_times)) + [timed] * settings.in_cycles
+    over = f", mean over {count} conditions" if (count := len(settings.conditions)) > 1 else ""
+    by = f"{free} without a cycle time, by {timed} in one" if len(kinds) > 1 else kinds[0]
+    return f"Placements are compared by {by}{over}."
+
+
+def all_words(planned: int) -> str:
+    """That the bound left out nothing, so that nothing is learnt of it. planned: how many were."""
+    few = f": the first {BATCH} are planned before there is a bound" if planned <= BATCH else ""
+    return f"All that a look found possible were planned, the bound left out none{few}."
 
 
 def bound_words(planned: int, settings: LayoutSettings) -> str:
