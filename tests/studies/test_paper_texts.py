@@ -9,6 +9,7 @@ from pathlib import Path
 
 import _paper_claims
 import _paper_cost
+import _paper_line
 import _paper_savings
 import numpy as np
 import pytest
@@ -157,3 +158,14 @@ def test_what_the_load_does_to_the_ranks_follows_from_the_figures(by: float, say
         _paper_cost.EMPTY,
         _paper_cost.PRINTED,
     }
+
+
+def test_the_line_says_how_many_movements_of_the_common_programs_are_no_straight_ones() -> None:
+    row: Row = {"cell": "open", "seconds": 10.0, "drives": 0.3, "mains": 0.2, "across": 4}
+    rows = [
+        row | {"stops": stops, "around": around} for stops, around in (("a b", 1), ("b a", 3), ("b a", 3))
+    ]
+    statements = _paper_line.judge(rows)
+    assert statements[-1].value == pytest.approx(100.0 * 7 / 12)
+    assert {one.count for one in statements} == {2}  # a program that every seed plans is one
+    assert "58 % of the common programs' movements run around bodies" in _paper_line.follows(statements)
