@@ -25,6 +25,7 @@ from ir_recorder.read.cdr import Columns
 from ir_recorder.read.cells import chosen_namespace
 from ir_recorder.read.chunks import ReadLimits
 from ir_recorder.read.decoded import decoder_of, movement_from, savings_from
+from ir_recorder.read.driven_plans import with_plans
 from ir_recorder.read.planned import planned_steps
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw
 from ir_recorder.read.recording import (
@@ -39,7 +40,6 @@ from ir_recorder.read.recording import (
     TextEvent,
     TopicSummary,
 )
-from ir_recorder.read.search_logs import search_logs
 
 _T = TypeVar("_T")
 _OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PROGRAM_STATE)
@@ -109,7 +109,7 @@ class _Reader:
             facts=raw.facts,
             problems=tuple(map(one_line, self._problems)),
         )
-        found = replace(found, searches=search_logs(self._channel(_CALLS), found.events))
+        found = with_plans(found, self._channel(_CALLS))
         if found.joints is not None or found.power is not None or found.events:
             return found
         planned = planned_steps(self._channel(_CALLS))

@@ -145,7 +145,8 @@ class Recording:
     urdf are "" where none is attached, so are power_yaml (data of the controller) and plant_yaml (the
     simulated plant with its figures). facts: texts by key. planned: steps of the last planned program, where
     nothing was driven. machines: their states by name, "closed>open" while they change; contacts: what the
-    robot touched, by body. searches: what the searches of the driven programs did, or of the last planned one
+    robot touched, by body. savings: of the driven programs, or of the last planned one, where their plans are
+    in it. searches: what the searches of the driven programs did, or of the last planned one
     where none was driven, where they keep a log.
     """
 

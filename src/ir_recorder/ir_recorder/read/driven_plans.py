@@ -1,9 +1,10 @@
-"""What the searches of the driven programs did, from the planner's answers that a recording holds."""
+"""What the plans behind a recorded run save, and what their searches did, from the planner's answers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -13,17 +14,35 @@ from ir_recorder.read.cdr import Columns
 from ir_recorder.read.front import ACTION, MOST_POINTS, answers, result_definition
 from ir_recorder.read.planned import MOST_STEPS, SERVICE
 from ir_recorder.read.raw import RawChannel
-from ir_recorder.read.recording import ProgramEvent
+from ir_recorder.read.recording import ProgramEvent, Recording
 
 MOST_STAGES = 2_000
 
 
-def search_logs(channel: RawChannel | None, events: Sequence[ProgramEvent] = ()) -> tuple[SearchLog, ...]:
-    """Logs of the programs that were driven, in the order in which they were, by the last answer on a
-    planner's calls that has them; of the last planned program where none was driven.
+def with_plans(found: Recording, channel: RawChannel | None) -> Recording:
+    """The recording with searches and savings of its plans, by the planner's calls; all savings where no plan
+    is known.
+    """
+    plans = _driven_plans(channel, found.events)
+    logs = tuple(log if plan.own else _not_driven(log) for plan in plans for log in _logs_of(plan.answer))
+    ids = {plan.answer.texts("savings.program_id")[0] for plan in plans}
+    savings = tuple(event for event in found.savings if not plans or event.savings.program_id in ids)
+    return replace(found, searches=logs, savings=savings)
 
-    A program that was planned before the recording, or by nobody in it, has none. One of a front, or of what
-    is saved, has those of its answer.
+
+@dataclass(frozen=True, eq=False)
+class _Driven:
+    """A planner's answer; own: its program itself was driven, not one of its front or its savings."""
+
+    answer: Columns
+    own: bool
+
+
+def _driven_plans(channel: RawChannel | None, events: Sequence[ProgramEvent]) -> tuple[_Driven, ...]:
+    """Of the programs that were driven, in the order in which they were, each by the last answer on a
+    planner's calls that has it; of the last planned program where none was driven.
+
+    A program that was planned before the recording, or by nobody in it, has none.
     """
     definition = result_definition()
     if channel is None or not definition:
@@ -33,15 +52,15 @@ def search_logs(channel: RawChannel | None, events: Sequence[ProgramEvent] = ())
     for event in events:
         driven.setdefault(event.program_id, set()).add(event.movement.trajectory_id)
     if not driven:
-        return next((_logs_of(plan) for plan in _plans(recorded, definition)), ())
-    logs: list[SearchLog] = []
+        return tuple(_Driven(plan, True) for plan in islice(_plans(recorded, definition), 1))
+    found: list[_Driven] = []
     for program, trajectories in driven.items():
         ids = {program} if program else trajectories - {""}  # steps that a client handed over have no name
         named = [answer for answer in recorded if ids and all(each.encode() in answer for each in ids)]
         plans = [plan for plan in _plans(named, definition) if ids <= _ids(plan)]
         own = [plan for plan in plans if program in ("", plan.texts("program_id")[0])]
-        logs += _logs_of(own[0]) if own else map(_not_driven, _logs_of(plans[0])) if plans else ()
-    return tuple(logs)
+        found += [_Driven(plan, bool(own)) for plan in (own or plans)[:1]]
+    return tuple(found)
 
 
 def _plans(recorded: Iterable[bytes], definition: str) -> Iterator[Columns]:

@@ -1,4 +1,4 @@
-"""Searches on the page are those of the program that was driven, not of the last that was planned."""
+"""Searches and savings are of the program that was driven, not of the last that was planned."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ir_msgs.msg import (
     PlannedMovement,
     PlanningStage,
     ProgramPoint,
+    ProgramSavings,
     ProgramState,
     RecordedCall,
 )
@@ -27,7 +28,8 @@ from ir_recorder.write.session import RecordingSession
 from ir_recorder.write.writer import RecordingWriter
 
 CALLS, STATES = "/ir_planner/calls", "/ir_program_runner/program_state"
-STATE = "ir_msgs/msg/ProgramState"
+SAVINGS = "/ir_planner/savings"
+STATE, SAVED = "ir_msgs/msg/ProgramState", "ir_msgs/msg/ProgramSavings"
 ROWS = np.array([[1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
 
 
@@ -43,6 +45,7 @@ class Planned:
         """The answer with logs that carry the program's name."""
         answer = Plan.Result(program_id=self.program)
         answer.status.message = "a text that names point-of-a and t1"
+        answer.savings.program_id = f"saved by {self.program}"
         answer.movements = [PlannedMovement(kind="regional", trajectory_id=each) for each in self.moves]
         answer.front = [ProgramPoint(cycle_time=9.0, energy=9.0, program_id=each) for each in self.front]
         driven = CorrectionLog(
@@ -59,11 +62,16 @@ def record(path: Path, plans: list[Planned], driven: list[tuple[str, str]]) -> P
     session = RecordingSession(RecordingWriter(path), {}, 1)
     session.open_topic(CALLS, "ir_msgs/msg/RecordedCall", [QosOffer()])
     session.open_topic(STATES, STATE, [QosOffer()])
-    encode = serialize_dynamic(STATE, SchemaLibrary().schema(STATE).text)[STATE]
+    session.open_topic(SAVINGS, SAVED, [QosOffer()])
+    encode, saved = (
+        serialize_dynamic(kind, SchemaLibrary().schema(kind).text)[kind] for kind in (STATE, SAVED)
+    )
     for k, plan in enumerate(plans):
         call = RecordedCall(node="/ir_planner", service="plan", type=ACTION)
         call.response = plan.result()
         session.message(CALLS, serialize_message(call), k + 1)
+        savings = ProgramSavings(available=True, program_id=f"saved by {plan.program}")
+        session.message(SAVINGS, saved(savings), k + 1)
     for k, (program, trajectory) in enumerate(driven):
         step = PlannedMovement(kind="regional", trajectory_id=trajectory)
         state = ProgramState(program_id=program, index=k, total=len(driven), event="started", movement=step)
@@ -96,6 +104,22 @@ def test_searches_are_those_of_the_programs_that_were_driven(
     searches = read_recording(record(tmp_path / "a.mcap", PLANS, driven)).searches
     assert [log.station for log in searches if isinstance(log, ConfigurationLog)] == shown
     assert len(searches) == 2 * len(shown)
+
+
+@pytest.mark.parametrize(
+    ("driven", "saved"),
+    [
+        ([], ["program-c"]),
+        ([("program-a", "t1")], ["program-a"]),
+        ([("saved by program-b", "t3")], ["program-b"]),  # what was planned in the common program's time
+        ([("elsewhere", "t9")], ["program-a", "program-b", "program-c"]),  # nobody knows
+    ],
+)
+def test_savings_are_those_of_the_programs_that_were_driven(
+    driven: list[tuple[str, str]], saved: list[str], tmp_path: Path
+) -> None:
+    savings = read_recording(record(tmp_path / "a.mcap", PLANS, driven)).savings
+    assert [event.savings.program_id for event in savings] == [f"saved by {name}" for name in saved]
 
 
 @pytest.mark.parametrize(("program", "points"), [("program-a", 2), ("point-of-a", 0)])
