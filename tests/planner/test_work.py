@@ -13,6 +13,8 @@ from asking import planned
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks import FreeSpace
 from ir_planner.program.parallel import mapped
+from ir_planner.regional import search_regional
+from ir_planner.regional.asynchronous import LATE, Found, with_own_laws
 from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
@@ -54,3 +56,31 @@ def test_sbl_exceeds_its_work_nowhere(scene_of: SceneOf) -> None:
         space = FreeSpace.of(scene, 0.02, Work(allowed, 1.0, lambda: 0.0))
         SEARCHES["sbl"].find(ends, space, allowed, space.work)
         assert space.work.iterations <= allowed
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_an_asynchronous_request_whose_time_is_over_keeps_its_synchronous_answer(
+    scene_of: SceneOf, late: bool
+) -> None:
+    """Own laws of the joints along a path with many corners take longer than its search."""
+    now = [0.0]
+    work = Work(100_000, 1.0, lambda: now[0])
+    scene = scene_of("open")
+    task = scene.cell.task("home->p1")
+    context = Context(scene, PlanOptions(timing="asynchronous"), Journal(work, 0))
+    answers: list[Found] = []
+
+    def synchronous() -> Found:
+        asked = context.with_timing("synchronous")
+        answers.append(search_regional(np.array(task.start), np.array(task.goal), asked, SEARCHES))
+        now[0] = 2.0 if late else 0.0
+        return answers[0]
+
+    found = with_own_laws(context, synchronous)
+    notes = [stage.note for stage in context.journal.stages if stage.name == "asynchronous"]
+    assert (notes == [LATE]) == late
+    assert work.truncated == late
+    assert found[0].ok
+    if late:
+        assert found[1] is answers[0][1]
+        assert context.journal.timing == "synchronous"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import sqlite3
 from collections.abc import Callable
 from contextlib import suppress
@@ -245,6 +246,9 @@ def test_the_page_holds_all_and_fetches_nothing(fought: Fought) -> None:
     assert "http://" not in page.replace("http://www.w3.org", "")
     assert "https://" not in page
     assert "{{" not in page
+    assert "3 planners, 1 cell, 1 question, 2 seeds: 6 runs of 0.01 s of processor" in page
+    data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
+    assert data["end"] == 0.01  # though the runs took 0.3 s: what comes after the seconds doesn't count
     assert "<b>2</b> of 2" in page
     assert "<b>0</b> of 2" in page
     assert "NaN" not in page.partition('id="data">')[2].partition("</script>")[0]

@@ -13,12 +13,13 @@ from ir_planner.request import Context
 from ir_planner.timing import Movement, straight_steps
 
 Found = tuple[Status, Movement | None]
+LATE = "timing is synchronous: no time was left for own laws of the joints"
 SYNCHRONOUS = "timing is synchronous: own laws for the joints serve no better"
 
 
 def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
     """The better of the synchronous answer and of the same free path in straight steps, each joint with its
-    own law; it notes when it is the synchronous one.
+    own law; it notes when it is the synchronous one. The synchronous one too where planning_time is over.
 
     Raises what `synchronous` raises where own laws don't serve either.
     """
@@ -28,6 +29,9 @@ def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
     except RequestError as error:
         status, common, refused = Status.success(), None, error
     with context.journal.stage("asynchronous") as notes:
+        if common is not None and _too_late(context):
+            notes.append(LATE)
+            return status, common
         own = None if common is None else _own(common, context)
         if own is not None and common is not None and (_as_named(context) or own.cost <= common.cost):
             notes.append(own.note or "each joint has its own law")
@@ -37,6 +41,11 @@ def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
     if refused is not None:
         raise refused
     return status, common
+
+
+def _too_late(context: Context) -> bool:
+    """Whether planning_time is over, with an answer at hand."""
+    return not _as_named(context) and context.work.exhausted and context.work.truncated
 
 
 def _as_named(context: Context) -> bool:

@@ -58,6 +58,7 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
     titles = _titles(settings.cells)
     blocked, _ = blocked_and_free(runs)
     shown = blocked or runs
+    end = min(longest(shown), settings.seconds)  # what comes after these doesn't count
     parts = {
         "title": "Arena",
         "subtitle": text(_subtitle(runs, settings, missing)),
@@ -71,7 +72,7 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
         "bindings": text(_bindings(runs, settings.planners)),
         "settings": text(settings_text(settings)),
         "data": json.dumps(
-            {"end": longest(shown), "axes": list(_curves(shown, titles, settings.planners))},
+            {"end": end, "axes": list(_curves(shown, titles, settings.planners, end))},
             separators=(",", ":"),
         ).replace("<", "\\u003c"),
         "script": "\n".join(asset(script) for script in SCRIPTS),
@@ -82,11 +83,10 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
 def _subtitle(runs: Sequence[Run], settings: ArenaSettings, missing: int) -> str:
     questions = len({run.entry.question for run in runs})
     made = f"{len(runs)} runs" if not missing else f"so far {len(runs)} of {len(runs) + missing} runs"
-    return (
-        f"{len(settings.planners)} planners, {len(settings.cells)} cells, {questions} questions, "
-        f"{settings.seeds} seed{'s' if settings.seeds > 1 else ''}: {made} of {settings.seconds:g} s "
-        "of processor"
-    )
+    counts = {"planner": len(settings.planners), "cell": len(settings.cells)}
+    counts |= {"question": questions, "seed": settings.seeds}
+    asked = ", ".join(f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items())
+    return f"{asked}: {made} of {settings.seconds:g} s of processor"
 
 
 def _bindings(runs: Sequence[Run], planners: Sequence[str]) -> str:
@@ -193,10 +193,10 @@ def milliseconds(value: float) -> str:
 
 
 def _curves(
-    runs: Sequence[Run], titles: Mapping[str, str], planners: Sequence[str]
+    runs: Sequence[Run], titles: Mapping[str, str], planners: Sequence[str], end: float
 ) -> Iterator[dict[str, Json]]:
-    """Success and cost over time, for all cells together and for each."""
-    time = np.linspace(0.0, longest(runs), GRID)
+    """Success and cost over time until `end` s, for all cells together and for each."""
+    time = np.linspace(0.0, end, GRID)
     places = [("all cells", list(runs)), *((title, of_cell(runs, cell)) for cell, title in titles.items())]
     kinds: tuple[tuple[str, Callable[..., FloatArray], float, float], ...] = (
         ("solved", success_over_time, 100.0, 0.0),
