@@ -20,8 +20,10 @@ PAIRS, QUICK_PAIRS = 1200, 24  # per seed
 LOW, HIGH = -80.0, 20.0  # % of section V
 WITHIN = 0.95  # share of the movements that must lie within
 LARGE = 1000.0  # J of the common PTP from which on a relative change is no accident of a small reference
+UNCHANGED = 0.05  # % up to which the answer is taken for the PTP itself
 PLANNING_S = 60.0
 SAME_TIME, LEAST_J = "same time", "free, least J"
+ITSELF = f"{SAME_TIME}: the PTP itself is the answer"
 SLOWED = f"the common PTP slowed down for {LEAST_J.split(', ')[1]}"
 ARMS = {  # objective, whether the duration is that of the PTP, and one of how many movements is asked
     SAME_TIME: ("energy", True, 1),
@@ -84,9 +86,15 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
             Statement(f"{arm}: what is usual", "change, median", *interval(median, x), len(x), "movements",
                       "%"),
         ]  # fmt: skip
-    x = change(rows, SLOWED)
-    usual = "change, median", *interval(median, x), len(x), "movements", "%"
-    return [*found, _lowered(rows), Statement(f"for comparison: {SLOWED}", *usual)]
+    x, kept = change(rows, SLOWED), np.abs(change(rows, SAME_TIME)) < UNCHANGED
+    same = percent(wilson(int(kept.sum()), len(kept)))
+    return [
+        *found,
+        _lowered(rows),
+        Statement(ITSELF, "share of the movements", *same, len(kept), "movements", "%"),
+        Statement(f"for comparison: {SLOWED}", "change, median", *interval(median, x), len(x), "movements",
+                  "%"),
+    ]  # fmt: skip
 
 
 def _lowered(rows: Sequence[Row]) -> Statement:
@@ -119,7 +127,8 @@ def follows(statements: Sequence[Statement]) -> str:
     }.get((most.verdict, upper), "")
     return (
         f"{fits}{ends}; the median change is {usual.value:.1f} % [{usual.low:.1f}, {usual.high:.1f}], the "
-        f"first percentile {most.value:.0f} %, the 99th {highest:+.1f} % (the PTP is among the answers). "
+        f"first percentile {most.value:.0f} %, the 99th {highest:+.1f} % (the PTP is among the answers, and "
+        f"the answer itself for {by[ITSELF].value:.0f} % of the movements). "
         f"{_why(by)}Free in time the median is "
         f"{free:+.1f} % for least J, where the common PTP slowed down for the same has {slowed:+.1f} %, and "
         f"{time:+.1f} % for least time: what is saved depends on the duration "

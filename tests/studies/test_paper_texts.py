@@ -169,3 +169,12 @@ def test_the_line_says_how_many_movements_of_the_common_programs_are_no_straight
     assert statements[-1].value == pytest.approx(100.0 * 7 / 12)
     assert {one.count for one in statements} == {2}  # a program that every seed plans is one
     assert "58 % of the common programs' movements run around bodies" in _paper_line.follows(statements)
+
+
+def test_savings_say_how_often_the_answer_is_the_ptp_itself() -> None:
+    arms = {f"{arm} J": 1500.0 for arm in (*_paper_savings.ARMS, _paper_savings.SLOWED)}
+    row: Row = {"load": "none", "direction": "up", "common_J": 2000.0, **arms}
+    rows = [row | {"same time J": joules} for joules in (2000.0, 2000.0, 2000.0, 1990.0)]
+    by = {one.says: one for one in _paper_savings.judge(rows)}
+    assert by[_paper_savings.ITSELF].value == 75.0
+    assert "the answer itself for 75 % of the movements" in _paper_savings.follows(list(by.values()))
