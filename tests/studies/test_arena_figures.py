@@ -60,6 +60,16 @@ def test_figures_of_a_planner_count_what_it_did_not_solve() -> None:
     assert figures("a", RUNS).cost_ratio == 1.0
 
 
+def test_what_costs_nothing_is_a_figure_too() -> None:
+    """As W of a task that ends where it begins, and J of it where a second is worth nothing."""
+    runs = [run("a", "stay", 0.0, 0.1, 0.5), run("b", "stay", 0.0, 0.2, 0.5), run("c", "stay", 3.0, 0.1, 0.2)]
+    assert (figures("a", runs).cost_ratio, figures("b", runs).movement_ratio) == (1.0, 1.0)
+    assert math.isnan(figures("c", runs).cost_ratio)
+    assert compared("a", "b", runs) == Compared(1, 1.0, 0)
+    assert compared("a", "c", runs).lower == 0
+    assert cost_over_time(("b",), runs, TIME)[-1, 0] == 0.0
+
+
 def test_planners_are_compared_where_both_solved() -> None:
     assert compared("a", "b", RUNS) == Compared(1, 1.5, 0)
     assert compared("b", "a", RUNS) == Compared(1, 100.0 / 150.0, 1)

@@ -60,10 +60,10 @@ def figures(planner: str, runs: Sequence[Run]) -> Figures:
         len(own),
         _median(run.number("first_s") for run in solved),
         _median(run.number("final_s") for run in solved),
-        _median(run.number("cost_j") / J[run.entry.question] for run in solved),
+        _median(_over(run.number("cost_j"), J[run.entry.question]) for run in solved),
         _median(run.number("duration_s") for run in solved),
         _median(run.number("energy_j") for run in solved),
-        _median(run.number("movement_cost") / W[run.entry.question] for run in solved),
+        _median(_over(run.number("movement_cost"), W[run.entry.question]) for run in solved),
         min((run.number("clearance_m") for run in solved), default=math.nan),
         sum(run.row.get("outcome", "answered") != "answered" for run in own),
     )
@@ -87,7 +87,7 @@ def compared(planner: str, other: str, runs: Sequence[Run], tie: float = 0.0) ->
          if run.solved and run.entry.planner == name}
         for name in (planner, other)
     )  # fmt: skip
-    ratios = [b[key] / a[key] for key in a.keys() & b.keys()]
+    ratios = [_over(b[key], a[key]) for key in a.keys() & b.keys()]
     return Compared(len(ratios), _median(ratios), sum(ratio < 1.0 - tie for ratio in ratios))
 
 
@@ -140,8 +140,15 @@ def _ratio_until(run: Run, best: Mapping[Question, float], time: FloatArray) -> 
     if not run.solved or not run.progress:
         return np.full(len(time), np.inf)
     at, cost = np.array(run.progress).T
-    known = np.concatenate([[np.inf], cost]) / best[run.entry.question]
+    known = np.array([np.inf, *(_over(value, best[run.entry.question]) for value in cost)])
     return np.asarray(known[np.searchsorted(at, time, side="right")])
+
+
+def _over(value: float, least: float) -> float:
+    """A figure as a multiple of the least one; where that is 0, as of a task that stays, 1 or inf."""
+    if least == 0.0:
+        return 1.0 if value == 0.0 else math.inf
+    return value / least
 
 
 def _median(values: Iterable[float]) -> float:
