@@ -150,6 +150,9 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
         found.append(line)
     for name in ("W", EMPTY, PRINTED):
         line = {"reading": "as read" if name == "W" else name}
+        for direction in DIRECTIONS:
+            some = [row for row in moved if row["direction"] == direction]
+            line[f"rank, {direction}"] = _shown(_ranked("", some, name))
         for load in loads:
             some, poses = ([row for row in rows if (row["kind"], row["load"]) == (kind, load)]
                            for kind in ("movement", "choice"))  # fmt: skip
@@ -159,7 +162,7 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
     ranks = "Rank correlation of W and E_drive by load and direction, 95 % intervals, movements"
     return {
         ranks: found,
-        "The same by load, and E_drive above the least where W chooses, by reading of (9)": readings,
+        "The same for each reading of (9), and E_drive above the least where W chooses": readings,
     }
 
 
