@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _paper_blocked
 import _paper_ccd
 import _paper_cell
 import _paper_cost
@@ -21,6 +22,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         *_paper_rivals.EXPERIMENTS,
         _paper_prm.EXPERIMENT,
         _paper_ccd.EXPERIMENT,
+        _paper_blocked.EXPERIMENT,
         _paper_withdrawal.EXPERIMENT,
         _paper_genetic.EXPERIMENT,
         _paper_cost.EXPERIMENT,

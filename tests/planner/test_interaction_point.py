@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ir_planner.configurations.ccd_search import descend
 from ir_planner.configurations.interaction_point import (
     branches,
     distinct_configurations,
@@ -17,7 +18,7 @@ from ir_planner.configurations.interaction_point import (
     searched_configurations,
 )
 from ir_planner.configurations.inverse_kinematics import free_configurations
-from ir_planner.configurations.set_back import LITERAL, SECANT, increments, shares_back
+from ir_planner.configurations.set_back import LITERAL, NONE, SECANT, increments, shares_back
 from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
@@ -99,7 +100,7 @@ def test_what_collided_before_the_step_is_not_set_back() -> None:
     assert share[0] == 0.0
 
 
-@pytest.mark.parametrize("set_back", [SECANT, LITERAL])
+@pytest.mark.parametrize("set_back", [SECANT, LITERAL, NONE])
 @pytest.mark.parametrize(
     ("cell", "station"), [("cnc_door", "cncL"), ("deep_box", "bin"), ("deep_box", "tun")]
 )
@@ -118,6 +119,22 @@ def test_the_search_finds_a_part_of_the_complete_set(
         assert complete.branch[int(np.argmin(same))] == branch
     costs = np.abs(found.q - HOME) @ scene.weights
     assert (np.diff(costs) > -1e-5).all()
+
+
+def test_without_the_set_back_bodies_are_in_no_step_and_sorted_out_at_the_pose(
+    scene_of: Callable[[str], PlanningScene], budget: Work
+) -> None:
+    """Against the secant with nothing to keep: the same descents, of which the free ones are left."""
+    scene = scene_of("deep_box")
+    pose, threshold = np.array(scene.station("bin").pose), scene.thresholds(0.02)
+    pose[:3, 3] += 0.3, 0.0, 0.0  # a finger in the wall: what arrives collides
+    nothing, robot = np.full(len(threshold), -1e3), scene.cell.robot
+    starts = random_starts(robot.position_min, robot.position_max, 40, "uniform", np.random.default_rng(1))
+    through = descend(pose, starts, scene, nothing, InteractionSettings(), budget)
+    sorted_out = descend(pose, starts, scene, threshold, InteractionSettings(set_back=NONE), budget)
+    free = through.q[scene.collision.is_free(through.q, threshold)]
+    assert len(free) < len(through.q)
+    assert np.array_equal(sorted_out.q, free)
 
 
 def test_the_same_seed_gives_the_same_configurations(

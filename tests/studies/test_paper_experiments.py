@@ -6,6 +6,7 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
+import _paper_blocked
 import _paper_ccd
 import _paper_page
 import _paper_rivals
@@ -85,26 +86,26 @@ def test_without_cells_there_is_one() -> None:
 def test_every_reading_of_the_descent_is_asked_for_what_its_name_says(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked: list[tuple[str, str, bool, bool]] = []
+    asked: list[tuple[str, str, bool]] = []
 
     def noted(pose: Any, starts: Any, scene: Any, threshold: Any, settings: Any, work: Any) -> Descent:
-        free = bool((threshold < -100.0).all())
-        asked.append((settings.set_back, settings.distribution, settings.newton_steps > 0, free))
+        assert (threshold > 0.0).all()
+        asked.append((settings.set_back, settings.distribution, settings.newton_steps > 0))
         return Descent(starts[:0], 0)
 
     monkeypatch.setattr(_paper_ccd, "descend", noted)
     place = next(places(("cnc_door",), 4, 1))
     for reading in _paper_ccd.READINGS.values():
-        _paper_ccd._row(place, reading, np.random.default_rng(1), 4)
+        _paper_ccd.tried(place, reading, np.random.default_rng(1), 4)
     normal = "truncated_normal"
     assert dict(zip(_paper_ccd.READINGS, asked, strict=True)) == {
-        "as read": ("secant", normal, True, False),
-        "(5) literal": ("literal", normal, True, False),
-        "no set-back": ("secant", normal, True, True),
-        "no Newton finish": ("secant", normal, False, False),
-        "no Newton finish, (5) literal": ("literal", normal, False, False),
-        "no Newton finish, no set-back": ("secant", normal, False, True),
-        "(1) uniform": ("secant", "uniform", True, False),
+        "as read": ("secant", normal, True),
+        "(5) literal": ("literal", normal, True),
+        "no set-back": ("none", normal, True),
+        "no Newton finish": ("secant", normal, False),
+        "no Newton finish, (5) literal": ("literal", normal, False),
+        "no Newton finish, no set-back": ("none", normal, False),
+        "(1) uniform": ("secant", "uniform", True),
     }
 
 
@@ -122,6 +123,13 @@ def test_readings_of_the_withdrawal_differ_in_what_their_names_say() -> None:
         assert ("step" in reading.changed) == ("no drift" in name)
         assert reading.printed == ("as printed" in name)
         assert reading.tree == ("trees" in name)
+
+
+def test_blocked_places_have_configurations_that_collide_and_others() -> None:
+    scene = next(places(("cnc_door",), 4, 1)).scene
+    for place in _paper_blocked.blocked_places(scene, 3, np.random.default_rng(1)):
+        q = scene.inverse_kinematics.solve(place.station.pose[None]).q
+        assert 0 < scene.collision.is_free(q, place.threshold).sum() == len(place.q) < len(q)
 
 
 def test_figures_near_each_other_look_different() -> None:

@@ -39,6 +39,12 @@ PHRASES: dict[str, tuple[tuple[str, int, tuple[str, ...]], ...]] = {
         ("it pays for its time", 7, (HOLDS,)),
         ("it does not pay", 7, (FAILS,)),
     ),
+    "ccd_blocked": (
+        ("set-back lets more starts end free (", 0, (HOLDS,)),
+        ("is not worth", 0, (FAILS,)),
+        ("and it pays for its time", 3, (HOLDS,)),
+        ("it does not pay", 3, (FAILS,)),
+    ),
     "withdrawal": (
         ("cost less than those of trees", 12, (HOLDS,)),
         ("cost no less than trees'", 12, (FAILS,)),

@@ -14,7 +14,7 @@ import numpy as np
 from ir_kernels import CcdSettings, ccd
 from ir_kernels.reference.ccd import best_value
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_planner.configurations.set_back import shares_back
+from ir_planner.configurations.set_back import NONE, shares_back
 from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
@@ -134,13 +134,15 @@ class _Descent:
     def _stepped(
         self, q: FloatArray, i: int, value: FloatArray, before: FloatArray
     ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Joint i at `value` (P,), or as far as it may; distances (P, Z) there; the pair that set it back, or
-        -1.
+        """Joint i at `value` (P,), or as far as it may; distances (P, Z) there, unless none set it back; the
+        pair that did, or -1.
         """
         old = q[:, i].copy()
         q[:, i] = value
-        after = self.scene.collision.distances(q)
         blocked = np.full(len(q), -1)
+        if self.settings.set_back == NONE:
+            return q, before, blocked
+        after = self.scene.collision.distances(q)
         rows = np.flatnonzero(((after <= self.threshold) & (before > self.threshold)).any(axis=1))
         for attempt in range(self.settings.repairs + 1):
             start, end = before[rows], after[rows]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 
-SECANT, LITERAL = "secant", "literal"
+SECANT, LITERAL, NONE = "secant", "literal", "none"
 
 
 def increments(before: FloatArray, after: FloatArray) -> FloatArray:

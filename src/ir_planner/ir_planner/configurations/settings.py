@@ -16,8 +16,9 @@ class InteractionSettings:
     )
     set_back: str = setting(
         "secant",
-        "How eq. 5 sets a joint back: secant (until the distance is S_m), or literal (by the gain in m).",
-        choices=("secant", "literal"),
+        "How eq. 5 sets a joint back: secant (until the distance is S_m), literal (by the gain in m), or "
+        "none: collisions are sorted out at the pose.",
+        choices=("secant", "literal", "none"),
     )
     overshoot: float = setting(
         0.05, "eps of eq. 5: how much farther than the secant says.", minimum=0.0, maximum=1.0
