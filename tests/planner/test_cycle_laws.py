@@ -8,7 +8,6 @@ which costs the drives more.
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -33,7 +32,7 @@ RISE = 5e-3  # of the drives' energy: parts are exchanged for others, whose path
 
 @pytest.mark.parametrize("cell", ["demo", "open", "table_columns"])
 def test_energy_over_cycle_time_keeps_its_laws(cell: str) -> None:
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", cell)
     park = np.array(planner.cell.park)
     rng = np.random.default_rng([1, *cell.encode()])
@@ -72,7 +71,7 @@ def drive_energy(plan: ProgramPlan) -> float:
 @pytest.mark.parametrize("cell", ["demo", "open", "table_columns", "cnc_door"])
 def test_energies_of_drawn_cycle_times_keep_the_law(cell: str) -> None:
     """Each is asked for alone: what one knows of fast movements, a longer one must know too."""
-    planner = Planner(time.monotonic)
+    planner = Planner(lambda: 0.0)
     planner.set_cell("", cell)
     park = np.array(planner.cell.park)
     rng = np.random.default_rng([2, *cell.encode()])
@@ -114,7 +113,7 @@ def test_a_movement_at_a_value_costs_no_more_than_known_ones_slowed(
 
 def searched(scene: PlanningScene, task: object, objective: str) -> Movement:
     """The movement of a task by an objective."""
-    work = Work(400_000, time.monotonic() + 600.0, time.monotonic, improvement=1000)
+    work = Work(400_000, 1.0, lambda: 0.0, improvement=1000)
     context = Context.of(scene, PlanOptions(objective=objective, planning_time=100.0), work)
     start, goal = (np.array(getattr(task, end)) for end in ("start", "goal"))
     _, found = search_regional(start, goal, context, SEARCHES)

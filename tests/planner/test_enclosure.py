@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -30,7 +29,7 @@ SIDES = [(axis, side) for axis in range(3) for side in (-1.0, 1.0)]
 
 
 def work() -> Work:
-    return Work(400_000, time.monotonic() + 600.0, time.monotonic)
+    return Work(400_000, 1.0, lambda: 0.0)
 
 
 def walls(pose: np.ndarray, size: np.ndarray, missing: tuple[int, float] | None = None) -> Equipment:

@@ -1,6 +1,5 @@
 """A coarse solution says about what the certified answer costs."""
 
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -17,7 +16,7 @@ NEAR = 0.1  # of the certified answer: 0.05 is usual
 
 
 def context_of(scene: PlanningScene) -> Context:
-    work = Work(400_000, time.monotonic() + 600.0, time.monotonic)
+    work = Work(400_000, 1.0, lambda: 0.0)
     return Context.of(scene, PlanOptions(planning_time=600.0), work)
 
 

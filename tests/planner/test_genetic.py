@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -43,7 +42,7 @@ TASKS = [
 
 
 def a_budget(edges: int = 10**9, cancelled: Callable[[], bool] = lambda: False) -> Work:
-    return Work(edges, time.monotonic() + 600.0, time.monotonic, cancelled)
+    return Work(edges, 1.0, lambda: 0.0, cancelled)
 
 
 def space_of(scene: PlanningScene, budget: Work | None = None) -> FreeSpace:

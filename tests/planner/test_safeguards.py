@@ -5,7 +5,6 @@ The baseline is timed here anew, with torques by Pinocchio.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -27,7 +26,7 @@ CELLS = st.sampled_from(["demo", "cnc_door", "deep_box", "open"])
 
 
 def ask(scene: PlanningScene, ends: FloatArray, options: PlanOptions) -> MovementPlan:
-    work = Work(400_000, time.monotonic() + 600.0, time.monotonic, improvement=1000)
+    work = Work(400_000, 1.0, lambda: 0.0, improvement=1000)
     return planned(ends[0], ends[1], scene, options, work)
 
 
