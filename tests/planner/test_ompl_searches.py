@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import itertools
 import os
+import pickle
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +24,7 @@ from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends, with_ompl
 from ir_planner.search.with_ompl import adapter, host
 from ir_planner.search.with_ompl.adapter import repaired
-from ir_planner.search.with_ompl.problem import Outcome, Problem
+from ir_planner.search.with_ompl.problem import Outcome, Parameters, Problem
 
 SceneOf = Callable[[str], PlanningScene]
 S_M = 0.02
@@ -55,6 +59,46 @@ def test_ompl_that_is_installed_but_broken_is_no_search_that_found_nothing(
     finally:
         if host._host is not None:
             host._host.close()
+
+
+CHECKED_BY = """
+import multiprocessing, os, pickle, sys, threading
+from ir_planner.search.with_ompl import worker
+
+class Checked(worker._Counted):
+    def motion(self, first, last):
+        threads.add(threading.get_ident())
+        return super().motion(first, last)
+
+threads, worker._Counted = set(), Checked
+connection, other = multiprocessing.Pipe()
+worker.util.setLogLevel(worker.util.LogLevel.LOG_NONE)
+worker.solved(pickle.load(sys.stdin.buffer), connection)
+print(threads == {threading.get_ident()}, flush=True)
+os._exit(0)  # without destructors, as the worker
+"""
+
+
+def test_a_roadmap_to_several_goals_is_checked_in_one_thread(scene_of: SceneOf) -> None:
+    """Checks are made with Python's lock: in a second thread they can wait for the first for ever."""
+    ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
+    goals = np.concatenate([ends.goals, ends.goals - 0.05, ends.goals + 0.05])
+    parameters = Parameters("PRM", reverse=with_ompl.Prm.reverse)
+    scene = replace(space.scene)  # without what it has computed
+    problem = Problem(scene, space.threshold, ends.start, goals, parameters, 1, 2000, 9.0)
+    command = [sys.executable, "-c", CHECKED_BY]
+    ran = subprocess.run(
+        command, input=pickle.dumps(problem), capture_output=True, check=False, timeout=300.0
+    )
+    assert ran.stdout == b"True\n", (ran.returncode, ran.stderr.decode())
+
+
+def test_a_roadmap_to_several_goals_leads_from_the_start_to_one_of_them(scene_of: SceneOf) -> None:
+    ends, space = a_blocked_task(scene_of, Work(100_000, 1.0, lambda: 0.0))
+    ends = Ends(ends.start, np.concatenate([ends.goals, ends.goals - 0.01]))
+    (path,) = SEARCHES["prm"].find(ends, space, 1, space.work).paths
+    assert np.array_equal(path[0], ends.start)
+    assert any(np.array_equal(path[-1], goal) for goal in ends.goals)
 
 
 def test_at_the_ceiling_it_is_killed(scene_of: SceneOf) -> None:

@@ -13,10 +13,11 @@ from ir_planner.search.with_ompl.problem import Parameters
 
 @dataclass(frozen=True)
 class OmplSearch:
-    """planner_id: name of the search; planner: OMPL's class of it."""
+    """planner_id: name of the search; planner: OMPL's class of it; reverse: it gets the goals as starts."""
 
     planner_id: ClassVar[str]
     planner: ClassVar[str]
+    reverse: ClassVar[bool] = False
 
     edges: int = setting(
         100_000_000, "Checks in certified edges before it is given up.", minimum=1, maximum=100_000_000
@@ -35,7 +36,7 @@ class OmplSearch:
 
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
         """One path, or none."""
-        parameters = Parameters(self.planner, self.parameters(), self.cells())
+        parameters = Parameters(self.planner, self.parameters(), self.cells(), self.reverse)
         return found_by(self.planner_id, parameters, self.edges, ends, space, seed, work)
 
 

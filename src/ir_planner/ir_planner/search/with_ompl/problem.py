@@ -15,12 +15,13 @@ STOP = "stop"
 class Parameters:
     """planner: name of a class in ompl.geometric; values: what its set... methods are called with, by the
     rest of their names; cell [rad]: cells of KPIECE's grid over the first three joints, 0 for OMPL's own
-    projection.
+    projection; reverse: it is asked for the movement from the goals to the start.
     """
 
     planner: str
     values: dict[str, float] = field(default_factory=dict)
     cell: float = 0.0
+    reverse: bool = False
 
 
 @dataclass(frozen=True, eq=False)

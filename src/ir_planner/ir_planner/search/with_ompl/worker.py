@@ -140,11 +140,15 @@ def solved(problem: Problem, connection: Connection) -> Outcome:
     setup.setStateValidityChecker(counted.state)
     validator = _validator(information, counted)
     information.setMotionValidator(validator)
-    start = space.allocState()
-    start[0:n] = problem.start.tolist()
-    setup.setStartState(start)
+    begins, ends = problem.start[None], problem.goals
+    if problem.parameters.reverse:
+        begins, ends = ends, begins
+    for configuration in begins:
+        start = space.allocState()
+        start[0:n] = configuration.tolist()
+        setup.addStartState(start)
     goals = base.GoalStates(information)
-    for configuration in problem.goals:
+    for configuration in ends:
         goal = space.allocState()
         goal[0:n] = configuration.tolist()
         goals.addState(goal)
@@ -153,8 +157,8 @@ def solved(problem: Problem, connection: Connection) -> Outcome:
     setup.solve(counted.end)
     if not setup.haveExactSolutionPath():
         return Outcome(None, counted.edges)
-    states = setup.getSolutionPath().getStates()
-    return Outcome(np.array([state[0:n] for state in states]), counted.edges)
+    path = np.array([state[0:n] for state in setup.getSolutionPath().getStates()])
+    return Outcome(path[::-1] if problem.parameters.reverse else path, counted.edges)
 
 
 def _validator(information: base.SpaceInformation, counted: _Counted) -> base.MotionValidator:
