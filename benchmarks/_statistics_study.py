@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean, median, stdev
@@ -16,9 +16,11 @@ from _results import Claim, at_least, at_most, line_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from ir_msgs_py.arrays import FloatArray
 from ir_studies import Means, study_of
 from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
 from ir_studies.statistics.figures import Comparison
+from ir_studies.statistics.intervals import alike, mean_of
 from ir_studies.statistics.runs import Finished
 from ir_studies.statistics.settings import DRAWN
 from ir_studies.work.results import NAME
@@ -28,6 +30,7 @@ QUICK = 8  # pairs
 SAMPLES = 10_000
 COUNTS = (10, 20, 30, 60, 100)  # pairs of a sample
 COLUMNS = ("duration_s", "predicted_j", "direct_j", "indirect_j", "peak_w", "path_m", None, "torque_share")
+SIMULATED, SIZES = 20_000, (10, 20, 60, 200)  # samples of a distribution, and values in each
 HELD = 80.0  # %: of robots drawn for 60 pairs 90 % +- 10 % lie in a 90 % interval
 
 
@@ -48,6 +51,7 @@ def statistics_claims(parts: Collection[str], out: Path | None, *, quick: bool) 
         fastest = made(replace(asked, objective="time", pairs=min(asked.pairs, 20)), folder / "time")
         claims = [*recomputed(one, folder / "example"), *held(drawn), *never_slower(fastest)]
     resampled(one)
+    simulated()
     return claims
 
 
@@ -96,10 +100,22 @@ def largest(each: Comparison, values: Sequence[float]) -> float:
     """The largest difference [%] of a comparison's mean, interval and median from those of the values."""
     if len(values) < 2 or max(values) - min(values) < 1e-6:
         return 0.0
-    half = t_quantile(0.95, len(values) - 1) * stdev(values) / math.sqrt(len(values))
-    expected = (fmean(values), fmean(values) - half, fmean(values) + half, median(values))
+    expected = (fmean(values), *ends(values, t_quantile(0.95, len(values) - 1)), median(values))
     found = (each.mean.value, each.mean.low, each.mean.high, each.median.value)
     return max(abs(a - b) for a, b in zip(found, expected, strict=True))
+
+
+def ends(values: Sequence[float], t: float) -> tuple[float, float]:
+    """Of the interval of a mean: the union of Student's and of Hall's, whose cubic is solved here."""
+    count, mean, spread = len(values), fmean(values), stdev(values)
+    third = fmean([(value - mean) ** 3 for value in values]) / spread**3
+    k = third * count**2 / ((count - 1) * (count - 2)) / math.sqrt(count) if count > 2 else 0.0
+
+    def solved(wanted: float) -> float:
+        return float(brentq(lambda x: x + k * (2 * x * x + 1) / 6 + k * k * x**3 / 27 - wanted, -1e4, 1e4))
+
+    error = spread / math.sqrt(count)
+    return mean - error * max(t, solved(t)), mean - error * min(-t, solved(-t))
 
 
 def t_quantile(level: float, freedom: int) -> float:
@@ -134,8 +150,31 @@ def resampled(finished: Finished) -> None:
             continue
         row: dict[str, object] = {"held of 90 %": each.name}
         for count in COUNTS:
-            drawn = rng.choice(each.values, (SAMPLES, count))
-            half = t_quantile(0.95, count - 1) * drawn.std(axis=1, ddof=1) / math.sqrt(count)
-            inside = np.abs(drawn.mean(axis=1) - each.mean.value) <= half
-            row[f"{count} pairs"] = 100.0 * float(inside.mean())
+            drawn, t = rng.choice(each.values, (SAMPLES, count)), t_quantile(0.95, count - 1)
+            found = [ends(values, t) for values in drawn.tolist() if max(values) > min(values)]
+            inside = [low <= each.mean.value <= high for low, high in found]
+            row[f"{count} pairs"] = 100.0 * sum(inside) / SAMPLES
         print(line_of(row))
+
+
+def simulated() -> None:
+    """How often the interval of the mean holds that of a distribution, and Student's (bracketed)."""
+    rng = np.random.default_rng(1)
+    drawn: dict[str, tuple[float, Callable[[tuple[int, int]], FloatArray]]] = {
+        "normal": (0.0, lambda size: rng.normal(size=size)),
+        "t of 3": (0.0, lambda size: rng.standard_t(3.0, size)),
+        "exponential": (1.0, lambda size: rng.exponential(size=size)),
+        "lognormal": (math.exp(0.5), lambda size: rng.lognormal(size=size)),
+        "a third zeros": (2 / 3, lambda size: rng.exponential(size=size) * (rng.random(size) > 1 / 3)),
+        "three quarters zeros": (0.25, lambda size: rng.exponential(size=size) * (rng.random(size) < 0.25)),
+    }
+    for name, (truth, draw) in drawn.items():
+        row: dict[str, object] = {"held of 90 %": name}
+        for count in SIZES:
+            samples = [values for values in draw((SIMULATED, count)) if not alike(values)]
+            found, t = [mean_of(values) for values in samples], t_quantile(0.95, count - 1)
+            halves = [t * values.std(ddof=1) / math.sqrt(count) for values in samples]
+            held = fmean(one.low <= truth <= one.high for one in found)
+            student = fmean(abs(one.value - truth) <= half for one, half in zip(found, halves, strict=True))
+            row[f"of {count}"] = f"{100.0 * held:.1f} ({100.0 * student:.1f})"
+        print(line_of(row), flush=True)

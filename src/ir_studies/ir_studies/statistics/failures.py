@@ -37,7 +37,7 @@ def _unsolved(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
         missing = [timing for timing in (SYNCHRONOUS, ASYNCHRONOUS) if not solved(row, timing)]
         if missing:
             one = row.get(missing[0], row)
-            only = f"{missing[0]} only: " if len(missing) == 1 else ""
+            only = f"{missing[0]} joints alone have none: " if len(missing) == 1 else ""
             yield NO_PAIR, only + str(one.get("message", "") or "no answer")
 
 

@@ -9,9 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.analysis.agreement import Mean, mean_of
+from ir_recorder.analysis.agreement import Mean
 from ir_studies.statistics.failures import Failure, failures_of
-from ir_studies.statistics.intervals import chance_of, median_of, shown_together, skewed
+from ir_studies.statistics.intervals import (
+    ALIKE,
+    alike,
+    chance_of,
+    mean_of,
+    median_of,
+    shown_together,
+    skewed,
+)
 from ir_studies.statistics.sides import ASYNCHRONOUS, SYNCHRONOUS, distinct, number, solved
 from ir_studies.work import Row
 
@@ -26,13 +34,12 @@ NATURAL = (
     ("largest torque share", "torque_share", ""),
 )
 """Natural values of section VI: what can be read off a movement, the column that holds it, and its unit."""
-ALIKE = 1e-7  # percent: below, two figures differ by rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """Relative differences in percent: values of each pair, or of each movement where pairs have several;
-    what follows is taken over `pairs`, which are independent: the mean with its 90 % interval by Student's t,
+    what follows is taken over `pairs`, which are independent: the mean with its 90 % interval,
     the median with that by order statistics, effect (mean over standard deviation: Cohen's d of paired
     samples), chance of such a mean. spread: standard deviation of the values. skewed: few carry the mean.
     levels: means of the first and of the second, in `unit`.
@@ -158,9 +165,8 @@ def compared(
     if own_pair is not None:
         of = np.asarray(own_pair, dtype=int)[kept]
         by_pair = np.array([values[of == pair].mean() for pair in dict.fromkeys(of.tolist())])
-    alike = len(by_pair) > 0 and float(np.ptp(by_pair)) == 0.0
-    mean = Mean(float(by_pair[0]), math.nan, math.nan) if alike else mean_of(by_pair)
-    deviation = math.nan if alike else _deviation(by_pair)
+    mean = mean_of(by_pair)
+    deviation = math.nan if alike(by_pair) else _deviation(by_pair)
     return Comparison(
         name,
         values,

@@ -1,8 +1,10 @@
 """What a sample of independent pairs says: intervals of mean and median, chance, and where they are too few.
 
-A pair's differences are far from normal: most are near zero, a few large. The interval of the mean by
-Student's t then holds less often than it says; that of the median by order statistics holds whatever the
-distribution. A skewness too large for the count is found after Cochran, Sampling Techniques (1977), 2.15.
+A pair's differences are far from normal: most are near zero, a few large. Student's t then leaves out a mean
+that few carry, Hall's transformation of t by the sample's skewness (J. R. Statist. Soc. B 54 (1992), 221)
+holds less often than t where the tails are heavy and even. The interval of a mean is the union of both, its
+chance the larger of both. That of the median is by order statistics and holds whatever the distribution. A
+skewness too large for the count is found after Cochran, Sampling Techniques (1977), 2.15.
 """
 
 from __future__ import annotations
@@ -12,13 +14,31 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from scipy.special import stdtr
+from scipy.special import stdtr, stdtrit
 from scipy.stats import binom
 
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis.agreement import LEVEL, Mean
 
+ALIKE = 1e-7  # of values in percent: below, two figures differ by rounding
 _COCHRAN = 25.0  # pairs per squared skewness from which the interval of a mean is near its level
+
+
+def alike(values: FloatArray) -> bool:
+    """Whether values (N,) differ by rounding at most, as fewer than two do."""
+    return len(values) < 2 or float(np.ptp(values)) <= ALIKE * max(1.0, float(np.abs(values).max()))
+
+
+def mean_of(values: FloatArray) -> Mean:
+    """The mean of independent values (N,) with its interval of LEVEL: zero lies outside where their chance is
+    less than 1 - LEVEL. NaN where they are alike.
+    """
+    mean = float(values.mean()) if len(values) else math.nan
+    if alike(values):
+        return Mean(mean, math.nan, math.nan)
+    error, k = _error(values), _skewness(values) / math.sqrt(len(values))
+    t = float(stdtrit(len(values) - 1, 0.5 + 0.5 * LEVEL))
+    return Mean(mean, mean - error * max(t, _student(t, k)), mean - error * min(-t, _student(-t, k)))
 
 
 def median_of(values: FloatArray) -> Mean:
@@ -42,22 +62,41 @@ def _rank(count: int) -> int:
 
 
 def chance_of(values: FloatArray) -> float:
-    """How likely a mean as far from zero is by chance alone, by Student's t; NaN where values (N,) don't vary
-    or are fewer than two.
-    """
-    if len(values) < 2 or np.ptp(values) == 0.0:
+    """How likely a mean as far from zero is by chance alone; NaN where values (N,) are alike."""
+    if alike(values):
         return math.nan
-    away = abs(float(values.mean())) * math.sqrt(len(values)) / float(values.std(ddof=1))
-    return float(2.0 * stdtr(len(values) - 1, -away))
+    away, k = float(values.mean()) / _error(values), _skewness(values) / math.sqrt(len(values))
+    least = max(0.0, min(abs(away), math.copysign(1.0, away) * _hall(away, k)))
+    return float(2.0 * stdtr(len(values) - 1, -least))
 
 
 def skewed(values: FloatArray) -> bool:
-    """Whether few of the values (N,) carry their mean, so that its interval holds less often than it says."""
-    if len(values) < 3 or np.ptp(values) == 0.0:
-        return False
-    off = values - values.mean()
+    """Whether few of the values (N,) carry their mean, so that its interval may hold less often."""
+    return not alike(values) and len(values) < _COCHRAN * _skewness(values) ** 2
+
+
+def _error(values: FloatArray) -> float:
+    return float(values.std(ddof=1)) / math.sqrt(len(values))
+
+
+def _skewness(values: FloatArray) -> float:
+    """Of values (N,) that are not alike, corrected for their number (Fisher and Pearson)."""
+    off, count = values - values.mean(), len(values)
+    if count < 3:
+        return 0.0
     skewness = float((off**3).mean()) / float((off**2).mean()) ** 1.5
-    return bool(len(values) < _COCHRAN * skewness**2)
+    return skewness * math.sqrt(count * (count - 1)) / (count - 2)
+
+
+def _hall(t: float, k: float) -> float:
+    """Hall's monotone cubic of Student's t; k: skewness over the root of the count."""
+    return t + k * (2.0 * t * t + 1.0) / 6.0 + k * k * t**3 / 27.0
+
+
+def _student(h: float, k: float) -> float:
+    """The t of which Hall's cubic is h: 3 (c - 1) / k, with c^3 - 1 divided by c - 1 so that k may be 0."""
+    c = math.cbrt(1.0 + k * h - k * k / 6.0)
+    return 3.0 * (h - k / 6.0) / (c * c + c + 1.0)
 
 
 def shown_together(chances: Sequence[float]) -> list[bool]:

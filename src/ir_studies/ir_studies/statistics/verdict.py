@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from ir_recorder.report.words import DASH
 from ir_studies.statistics.failures import NO_PAIR, NOT_DRIVEN
 from ir_studies.statistics.figures import Comparison, Findings
+from ir_studies.statistics.intervals import ALIKE
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
 
 FEW = 30
 """Pairs below which a mean may miss the few that carry it: drawn from the differences of `demo`, the interval
-holds their mean in 85 % of samples of 30, in 62 % of samples of 10 (benchmarks/studies.py --only statistics).
+holds their mean in 90 % of samples of 30, in 62 % of samples of 10 (benchmarks/studies.py --only statistics).
 """
 _SAID = ("duration", "energy, direct", "energy, predicted")
 
@@ -31,18 +32,20 @@ def sentences(found: Findings, settings: StatisticsSettings) -> list[str]:
 def _counts(found: Findings) -> Iterator[str]:
     own = found.solved - found.same
     again = f", {found.different} of them different" if found.different < own else ""
+    have, are = ("has" if found.solved == 1 else "have"), ("is" if own == 1 else "are")
     yield (
-        f"{found.solved} of {_some(found.pairs, 'pair')} have a certified movement with both timings; in "
-        f"{found.same} of them the asynchronous answer is the synchronous one, so {own} are compared{again}."
+        f"{found.solved} of {_some(found.pairs, 'pair')} {have} a certified movement with both timings; "
+        f"in {found.same} of them the asynchronous answer is the synchronous one, so {own} {are} "
+        f"compared{again}."
     )
-    for what in (NO_PAIR, NOT_DRIVEN):
+    for what, of in ((NO_PAIR, "of timings"), (NOT_DRIVEN, "of what is measured")):
         failures = [each for each in found.failures if each.what == what]
         if failures:
             count = sum(each.count for each in failures)
             most = max(failures, key=lambda each: each.count)
             often = "" if most.count == count else f"most often ({most.count}) "
             why = most.example.partition(";")[0].rstrip(".")
-            yield f"Left out, and nothing follows for them: {_some(count, what)}, {often}since {why}."
+            yield f"Left out of comparisons {of}: {_some(count, what)}, {often}since {why}."
 
 
 def _timings(found: Findings) -> Iterator[str]:
@@ -95,22 +98,24 @@ def _measurements(found: Findings, settings: StatisticsSettings) -> Iterator[str
         )
         yield (
             "The predicted 90 % interval holds the directly measured energy of "
-            f"{100.0 * found.covered:.0f} % of {_some(found.driven, 'movement')}, {robots}."
+            f"{round(found.covered * found.driven)} of {_some(found.driven, 'movement')}, {robots}."
         )
 
 
 def _limits(found: Findings, settings: StatisticsSettings) -> Iterator[str]:
-    own = found.solved - found.same
-    pairs = own or max((each.pairs for each in found.agreements), default=0)
-    if 0 < pairs < FEW:
-        few = "this mean says" if pairs == 1 else "these means say"
-        yield f"With {_some(pairs, 'pair')} {few} little, for few may carry them: ask for more pairs."
-    elif any(each.skewed for each in found.comparisons if each.name in _SAID):
-        yield "Where few pairs carry a mean its interval holds less often than 90 %: look at the dots."
-    if own:
+    said = [each for each in found.comparisons if each.name in _SAID and each.count]
+    if any(0 < each.pairs < FEW for each in (*said, *found.agreements)):
         yield (
-            f"What is shown counts all {len(found.comparisons)} comparisons together (Holm): by chance alone "
-            "any of them would be shown in at most one study of ten."
+            f"Fewer than {FEW} pairs may miss the few that carry a mean, and its interval then holds less "
+            "often than 90 %: ask for more pairs."
+        )
+    elif any(each.skewed for each in said):
+        yield "Where few pairs carry a mean its interval may hold less often than 90 %: look at the dots."
+    tested = sum(math.isfinite(each.chance) for each in found.comparisons)
+    if tested > 1:
+        yield (
+            f"What is shown of the timings counts {tested} comparisons together (Holm): by chance alone any "
+            "of them would be shown in at most one study of ten."
         )
     if not found.solved and not found.driven:
         yield "Nothing follows from that."
@@ -149,7 +154,7 @@ def _shown(each: Comparison) -> str:
         carried = ", carried by few" if each.skewed else ""
         return f"a difference is shown, {effect_words(each.effect)}{carried}"
     if each.outside:
-        return "zero lies outside, but among so many comparisons none is shown"
+        return "zero lies outside, but among so many comparisons it is not shown"
     if each.pairs < FEW:
         return "no difference is shown"
     most = signed(max(abs(each.mean.low), abs(each.mean.high))).lstrip("+")
@@ -157,9 +162,13 @@ def _shown(each: Comparison) -> str:
 
 
 def signed(value: float) -> str:
-    """Percent with its sign; zero has none."""
-    shown = f"{value:+.2f}"
-    return f"{shown.lstrip('+-') if float(shown) == 0.0 else shown} %" if math.isfinite(value) else DASH
+    """Percent with its sign and two decimals, more where it is smaller; zero has no sign."""
+    if not math.isfinite(value):
+        return DASH
+    size = abs(value)
+    if size < ALIKE:
+        return "0.00 %"
+    return f"{value:+.{max(2, math.ceil(-math.log10(size)))}f} %"
 
 
 def effect_words(effect: float) -> str:
