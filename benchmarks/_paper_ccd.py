@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from _paper_plots import finished, panels
 from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_stations import CELLS, Place, cells_of, difference, of_reading, places
+from _paper_stations import CELLS, MARGIN, Place, cells_of, difference, of_reading, places
 from _paper_statistics import interval, mean, mean_difference, percent, share
 
 from ir_planner.configurations import InteractionSettings
@@ -254,7 +254,7 @@ EXPERIMENT = Experiment(
     f"each; {STARTS} starts per station for each reading: (5) as a secant or as printed, none at all "
     f"(collisions sorted out at the end), all three also without Newton's finish but {MANY_SWEEPS} sweeps "
     f"and arrived at 1 mm, (1) uniform; {2 * MORE} further variants of each with both readings of (5) only. "
-    "Only stations where the closed form has a free configuration.",
+    f"Only stations where the closed form has a free configuration. {MARGIN}",
     measure,
     judge,
     follows,

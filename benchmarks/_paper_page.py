@@ -26,7 +26,7 @@ stays. `measured` claims nothing; `calibration` is no evidence, the data were ma
 predicted by the planner's model of robot and drives, no robot was measured; times are processor
 times{machine}.
 
-How large the samples are follows from pilots with seeds 0 to 3, whose draws are not used here (the bundled
+How large the samples are follows from pilots with seeds 0 to 5, whose draws are not used here (the bundled
 cells themselves, which the drawn ones vary, are the same for every seed): where an interval was too wide to
 decide, the sample grew with the square of its width over its distance to the bound, on whichever side of it
 the figure was, as far as an hour of processor time for all claims allows. What is drawn independently are

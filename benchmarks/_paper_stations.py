@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from _paper_result import Row
 from _regional_tasks import scene_of_cell
-from _service_stations import margin_at
+from _service_stations import S_M, SHARE_OF_BEST, margin_at
 from _variants import variant
 
 from ir_description import Station, load_cell
@@ -18,6 +18,10 @@ from ir_planner.scene import PlanningScene
 
 Key = tuple[int, str, str, int]  # seed, cell, station, draw
 CELLS = ("cnc_door", "deep_box", "demo", "table_columns", "open")
+MARGIN = (
+    f"S_m is {1e3 * S_M:g} mm, or {100 * SHARE_OF_BEST:g} % of the best clearance at the station where that "
+    "is less."
+)
 
 
 @dataclass(frozen=True, eq=False)
