@@ -31,7 +31,9 @@ cells themselves, which the drawn ones vary, are the same for every seed): where
 decide, the sample grew with the square of its width over its distance to the bound, on whichever side of it
 the figure was, as far as an hour of processor time for all claims allows. What is drawn independently are
 cells and movements, not the searches in them. Every interval is one of 95 % by itself, and there are many:
-that is why each seed must say the same alone, so that chance has to deceive twice for a wrong verdict.
+that is why each seed must say the same alone, so that chance has to deceive twice for a wrong verdict. An
+interval says what another draw would change, not what another machine would, or what else runs on it: the
+ratio of two times of milliseconds can move further than that.
 """
 
 
