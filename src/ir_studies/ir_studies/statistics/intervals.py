@@ -84,7 +84,7 @@ def _skewness(values: FloatArray) -> float:
     off, count = values - values.mean(), len(values)
     if count < 3:
         return 0.0
-    skewness = float((off**3).mean()) / float((off**2).mean()) ** 1.5
+    skewness = float((off**3).mean() / (off**2).mean() ** 1.5)
     return skewness * math.sqrt(count * (count - 1)) / (count - 2)
 
 
