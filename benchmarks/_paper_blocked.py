@@ -11,12 +11,12 @@ from _paper_ccd import (
     FREE,
     FREE_SWEPT,
     MANY_SWEEPS,
-    NUMBERS,
     QUICK_STARTS,
     READINGS,
     STARTS,
     SWEPT,
     chance_of,
+    chances,
     colliding,
     gain,
     pays,
@@ -120,14 +120,7 @@ def follows(statements: Sequence[Statement]) -> str:
 
 def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Success by number of starts."""
-    found = []
-    for name in ASKED:
-        mine = [row for row in rows if row["reading"] == name]
-        line: Row = {"reading": name}
-        for n in NUMBERS:
-            some = [chance_of(row, n) for row in mine if row["starts"] >= n]
-            line[f"{n}"] = f"{100.0 * np.mean(some):.1f} %" if some else ""
-        found.append(line)
+    found = [{"reading": name, **chances([row for row in rows if row["reading"] == name])} for name in ASKED]
     return {"Chance that so many starts find a free configuration, mean of the poses": found}
 
 

@@ -213,17 +213,23 @@ def _with_all_readings(rows: Sequence[Row], name: str) -> list[Row]:
     return [row for key, row in mine.items() if all(key in other for other in others)]
 
 
+def chances(rows: Sequence[Row]) -> Row:
+    """Of a free configuration, by the number of starts: mean of the places."""
+    found = {}
+    for number in NUMBERS:
+        some = [chance_of(row, number) for row in rows if row["starts"] >= number]
+        found[f"{number}"] = f"{100.0 * np.mean(some):.1f} %" if some else ""
+    return found
+
+
 def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Success by number of starts, for each reading."""
     found = []
     for name in READINGS:
         mine = _with_all_readings(rows, name)
-        line: Row = {"reading": name}
-        for number in NUMBERS:
-            some = [chance_of(row, number) for row in mine if row["starts"] >= number]
-            line[f"{number}"] = f"{100.0 * np.mean(some):.1f} %" if some else ""
         milliseconds = [1e3 * row["seconds"] / row["starts"] for row in mine]
-        found.append(line | {"ms per start": f"{np.median(milliseconds):.2f}"})
+        line = {"reading": name, **chances(mine), "ms per start": f"{np.median(milliseconds):.2f}"}
+        found.append(line)
     return {"Chance that so many starts find a free configuration, mean of the stations": found}
 
 
