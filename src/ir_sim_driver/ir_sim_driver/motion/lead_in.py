@@ -1,9 +1,9 @@
 """From where the command is onto a trajectory, without a jump.
 
 First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference (within the start
-tolerance) is closed before path time starts. First time 0 in motion, or with a first velocity: a polynomial
-bridges to the next point far enough away. A movement that is replaced by one with a later start leads in
-until that start.
+tolerance) is closed before path time starts, as slowly as is asked. First time 0 in motion, or with a first
+velocity: a polynomial bridges to the next point far enough away. A movement that is replaced by one with a
+later start leads in until that start.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from ir_sim_driver.motion.goal import ErrorCode
 from ir_sim_driver.motion.path import Motion, Path, quintic
 from ir_sim_driver.motion.rounding import rounded
 
-_GENTLE = 0.25  # share of the acceleration limit that closing the last difference may use
 _PEAK = 10.0 / math.sqrt(3.0)  # largest acceleration of a unit quintic step of unit duration
 _SAME = 1e-12  # rad; what rounding leaves of a difference
 AT_REST = 1e-6  # rad/s that still count as standing
@@ -43,11 +42,13 @@ def route_onto(
     now: Motion,
     acceleration_max: FloatArray,
     settings: ExecutionSettings,
-    delay: float = 0.0,
+    delay: float,
+    share: float,
 ) -> Route:
     """Path from the commanded motion `now` onto and along what is executed of the trajectory.
 
     acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory; a robot at rest waits for it.
+    share: of acceleration_max, that closing the last difference may use; anything else has its time given.
     Raises TrajectoryRefusedError.
     """
     moving = bool(now.qd.any())
@@ -63,7 +64,7 @@ def route_onto(
     delta = np.abs(trajectory.positions[0] - now.q)
     if delta.max() <= _SAME:
         return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
-    T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / _GENTLE)
+    T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / share)
     still = np.zeros_like(delta)
     closing = quintic(Motion(now.q, still, still), Motion(trajectory.positions[0], still, still), T)
     return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)

@@ -20,6 +20,10 @@ from ir_sim_driver.motion.path import Motion
 from ir_sim_driver.motion.rounding import rounded
 
 _NS = 1e-9
+_GENTLENESS = (0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4)
+"""Shares of the acceleration limits with which the last difference to a trajectory may be closed, tried in
+turn. With the last one the torques are those of standing there, which the trajectory was found to keep.
+"""
 
 
 def check_goal(
@@ -83,13 +87,21 @@ def checked_route(
     """Path from the commanded motion `now` along a trajectory that passed check_trajectory.
 
     Only what leads in is checked here; from outside its range a joint may come back, and go no farther out.
+    The last difference of a robot at rest is closed as fast as its torques allow: nobody gave that a time.
     delay [s]: until time 0 of the trajectory. Raises TrajectoryRefusedError.
     """
-    route = route_onto(trajectory, now, robot.acceleration_max, settings, delay)
-    lead = slice(0, route.lead)
-    coefficients, durations = route.path.coefficients[lead], route.path.durations[lead]
     allowed = Range.of(robot).including(now.q)
-    check_limits(coefficients, durations, -route.offset, robot, dynamics, settings, allowed)
+    for share in _GENTLENESS:
+        route = route_onto(trajectory, now, robot.acceleration_max, settings, delay, share)
+        lead = slice(0, route.lead)
+        coefficients, durations = route.path.coefficients[lead], route.path.durations[lead]
+        try:
+            check_limits(coefficients, durations, -route.offset, robot, dynamics, settings, allowed)
+        except TrajectoryRefusedError:
+            if route.offset == 0.0 or share == _GENTLENESS[-1]:
+                raise
+        else:
+            break
     return route
 
 
