@@ -38,6 +38,30 @@ def test_a_typo_is_answered_when_the_graph_has_settled(clock: Callable[[], float
     assert clock() > SETTLED_SECONDS + DISCOVERY_SECONDS
 
 
+@pytest.mark.parametrize("namespace", ["", "/cell_1"])
+def test_a_node_that_has_its_parameters_only_is_still_starting(
+    clock: Callable[[], float], namespace: str
+) -> None:
+    """However long the rest takes: its own names are no typos of those of its parameters."""
+    node = f"{namespace}/ir_sim_driver"
+
+    def seen() -> dict[str, str]:
+        late = {f"{node}/query_modes": "x/srv/B"} if clock() > DISCOVERY_SECONDS - 1.0 else {}
+        return {f"{node}/get_parameters": "x/srv/A", f"{node}/list_parameters": "x/srv/A", **late}
+
+    assert type_of(seen, f"{node}/query_modes", "service") == "x/srv/B"
+    began = clock()
+    with pytest.raises(CommandError, match="did you mean"):
+        type_of(seen, f"{node}/query_mode", "service")
+    assert clock() - began < SETTLED_SECONDS + 0.1
+
+
+def test_a_node_that_is_in_another_namespace_is_named(clock: Callable[[], float]) -> None:
+    with pytest.raises(CommandError, match="did you mean /cell_1/ir_planner/get_cell"):
+        type_of(lambda: {"/cell_1/ir_planner/get_cell": "x/srv/A"}, "/ir_planner/get_cell", "service")
+    assert clock() < DISCOVERY_SECONDS + 0.1
+
+
 def test_a_graph_that_grows_slowly_is_given_as_long_again(clock: Callable[[], float]) -> None:
     """Half of a node's services after 3 s, the rest 2 s later: what comes late is no typo."""
 

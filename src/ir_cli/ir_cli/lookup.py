@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Callable, Mapping
+
+from ir_msgs_py import names
 
 from .errors import CommandError
 from .suggestions import nearest, unknown_name
@@ -13,8 +16,12 @@ DISCOVERY_SECONDS = 10.0
 """Longest wait for a graph to grow; discovery takes tenths of a second, on a busy machine seconds."""
 SETTLED_SECONDS = 1.0
 """A graph that has not grown for this long, nor for as long as it took so far, is complete: a name that is
-near a known one is a typo then."""
+near a known one is a typo then, unless a node of this project has it as soon as it runs."""
 POLL_SECONDS = 0.02
+_OF_NODES = tuple(
+    f"/{name}" for name in vars(names).values() if isinstance(name, str) and re.fullmatch(r"\w+/\w+", name)
+)
+"""Ends of what this project's nodes offer in any namespace."""
 
 
 def absolute(name: str) -> str:
@@ -30,7 +37,8 @@ def type_of(
     known = dict(look())
     while name not in known:
         now = time.monotonic()
-        typo = bool(nearest(name, known)) and _complete(began, grown, now)
+        mistyped = bool(nearest(name, known)) and not name.endswith(_OF_NODES)
+        typo = mistyped and _complete(began, grown, now)
         if typo or now - grown > seconds:
             raise CommandError(_missing(name, kind, known))
         time.sleep(POLL_SECONDS)
