@@ -68,9 +68,9 @@ def test_wherever_it_stands_the_difference_is_closed_straight(loaded, plan, load
     route = on(simulation, plan, q, stands)
     if route is None:  # the trajectory itself asks too much
         return
-    way = np.array([route.path.position(route.offset * k / 50.0) for k in range(51)])
-    assert np.abs(way[-1] - q).max() < 1e-12
-    steps = np.diff(way, axis=0) * np.sign(q - stands)
+    straight = np.array([route.path.position(route.offset * k / 50.0) for k in range(51)])
+    assert np.abs(straight[-1] - q).max() < 1e-12
+    steps = np.diff(straight, axis=0) * np.sign(q - stands)
     assert steps.min() > -1e-13  # straight there: no joint turns back
 
 
