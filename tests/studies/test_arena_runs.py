@@ -191,6 +191,13 @@ def test_what_lies_where_the_database_belongs_is_named(fought: Fought, tmp_path:
         fought("sbl", seeds=1)
 
 
+def test_a_database_that_cannot_be_finished_leaves_nothing_behind(fought: Fought, tmp_path: Path) -> None:
+    (tmp_path / "out" / "arena.db").mkdir(parents=True)
+    with pytest.raises(FolderError, match=r"arena\.db can't be written"):
+        fought("sbl", seeds=1)
+    assert not (tmp_path / "out" / "arena.db.part").exists()
+
+
 def test_workers_that_never_start_end_the_arena(tmp_path: Path) -> None:
     settings = ArenaSettings(cells=("open",), tasks=("home->p1",), seeds=5)
     with pytest.raises(WorkerError, match="a worker died before it could start"):

@@ -12,12 +12,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from ir_description import cell_to_yaml, load_cell
 from ir_studies import LayoutSettings, Means, read_layout, run_layout
 from ir_studies.errors import FolderError, StoppedError
-from ir_studies.layout import Layouts
+from ir_studies.layout import Layouts, search
+from ir_studies.layout.search import points
 from ir_studies.work.results import NAME
 
 WORKER = Path(__file__).with_name("fake_layout_worker.py")
@@ -259,3 +261,19 @@ def test_no_mark_lies_outside_its_picture(laid: Laid, tmp_path: Path) -> None:
     assert len(marks) > 30
     assert all(0.0 <= float(x) <= width and 0.0 <= float(y) <= height for x, y in marks)
     assert height <= 1.6 * width
+
+
+@pytest.mark.parametrize(("placements", "rounds"), [(41, 4), (10, 6), (5, 2), (3, 5)])
+def test_as_many_placements_are_drawn_as_were_asked_for(
+    monkeypatch: pytest.MonkeyPatch, laid: Laid, placements: int, rounds: int
+) -> None:
+    """However they divide among the rounds."""
+    drawn: list[int] = []
+
+    def counted(dimensions: int, count: int, *seeds: int) -> np.ndarray:
+        drawn.append(count)
+        return points(dimensions, count, *seeds)
+
+    monkeypatch.setattr(search, "points", counted)
+    laid(replace(SPREAD, placements=placements, rounds=rounds))
+    assert 1 + sum(drawn) == placements

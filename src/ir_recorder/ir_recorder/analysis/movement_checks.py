@@ -85,7 +85,7 @@ def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findin
     movement = result.step.movement
     if movement.duration <= 0.0:
         return  # a stop without a dwell: nothing is planned
-    why = "wake margin and answers of the nodes"
+    why = "wake margin and answers of the nodes; time of the plant, which a busy machine delays"
     yield near(f"duration of {name}", result.seconds, movement.duration, bounds.pause_duration, "s", why)
     if movement.report.energy <= 0.0:
         yield unchecked(f"energy of {name}", "the pause carries no plan")

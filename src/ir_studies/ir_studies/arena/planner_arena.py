@@ -7,7 +7,7 @@ import os
 import platform
 import sqlite3
 from collections.abc import Iterable, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -50,6 +50,8 @@ def write_database(runs: Sequence[Run], settings: ArenaSettings, path: Path) -> 
             _fill(database, runs, settings)
         os.replace(part, path)
     except (OSError, sqlite3.Error) as error:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
         raise FolderError(f"{path} can't be written: {error}") from error
     return path
 

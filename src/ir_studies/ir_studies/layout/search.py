@@ -68,7 +68,8 @@ class Search:
             yield from grid(self._settings) if self._settings.method == "grid" else self._spread(first, 0)
             return
         found = best_of(self._known(), self._settings.keep)
-        count = (self._settings.placements - self._first(rounds)) // max(rounds - 1, 1)
+        left, later = self._settings.placements - self._first(rounds), rounds - 1
+        count = left // later + (k <= left % later)
         if not found:  # near what?
             yield from self._spread(count, k)
         for place, known in enumerate(found):
