@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -9,7 +10,15 @@ import pytest
 
 from ir_cli import lookup
 from ir_cli.errors import CommandError
-from ir_cli.lookup import DISCOVERY_SECONDS, SETTLED_SECONDS, checked_type, settled, type_of
+from ir_cli.lookup import (
+    DISCOVERY_SECONDS,
+    SETTLED_SECONDS,
+    START_SECONDS,
+    checked_type,
+    settled,
+    type_of,
+)
+from ir_cli.only_one import claim
 
 
 @pytest.fixture
@@ -60,6 +69,47 @@ def test_a_node_that_is_in_another_namespace_is_named(clock: Callable[[], float]
     with pytest.raises(CommandError, match="did you mean /cell_1/ir_planner/get_cell"):
         type_of(lambda: {"/cell_1/ir_planner/get_cell": "x/srv/A"}, "/ir_planner/get_cell", "service")
     assert clock() < DISCOVERY_SECONDS + 0.1
+
+
+def test_nodes_that_somebody_starts_on_this_host_get_a_minute(clock: Callable[[], float]) -> None:
+    """Four processes that start at once on a slow machine: nothing is seen of them for half of it."""
+    namespace = f"/starting_{os.getpid()}"
+    name = f"{namespace}/ir_planner/set_cell"
+
+    def seen() -> dict[str, str]:
+        return {name: "x/srv/A"} if clock() > START_SECONDS - 1.0 else {}
+
+    held = claim(os.environ.get("ROS_DOMAIN_ID", ""), namespace)
+    assert held is not None
+    with held:
+        assert type_of(seen, name, "service") == "x/srv/A"
+        began = clock()
+        with pytest.raises(CommandError, match="no service"):
+            type_of(dict, name, "service")
+        assert START_SECONDS < clock() - began < START_SECONDS + 0.1
+        began = clock()
+        with pytest.raises(CommandError, match="no service"):
+            type_of(dict, name, "service", seconds=2.0)
+        assert clock() - began < 2.1
+    began = clock()
+    with pytest.raises(CommandError, match="no service"):
+        type_of(dict, name, "service")
+    assert clock() - began < DISCOVERY_SECONDS + 0.1
+
+
+def test_a_process_that_was_held_up_has_not_seen_that_nothing_came(clock: Callable[[], float]) -> None:
+    """3 s between two looks: what discovery had to say in them is heard a moment later."""
+    looks: list[float] = []
+
+    def seen() -> dict[str, str]:
+        looks.append(clock())
+        if len(looks) == 5:
+            lookup.time.sleep(3.0)
+        return {"/machine": "x/srv/A", **({"/machines": "x/srv/B"} if len(looks) > 10 else {})}
+
+    assert type_of(seen, "/machines", "service") == "x/srv/B"
+    looks.clear()
+    assert "/machines" in settled(seen)
 
 
 def test_a_graph_that_grows_slowly_is_given_as_long_again(clock: Callable[[], float]) -> None:

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from ir_cli.errors import CommandError
-from ir_cli.only_one import claim
+from ir_cli.only_one import claim, claimed
 
 
 def test_a_claim_is_refused_while_another_holds_it_and_free_after() -> None:
@@ -22,3 +22,14 @@ def test_a_claim_is_refused_while_another_holds_it_and_free_after() -> None:
     for held in (*others, again):
         assert held is not None
         held.close()
+
+
+def test_whoever_looks_sees_the_claim_and_does_not_take_it() -> None:
+    namespace = f"/seen_{os.getpid()}"
+    assert not claimed("77", namespace)
+    held = claim("77", namespace)
+    assert held is not None
+    with held:
+        assert claimed("77", namespace)
+        assert not claimed("78", namespace)
+    assert not claimed("77", namespace)

@@ -10,7 +10,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.types import interface_type
 from ir_msgs_py.ros.yaml_messages import message_from_yaml, message_to_yaml
 
-from .lookup import absolute, checked_type, settled, type_of
+from .lookup import DISCOVERY_SECONDS, absolute, checked_type, settled, type_of
 from .terminal import SHOWN_ELEMENTS
 from .words import type_and_text
 
@@ -27,7 +27,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     echo = commands.add_parser("echo", help="print a topic's messages: echo /ir_sim_driver/power_state")
     echo.add_argument("topic")
     echo.add_argument("--once", action="store_true", help="one message, then end")
-    echo.add_argument("--timeout", type=float, default=10.0, help="s to wait for the topic (10)")
+    words = "s to wait for the topic (10, longer while `ir up` starts its node)"
+    echo.add_argument("--timeout", type=float, help=words)
     echo.add_argument("--full", action="store_true", help="print long arrays whole")
     echo.set_defaults(run=run_echo)
 
@@ -53,7 +54,8 @@ def run_call(arguments: argparse.Namespace) -> int:
 def run_echo(arguments: argparse.Namespace) -> int:
     """Print messages until interrupted."""
     limit = None if arguments.full else SHOWN_ELEMENTS
-    with Client(node_name="ir_echo", timeout=arguments.timeout) as client:
+    patience = DISCOVERY_SECONDS if arguments.timeout is None else arguments.timeout
+    with Client(node_name="ir_echo", timeout=patience) as client:
         name = absolute(arguments.topic)
         message_type = interface_type(type_of(client.graph.topics, name, "topic", arguments.timeout), "msg")
         if arguments.once:

@@ -8,20 +8,56 @@ import time
 from collections.abc import Callable, Mapping
 
 from ir_msgs_py import names
+from ir_msgs_py.ros.network import DOMAIN
 
 from .errors import CommandError
+from .only_one import claimed
 from .suggestions import nearest, unknown_name
 
 DISCOVERY_SECONDS = 10.0
 """Longest wait for a graph to grow; discovery takes tenths of a second, on a busy machine seconds."""
+START_SECONDS = 60.0
+"""The same for what this project's nodes offer, while `ir up` starts or runs them on this host."""
 SETTLED_SECONDS = 1.0
 """A graph that has not grown for this long, nor for as long as it took so far, is complete: a name that is
 near a known one is a typo then, unless a node of this project has it as soon as it runs."""
 POLL_SECONDS = 0.02
+SEEN_SECONDS = 0.2
+"""What counts of the time between two looks: more is a process that was held up, and saw nothing."""
 _OF_NODES = tuple(
     f"/{name}" for name in vars(names).values() if isinstance(name, str) and re.fullmatch(r"\w+/\w+", name)
 )
 """Ends of what this project's nodes offer in any namespace."""
+
+
+class _Watch:
+    """A graph that is looked at again and again; watched, grown [s]: how long so far, and when it changed last,
+    in time in which this process could see that.
+    """
+
+    def __init__(self, look: Callable[[], Mapping[str, str]]) -> None:
+        self._look, self._looked = look, time.monotonic()
+        self.known, self.watched, self.grown = dict(look()), 0.0, 0.0
+
+    def again(self) -> None:
+        """Look after a moment."""
+        time.sleep(POLL_SECONDS)
+        now = time.monotonic()
+        self.watched += min(now - self._looked, SEEN_SECONDS)
+        self._looked = now
+        found = dict(self._look())
+        if found != self.known:
+            self.known, self.grown = found, self.watched
+
+    @property
+    def still(self) -> float:
+        """How long it has not changed [s]."""
+        return self.watched - self.grown
+
+    @property
+    def complete(self) -> bool:
+        """Whether it will show no more."""
+        return self.still > max(SETTLED_SECONDS, self.grown)
 
 
 def absolute(name: str) -> str:
@@ -29,40 +65,34 @@ def absolute(name: str) -> str:
     return name if name.startswith("/") else "/" + name
 
 
-def type_of(
-    look: Callable[[], Mapping[str, str]], name: str, kind: str, seconds: float = DISCOVERY_SECONDS
-) -> str:
-    """Type of a name as soon as the graph shows it; `kind`: "service", "topic" or "action"."""
-    began = grown = time.monotonic()
-    known = dict(look())
-    while name not in known:
-        now = time.monotonic()
-        mistyped = bool(nearest(name, known)) and not name.endswith(_OF_NODES)
-        typo = mistyped and _complete(began, grown, now)
-        if typo or now - grown > seconds:
-            raise CommandError(_missing(name, kind, known))
-        time.sleep(POLL_SECONDS)
-        found = dict(look())
-        if found != known:
-            known, grown = found, time.monotonic()
-    return known[name]
+def type_of(look: Callable[[], Mapping[str, str]], name: str, kind: str, seconds: float | None = None) -> str:
+    """Type of a name as soon as the graph shows it; `kind`: "service", "topic" or "action". seconds: longest
+    wait for a graph that does not grow; None: as long as nodes may take.
+    """
+    own = name.endswith(_OF_NODES)
+    graph = _Watch(look)
+    while name not in graph.known:
+        typo = not own and graph.complete and bool(nearest(name, graph.known))
+        if typo or graph.still > (DISCOVERY_SECONDS if seconds is None else seconds):
+            starting = not typo and seconds is None and graph.still <= START_SECONDS and _starting(name)
+            if not starting:
+                raise CommandError(_missing(name, kind, graph.known))
+        graph.again()
+    return graph.known[name]
 
 
 def settled(look: Callable[[], Mapping[str, str]]) -> dict[str, str]:
     """Names with their types once the graph has not grown for a moment, or changes without end."""
-    began = grown = time.monotonic()
-    known = dict(look())
-    while not _complete(began, grown, now := time.monotonic()) and now - began < DISCOVERY_SECONDS:
-        time.sleep(POLL_SECONDS)
-        found = dict(look())
-        if found != known:
-            known, grown = found, time.monotonic()
-    return known
+    graph = _Watch(look)
+    while not graph.complete and graph.watched < DISCOVERY_SECONDS:
+        graph.again()
+    return graph.known
 
 
-def _complete(began: float, grown: float, now: float) -> bool:
-    """Whether a graph that was first seen at `began` and grew last at `grown` [s] will show no more."""
-    return now - grown > max(SETTLED_SECONDS, grown - began)
+def _starting(name: str) -> bool:
+    """Whether a process of this host has started, and watches, the nodes that have this name."""
+    namespace = next((name.removesuffix(end) for end in _OF_NODES if name.endswith(end)), None)
+    return namespace is not None and claimed(os.environ.get(DOMAIN, ""), namespace)
 
 
 def checked_type(typed: str, found: str, name: str, kind: str) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import socket
 import sys
+from pathlib import Path
 
 from .errors import CommandError
 
@@ -20,10 +21,9 @@ def claim(domain: str, namespace: str) -> socket.socket | None:
     """
     if not sys.platform.startswith("linux"):
         return None
-    what = hashlib.sha256(f"{domain or '0'}\0{namespace}".encode()).hexdigest()[:32]
     held = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        held.bind(f"\0ir_up.{what}")
+        held.bind(f"\0{_name(domain, namespace)}")
     except OSError as error:
         held.close()
         where = f"in {namespace}" if namespace else "without a namespace"
@@ -32,3 +32,18 @@ def claim(domain: str, namespace: str) -> socket.socket | None:
             "end it, or choose another domain (ROS_DOMAIN_ID) or --namespace"
         ) from error
     return held
+
+
+def claimed(domain: str, namespace: str) -> bool:
+    """Whether a process of this host has the claim now; False where nobody can know."""
+    try:
+        names = Path("/proc/net/unix").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+    wanted = f"@{_name(domain, namespace)}"
+    return any(line.endswith(wanted) for line in names.splitlines())
+
+
+def _name(domain: str, namespace: str) -> str:
+    what = hashlib.sha256(f"{domain or '0'}\0{namespace}".encode()).hexdigest()[:32]
+    return f"ir_up.{what}"
