@@ -93,7 +93,7 @@ class Driver:
         """Whether the meter has not been heard for too long, while this process could hear."""
         self._read_meter()
         now = time.monotonic()
-        if self._mode is not None and now - self._looked > max(self._silence_timeout, _UNSEEN):
+        if self._mode is not None and now - self._looked > _UNSEEN:
             self._heard = now
         self._looked = now
         return now - self._heard > self._silence_timeout

@@ -1,7 +1,8 @@
 """Waiting in a callback without blocking it: `await waiting.until(condition, timeout)`.
 
 For coroutines on a SingleThreadedExecutor. A condition is looked at whenever something arrives (`look`) and
-at least every `period`; time is the steady clock, so a jump of /clock neither ends nor prolongs a wait.
+at least every `period`; time is the steady clock, so a jump of /clock neither ends nor prolongs a wait. A
+process that was held up gets that time again: what came meanwhile is not late.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from rclpy.task import Future
 
 from ir_msgs_py.status import Status, StatusCode
 
+_HELD_UP = 0.1
+"""s between two looks from which on a process was held up."""
+
 
 @dataclass(eq=False)
 class _Wait:
@@ -30,6 +34,7 @@ class Waiting:
 
     def __init__(self, node: Node, period: float = 0.02) -> None:
         self._waits: list[_Wait] = []
+        self._looked = 0.0
         self._timer = node.create_timer(period, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
 
@@ -37,7 +42,9 @@ class Waiting:
         """Wait until the condition holds; False when `timeout` [s] went by first."""
         if condition():
             return True
-        wait = _Wait(condition, time.monotonic() + timeout)
+        now = time.monotonic()
+        self._give_back(now)
+        wait = _Wait(condition, now + timeout)
         self._waits.append(wait)
         self._timer.reset()
         return bool(await wait.future)
@@ -60,6 +67,7 @@ class Waiting:
     def look(self) -> None:
         """Look at all conditions again; call it where something arrives that a condition depends on."""
         now = time.monotonic()
+        self._give_back(now)
         for wait in list(self._waits):
             met = wait.condition()
             if met or now >= wait.deadline:
@@ -67,3 +75,9 @@ class Waiting:
                 wait.future.set_result(met)
         if not self._waits:
             self._timer.cancel()
+
+    def _give_back(self, now: float) -> None:
+        """Prolong all waits by the time in which nobody looked."""
+        lost, self._looked = now - self._looked - _HELD_UP, now
+        for wait in self._waits:
+            wait.deadline += max(0.0, lost)
