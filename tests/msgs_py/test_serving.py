@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 import pytest
 import rclpy
+from rclpy.action import ActionClient, CancelResponse
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.task import Future
 
+from ir_msgs.action import RunProgram
 from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.quality import SERVICE
-from ir_msgs_py.ros.serving import SENDS, UNDISCOVERED, BoundedService, PatientSender
+from ir_msgs_py.ros.serving import (
+    SENDS,
+    UNDISCOVERED,
+    BoundedService,
+    PatientSender,
+    RecordedActionServer,
+)
 from ir_msgs_py.status import StatusCode
 
 MOST, SENT = 50, 400
@@ -92,6 +103,64 @@ def test_a_client_that_is_never_discovered_costs_a_second_and_no_more() -> None:
     middleware.lost = middleware.sent + 1
     sender.send("response", "header")
     assert middleware.sent == middleware.lost + 1
+
+
+@pytest.fixture
+def late_discovery(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
+    """The middleware's first two responses of each kind are lost, as rclpy says it; counts by kind."""
+    sent: dict[str, int] = {}
+
+    def loses(kind: str) -> None:
+        plain = getattr(_rclpy.ActionServer, kind)
+
+        def send(handle: Any, header: Any, response: Any) -> None:
+            sent[kind] = sent.get(kind, 0) + 1
+            if sent[kind] <= 2:
+                time.sleep(2.0 * UNDISCOVERED)
+                raise _rclpy.RCLError(f"Failed to {kind}")
+            plain(handle, header, response)
+
+        monkeypatch.setattr(_rclpy.ActionServer, kind, send)
+
+    for kind in ("send_goal_response", "send_result_response", "send_cancel_response"):
+        loses(kind)
+    return sent
+
+
+def test_a_goal_is_executed_though_its_client_is_discovered_late(
+    late_discovery: dict[str, int], ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    """And the client hears that it was taken, that it will end, and what became of it."""
+    canceled = Future()
+
+    async def execute(goal: Any) -> Any:
+        await canceled
+        goal.canceled()
+        return RunProgram.Result(executed=3)
+
+    def cancel(goal: Any) -> CancelResponse:
+        canceled.set_result(None)
+        return CancelResponse.ACCEPT
+
+    server = BackgroundExecutor(ros_context)
+    try:
+        node = server.add_node(rclpy.create_node("late", context=ros_context))
+        made = server.run(
+            lambda: RecordedActionServer(node, RunProgram, "~/run", execute, cancel_callback=cancel)
+        )
+        client = ros_executor.run(lambda: ActionClient(ros_node, RunProgram, "/late/run"))
+        wait_for(client.server_is_ready, what="the action is offered")
+        sent = ros_executor.run(lambda: client.send_goal_async(RunProgram.Goal()))
+        wait_for(sent.done, what="the goal is taken")
+        result = ros_executor.run(sent.result().get_result_async)
+        ending = ros_executor.run(sent.result().cancel_goal_async)
+        wait_for(lambda: result.done() and ending.done(), what="the goal has ended")
+        assert result.result().result.executed == 3
+        ros_executor.run(client.destroy)
+        server.run(made.destroy)
+    finally:
+        server.close()
+    assert set(late_discovery.values()) == {3}
 
 
 class Unsendable:

@@ -31,8 +31,8 @@ _OF_NODES = tuple(
 
 
 class _Watch:
-    """A graph that is looked at again and again; watched, grown [s]: how long so far, and when it changed last,
-    in time in which this process could see that.
+    """A graph that is looked at again and again; watched, grown [s]: how long, and when it changed last.
+    Time counts in which this process could see that.
     """
 
     def __init__(self, look: Callable[[], Mapping[str, str]]) -> None:

@@ -7,15 +7,18 @@ What was answered is published for recordings (calls.py).
 
 from __future__ import annotations
 
+import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from rclpy.action import ActionServer
 from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import await_or_execute
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.waitable import NumberOfEntities, Waitable
 
@@ -125,13 +128,52 @@ class BoundedService(Waitable):
         self._sender.send(response, header)
 
 
+class _PatientHandle(_rclpy.ActionServer):  # type: ignore[misc]
+    """rclpy's handle of an action server, whose responses reach a client that is discovered late.
+
+    A goal whose client does not hear that it was accepted would not even be executed.
+    """
+
+    def send_goal_response(self, header: Any, response: Any) -> None:
+        """That a goal is taken or not."""
+        self._patiently(super().send_goal_response, header, response)
+
+    def send_cancel_response(self, header: Any, response: Any) -> None:
+        """Which goals will end."""
+        self._patiently(super().send_cancel_response, header, response)
+
+    def send_result_response(self, header: Any, response: Any) -> None:
+        """What became of a goal."""
+        self._patiently(super().send_result_response, header, response)
+
+    def _patiently(self, send: Callable[[Any, Any], None], header: Any, response: Any) -> None:
+        failures: list[Exception] = []
+
+        def attempt(response: Any, header: Any) -> None:
+            failures.clear()
+            try:
+                send(header, response)
+            except _rclpy.RCLError as error:
+                failures.append(error)
+
+        if not hasattr(self, "_sender"):
+            self._sender = PatientSender(lambda response, attempt: attempt(response))
+        self._sender.send(response, lambda response: attempt(response, header))
+        if failures:
+            raise failures[0]
+
+
+_MAKING = threading.Lock()
+
+
 class RecordedActionServer(ActionServer):
     """An ActionServer whose goals and results are published for recordings."""
 
     def __init__(self, node: Node, action_type: Any, name: str, *arguments: Any, **options: Any) -> None:
         self._calls, self._type_text = Calls.of(node), type_text(action_type)
         self._full_name = node.resolve_topic_name(name)
-        super().__init__(node, action_type, name, *arguments, **options)
+        with _MAKING, _made_of(_PatientHandle):
+            super().__init__(node, action_type, name, *arguments, **options)
 
     async def _execute_goal(self, execute_callback: Any, goal_handle: Any) -> None:
         async def execute(goal: Any) -> Any:
@@ -164,6 +206,16 @@ class PatientSender:
                 self._patient = True
                 return
         self._patient = False
+
+
+@contextmanager
+def _made_of(handle: type) -> Iterator[None]:
+    """rclpy makes its action servers of this class meanwhile."""
+    plain, _rclpy.ActionServer = _rclpy.ActionServer, handle
+    try:
+        yield
+    finally:
+        _rclpy.ActionServer = plain
 
 
 def _nothing() -> None:
