@@ -20,21 +20,36 @@ from ir_msgs_py.status import StatusCode
 from ir_recorder.format.contents import PARAMETERS, POWER_PARAMETERS
 from ir_recorder.write.session import CellFiles
 
+PATIENCE = 5
+"""Looks, each a second after the other, at a request that nobody has answered."""
 ASKED = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER)
 
 
 class Asked:
-    """One service call that is repeated until its answer was taken; `each` sends it while nobody answers."""
+    """One service call that is repeated until its answer was taken; `each` sends it while nobody answers.
+
+    An answer may be lost, as that of a node that had not discovered its client: who has not answered for
+    PATIENCE looks is asked again.
+    """
 
     def __init__(self, client: Client, request: Any, take: Callable[[Any], bool]) -> None:
         self._client, self._request, self._take = client, request, take
         self._pending: Future | None = None
+        self._looks = 0
         self.done = False
 
     def each(self) -> None:
         """Sends the request where it is still needed and its service is there."""
-        waiting = self._pending is not None and not self._pending.done()
-        if not self.done and not waiting and self._client.service_is_ready():
+        if self.done:
+            return
+        if self._pending is not None and not self._pending.done():
+            self._looks += 1
+            if self._looks < PATIENCE:
+                return
+            self._client.remove_pending_request(self._pending)
+            self._pending = None
+        if self._client.service_is_ready():
+            self._looks = 0
             self._pending = self._client.call_async(self._request)
             self._pending.add_done_callback(self._answered)
 
