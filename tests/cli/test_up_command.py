@@ -19,7 +19,7 @@ from ir_cli.main import main
 from ir_cli.node_parameters import given_parameters
 from ir_cli.node_settings import parameters_of
 from ir_cli.nodes import cell_nodes
-from ir_cli.ports import TCP, UDP, free_port, is_free
+from ir_cli.ports import TCP, UDP, PortClaims, free_port, is_free
 from ir_cli.up_command import choose_ports
 
 WAITING = """
@@ -119,7 +119,8 @@ def test_taken_ports_are_replaced_by_free_ones_for_driver_and_runner() -> None:
                 continue  # somebody has it already: just as well
         modbus.listen()
         values = given_parameters(["modbus:=true"])
-        lines = choose_ports(values)
+        with PortClaims() as claims:
+            lines = choose_ports(values, claims)
     driver = values["ir_sim_driver"]
     assert driver["wake_port"] == values["ir_program_runner"]["wake_port"] != 9009
     assert driver["modbus_port"] != 5020
@@ -141,7 +142,25 @@ def test_a_given_port_that_is_taken_is_refused() -> None:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
         with pytest.raises(CommandError, match=f"wake_port {port} is taken"):
-            choose_ports(given_parameters([f"wake_port:={port}"]))
+            choose_ports(given_parameters([f"wake_port:={port}"]), PortClaims())
+
+
+def test_who_starts_while_the_nodes_of_another_do_not_listen_yet_gets_other_ports() -> None:
+    """The driver opens its ports some seconds after it was started."""
+    chosen = []
+    with PortClaims() as first, PortClaims() as second:
+        for claims in (first, second):
+            values = given_parameters(["modbus:=true"])
+            choose_ports(values, claims)
+            parameters = {"wake_port": 9009, "modbus_port": 5020, **values["ir_sim_driver"]}
+            chosen.append({name: parameters[name] for name in ("wake_port", "modbus_port")})
+        assert chosen[0]["wake_port"] != chosen[1]["wake_port"]
+        assert chosen[0]["modbus_port"] != chosen[1]["modbus_port"]
+        port = chosen[0]["wake_port"]
+        with pytest.raises(CommandError, match=f"wake_port {port} is taken"):
+            choose_ports(given_parameters([f"wake_port:={port}"]), second)
+    with PortClaims() as third:
+        choose_ports(given_parameters([f"wake_port:={port}"]), third)
 
 
 def test_the_namespace_reaches_every_node() -> None:

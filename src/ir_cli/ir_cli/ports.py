@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import random
 import socket
+import sys
+from types import TracebackType
 
 UDP, TCP = socket.SOCK_DGRAM, socket.SOCK_STREAM
 _GIVEN_AWAY = 32_768
@@ -24,6 +26,40 @@ def is_free(port: int, kind: socket.SocketKind, host: str = "127.0.0.1") -> bool
         except OSError:
             return False
     return True
+
+
+class PortClaims:
+    """Ports that this process has chosen for nodes it starts: nobody else who asks gets them, though those
+    nodes do not listen yet. They are free again when the block ends, or this process, however it ends.
+    """
+
+    def __init__(self) -> None:
+        self._held: list[socket.socket] = []
+
+    def __enter__(self) -> PortClaims:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for held in self._held:
+            held.close()
+        self._held.clear()
+
+    def take(self, port: int, kind: socket.SocketKind) -> bool:
+        """Claim a port that nobody listens on and nobody else has claimed; whether that could be done."""
+        if not is_free(port, kind):
+            return False
+        if not sys.platform.startswith("linux"):
+            return True
+        name = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            name.bind(f"\0ir_port.{kind.name}.{port}")
+        except OSError:
+            name.close()
+            return False
+        self._held.append(name)
+        return True
 
 
 def free_port(kind: socket.SocketKind) -> int:

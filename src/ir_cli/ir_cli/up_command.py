@@ -21,7 +21,7 @@ from .errors import CommandError
 from .node_parameters import given_parameters
 from .node_settings import parameters_of
 from .nodes import cell_nodes
-from .ports import TCP, UDP, free_port, is_free
+from .ports import TCP, UDP, PortClaims, free_port
 from .processes import NodeProcesses
 
 Given = dict[str, dict[str, Any]]
@@ -62,8 +62,13 @@ def run_up(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace, namespace: str, cell: Cell, parameters: Given) -> int:
-    for line in choose_ports(parameters):
-        sys.stdout.write(f"{line}\n")
+    with PortClaims() as claims:
+        for line in choose_ports(parameters, claims):
+            sys.stdout.write(f"{line}\n")
+        return _run_nodes(arguments, namespace, cell, parameters)
+
+
+def _run_nodes(arguments: argparse.Namespace, namespace: str, cell: Cell, parameters: Given) -> int:
     planner, driver, runner, recorder = (parameters[name] for name in NODES)
     commands = cell_nodes(
         arguments.cell,
@@ -85,8 +90,9 @@ def _run(arguments: argparse.Namespace, namespace: str, cell: Cell, parameters: 
             time.sleep(LOOK_SECONDS)
 
 
-def choose_ports(parameters: dict[str, dict[str, Any]]) -> list[str]:
-    """Put free ports where nobody gave one and the usual one is taken; lines that say so.
+def choose_ports(parameters: Given, claims: PortClaims) -> list[str]:
+    """Put free ports where nobody gave one and the usual one is taken; lines that say so. All are claimed:
+    the nodes listen only some seconds later.
 
     Raises CommandError for a given port that is taken.
     """
@@ -97,11 +103,12 @@ def choose_ports(parameters: dict[str, dict[str, Any]]) -> list[str]:
     for name, kind, what, takers in wanted:
         usual = parameters_of("ir_sim_driver")[name].default
         port = driver.get(name, usual)
-        if not port or is_free(port, kind):
+        if not port or claims.take(port, kind):
             continue
         if name in driver:
             raise CommandError(f"{name} {port} is taken: another driver may run")
         found = free_port(kind)
+        claims.take(found, kind)
         for taker in takers:
             taker[name] = found
         lines.append(f"{what} port {found}: {port} is taken")
