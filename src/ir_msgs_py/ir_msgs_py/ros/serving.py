@@ -128,7 +128,7 @@ class BoundedService(Waitable):
         self._sender.send(response, header)
 
 
-class _PatientHandle(_rclpy.ActionServer):  # type: ignore[misc]
+class _PatientHandle(_rclpy.ActionServer):
     """rclpy's handle of an action server, whose responses reach a client that is discovered late.
 
     A goal whose client does not hear that it was accepted would not even be executed.
