@@ -22,8 +22,13 @@ from ir_sim_driver.motion.rounding import rounded
 _NS = 1e-9
 _GENTLENESS = (0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4)
 """Shares of the acceleration limits with which the last difference to a trajectory may be closed, tried in
-turn. With the last one the torques are those of standing there, which the trajectory was found to keep.
+turn. With the last one the torques are those of standing there and of friction.
 """
+_HARMLESS = 1e-5
+"""A difference [rad] that is closed whatever friction asks for: encoders leave less, and a drive that holds
+the robot where the trajectory starts creeps so far (30 um at 3 m) with what it has left.
+"""
+_SHORT = 0.01  # share for it: over before a motor that gives all it has counts as overloaded
 
 
 def check_goal(
@@ -88,21 +93,32 @@ def checked_route(
 
     Only what leads in is checked here; from outside its range a joint may come back, and go no farther out.
     The last difference of a robot at rest is closed as fast as its torques allow: nobody gave that a time.
+    One that is _HARMLESS is never refused.
     delay [s]: until time 0 of the trajectory. Raises TrajectoryRefusedError.
     """
     allowed = Range.of(robot).including(now.q)
+
+    def route(share: float) -> Route:
+        return route_onto(trajectory, now, robot.acceleration_max, settings, delay, share)
+
     for share in _GENTLENESS:
-        route = route_onto(trajectory, now, robot.acceleration_max, settings, delay, share)
-        lead = slice(0, route.lead)
-        coefficients, durations = route.path.coefficients[lead], route.path.durations[lead]
+        found = route(share)
+        lead = slice(0, found.lead)
+        coefficients, durations = found.path.coefficients[lead], found.path.durations[lead]
         try:
-            check_limits(coefficients, durations, -route.offset, robot, dynamics, settings, allowed)
-        except TrajectoryRefusedError:
-            if route.offset == 0.0 or share == _GENTLENESS[-1]:
+            check_limits(coefficients, durations, -found.offset, robot, dynamics, settings, allowed)
+        except TrajectoryRefusedError as error:
+            if found.offset == 0.0:
                 raise
+            refusal = error
         else:
-            break
-    return route
+            return found
+    if np.abs(trajectory.positions[0] - now.q).max() <= _HARMLESS:
+        return route(_SHORT)
+    raise _invalid(
+        f"{refusal}; until 0 s it goes from where it stands to the first point, however slowly: plan it "
+        "again from where it stands"
+    ) from refusal
 
 
 def _check_points(trajectory: JointTrajectory, robot: RobotModel, settings: ExecutionSettings) -> None:
