@@ -82,3 +82,12 @@ def test_what_is_closed_gently_already_is_not_slowed_down_for_those_that_are_not
         times.append(on(loaded["cell"], plan, q, stands).offset)
     assert min(times) < 0.2
     assert len({round(time, 6) for time in times}) > 1
+
+
+def test_a_stamp_is_kept_also_where_a_difference_is_closed_before_it(make, plan, start, cell):
+    simulation = make()
+    home = np.array(cell.machine_home)
+    start(simulation, plan(1.0, home + 0.009, home), stamp_ns=1_000_000_000)
+    simulation.run(1.0)
+    assert simulation.executor.path_time == pytest.approx(0.0, abs=2e-3)
+    assert np.abs(simulation.executor.command - home - 0.009).max() < 1e-6
