@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
@@ -10,7 +12,7 @@ from ir_description import load_cell
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.node.inputs import LastState, measured_velocity, state_of
+from ir_planner.node.inputs import LOOKS, LastState, measured_velocity, state_of
 from ir_planner.scene.motion_limits import STILL
 
 
@@ -34,6 +36,48 @@ def test_no_state_and_an_old_one_are_distinguished() -> None:
     state.take(np.zeros(6), 0.0)
     with pytest.raises(RequestError, match=r"came 2.5 s ago: it must be at most 1 s"):
         state.fresh(2.5, 1.0)
+
+
+class Busy:
+    """A machine on which a driver is heard only after so many looks; time passes while somebody sleeps."""
+
+    def __init__(self, after: int, offered: bool = True) -> None:
+        self.looks, self.now = 0, 100.0
+        self._after = after
+        self.state = LastState(self._look, lambda: offered)
+
+    def _look(self) -> None:
+        self.looks += 1
+        if self.looks > self._after:
+            self.state.take(np.ones(6), self.now)
+
+    def ask(self) -> Any:
+        return self.state.soon(lambda: self.now, 1.0, sleep=self._sleep)
+
+    def _sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.mark.parametrize("before", [None, 2.5])
+def test_a_driver_that_is_held_up_is_heard_a_moment_later(before: float | None) -> None:
+    busy = Busy(after=LOOKS - 1)
+    if before is not None:
+        busy.state.take(np.zeros(6), busy.now - before)
+    assert busy.ask().tolist() == [1.0] * 6
+    looks = busy.looks
+    assert busy.ask().tolist() == [1.0] * 6
+    assert busy.looks == looks + 2, "nobody waits for a state that is there"
+
+
+def test_a_driver_that_stays_silent_and_one_that_is_not_there_are_said() -> None:
+    silent = Busy(after=10 * LOOKS)
+    with pytest.raises(RequestError, match="no joint_states have come yet"):
+        silent.ask()
+    assert silent.looks <= LOOKS + 1
+    missing = Busy(after=5, offered=False)
+    with pytest.raises(RequestError, match="no joint_states have come yet"):
+        missing.ask()
+    assert missing.looks <= 2
 
 
 def test_a_moving_robot_is_no_start_but_a_state() -> None:

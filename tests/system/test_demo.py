@@ -24,6 +24,7 @@ HOME_W = {  # the paper, Table II: motors, brakes, Bus Power Off, hibernation
 }
 RESTS = (0, 2, 3, 4)
 GRID = 0.002
+PATIENCE = 900.0  # s; the demonstration takes 100 where it is alone
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     folder = tmp_path_factory.mktemp("demo")
     command = [sys.executable, "-m", "ir_cli.main", "demo", "--plant", "nominal", "--out", str(folder)]
     done = subprocess.run(
-        command, capture_output=True, text=True, timeout=400, env=dict(os.environ), check=False
+        command, capture_output=True, text=True, timeout=PATIENCE, env=dict(os.environ), check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     messages: dict[str, list[tuple[int, Any]]] = defaultdict(list)
@@ -63,7 +64,7 @@ def test_every_check_of_the_demonstration_held(run: Run) -> None:
 def test_the_recorded_requests_are_planned_again_with_equal_ids(run: Run) -> None:
     file = str(run.folder / "demo.mcap")
     command = [sys.executable, "-m", "ir_cli.main", "replan", file, "--root", str(run.folder)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     (plan,) = re.findall(r"/ir_planner/plan +equal +(\d+)", done.stdout)
     assert int(plan) >= 20

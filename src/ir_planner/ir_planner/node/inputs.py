@@ -1,5 +1,6 @@
 """What requests say, as values: states, goals, poses, options, trajectories. Nothing here is planned."""
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
@@ -31,16 +32,18 @@ from ir_planner.request import POSITION_MAX, Goal, one_goal
 from ir_planner.trajectories import POINTS_MAX, Reference
 
 AT_REST = 0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
+LOOK, LOOKS = 0.02, 200  # s; 4 s for a driver that publishes 500 times a second
 MEASURED = 9  # decimals of rad: finer than any encoder, and less than what counts as movement
 
 
 @dataclass
 class LastState:
     """The last joint_states (n,), and when it came [s on the node's clock]; written and read by different
-    threads. look: takes what has come since the last look.
+    threads. look: takes what has come since the last look. offered: whether somebody publishes them.
     """
 
     look: Callable[[], None] = lambda: None
+    offered: Callable[[], bool] = lambda: False
     q: FloatArray | None = None
     velocity: FloatArray | None = None
     came: float = 0.0
@@ -67,6 +70,23 @@ class LastState:
         if joints_at_rest and velocity is not None and age <= max_age:
             check_at_rest(velocity, joints_at_rest, "the robot is moving", StatusCode.START_STATE_INVALID)
         return q
+
+    def soon(
+        self,
+        now: Callable[[], float],
+        max_age: float,
+        joints_at_rest: tuple[str, ...] = (),
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> FloatArray:
+        """The same as `fresh`, after a wait for a state where somebody publishes them: on a busy machine a
+        driver that has just started, or was held up, is heard a moment later.
+        """
+        for _ in range(LOOKS):
+            self.look()
+            if (self.q is not None and now() - self.came <= max_age) or not self.offered():
+                break
+            sleep(LOOK)
+        return self.fresh(now(), max_age, joints_at_rest)
 
     def fresh(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray:
         """The same where it must not be older: raises RequestError when there is none, or an old one."""

@@ -84,7 +84,7 @@ class PlannerNode(Node):
         parameters = Parameters(self, PlannerSettings, on_change=self._change_settings)
         make = make_planner or (lambda settings: Planner(time.monotonic, settings, read_cell=read_cell_apart))
         self.planner = make(parameters.value)
-        self._last_state = LastState(look=self._look)
+        self._last_state = LastState(self._look, lambda: self.count_publishers(names.JOINT_STATES) > 0)
         self._requests = Requests(
             self.planner,
             self._last_state,

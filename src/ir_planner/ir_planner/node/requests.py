@@ -288,7 +288,7 @@ class Requests:
         if given is not None:
             return given
         standing = cell.robot.joint_names if at_rest else ()
-        return self.last_state.fresh(self.now(), self.planner.settings.state_max_age, standing)
+        return self.last_state.soon(self.now, self.planner.settings.state_max_age, standing)
 
     def _known_or_home(self, at_rest: bool = False) -> FloatArray:
         """The last known state, however old; machine home where no state was received. at_rest: a robot that
