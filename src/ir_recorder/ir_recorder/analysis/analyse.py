@@ -21,6 +21,7 @@ from ir_description.robot import DATA_SHEET, DcLink
 from ir_kernels import KernelError
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES
+from ir_recorder.analysis.charge import lost_charges
 from ir_recorder.analysis.clearance import StepClearance, step_clearances
 from ir_recorder.analysis.grid import check_grid
 from ir_recorder.analysis.indirect import IndirectMeter
@@ -143,9 +144,10 @@ class _Analyser:
     ) -> tuple[StepResult, ...]:
         indirect = self._indirect(cell)
         clearances = self._clearances(steps, cell)
+        lost = lost_charges(steps, meter, self.link)
         return tuple(
-            self._result(step, clearance, meter, cell, indirect)
-            for step, clearance in zip(steps, clearances, strict=True)
+            replace(self._result(step, clearance, meter, cell, indirect), lost_charge=charge)
+            for step, clearance, charge in zip(steps, clearances, lost, strict=True)
         )
 
     def _result(

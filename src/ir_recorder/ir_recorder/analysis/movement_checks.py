@@ -13,8 +13,6 @@ from ir_recorder.analysis.results import StepResult
 from ir_recorder.analysis.steps import UNSEEN
 from ir_recorder.analysis.tolerances import Tolerances
 
-_PLAN = "planned from empty capacitors"
-
 
 def step_checks(result: StepResult, safety_distance: float, bounds: Tolerances) -> Iterator[Finding]:
     """All checks of a movement or pause that ended; safety_distance [m]: S_m as recorded, NaN where not."""
@@ -60,9 +58,8 @@ def _energy(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findi
         yield unchecked(f"energy of {name}", "the movement carries no plan")
         return
     low, high, why = _expected(result, 1.0, bounds)
-    if stored >= 1.0:
-        why += f"; less {stored:.0f} J that the capacitors held at the start ({_PLAN})"
-    yield _between(f"energy of {name}", result.energy, low - stored, high, planned, why)
+    why += _of_capacitors(result)
+    yield _between(f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why)
 
 
 def _expected(result: StepResult, share: float, bounds: Tolerances) -> tuple[float, float, str]:
@@ -98,9 +95,8 @@ def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findin
         planned *= share
         low, high, why = _expected(result, share, bounds)
         why += " of the planned power"
-    if stored >= 1.0:
-        why += f"; less {stored:.0f} J that the capacitors held at the start"
-    yield _between(f"energy of {name}", result.energy, low - stored, high, planned, why)
+    why += _of_capacitors(result)
+    yield _between(f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why)
 
 
 def _resting(result: StepResult, bounds: Tolerances) -> tuple[float, float, str]:
@@ -154,6 +150,13 @@ def _rests(movement: PlannedMovement) -> bool:
 def _least(result: StepResult, bounds: Tolerances) -> float:
     """J that any step may differ by: more where a reading at an end holds more, as if the next one moves."""
     return max(bounds.energy_absolute, float(np.nan_to_num(result.straddling_energy)))
+
+
+def _of_capacitors(result: StepResult) -> str:
+    """What they change in a bound, in words."""
+    stored, lost = _stored(result), result.lost_charge
+    less = f"; less {stored:.0f} J that the capacitors held at the start" if stored >= 1.0 else ""
+    return less + (f"; and {lost:.0f} J that had gone from them as it began late" if lost >= 1.0 else "")
 
 
 def _stored(result: StepResult) -> float:

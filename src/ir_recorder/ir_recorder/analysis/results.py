@@ -28,7 +28,8 @@ class StepResult:
     indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and torque;
     second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
     stored_energy [J]: in the capacitors at the
-    start; motors_power [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
+    start; lost_charge [J]: that the plan counted on in them, and that had gone as the step began late;
+    motors_power [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
     commanded and simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
     """
 
@@ -47,6 +48,7 @@ class StepResult:
     motors_power: float
     tool_deviation: float
     clearance: StepClearance | None
+    lost_charge: float = 0.0
 
     @property
     def seconds(self) -> float:
