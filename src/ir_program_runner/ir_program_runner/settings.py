@@ -61,7 +61,7 @@ class LinkSettings:
         WAKE_PORT, "UDP port of Wake-on-LAN; the real one is 9.", minimum=1, maximum=65535, read_only=True
     )
     response_timeout: float = setting(
-        2.0,
+        5.0,
         "Longest wait for an answer of driver or planner.",
         unit="s",
         minimum=0.01,
