@@ -17,10 +17,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from ir_msgs_py.arrays import FloatArray
+from ir_recorder.intervals import alike, mean_of
 from ir_studies import Means, study_of
 from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
 from ir_studies.statistics.figures import Comparison
-from ir_studies.statistics.intervals import alike, mean_of
 from ir_studies.statistics.runs import Finished
 from ir_studies.statistics.settings import DRAWN
 from ir_studies.work.results import NAME

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import ttest_1samp
 
 from ir_recorder import Analysis, analyse, findings, read_recording
-from ir_recorder.analysis.agreement import LEVEL, agreement, mean_of
+from ir_recorder.analysis.agreement import agreement
 from ir_recorder.analysis.steps import executed_steps
+from ir_recorder.intervals import mean_of
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 
@@ -52,11 +55,30 @@ def test_both_measurements_agree_where_the_robot_is_as_its_data_say(analysis: An
         assert np.isnan(row.second_opinion) or row.second_opinion == pytest.approx(row.indirect, rel=1e-6)
 
 
-def test_the_interval_of_a_mean_covers_as_often_as_it_says() -> None:
-    rng = np.random.default_rng(7)
-    intervals = [mean_of(rng.normal(0.1, 0.05, 8)) for _ in range(2000)]
-    inside = np.mean([each.low <= 0.1 <= each.high for each in intervals])
-    assert inside == pytest.approx(LEVEL, abs=0.02)  # three standard deviations of 2000 draws
+def test_the_difference_has_the_interval_that_means_of_studies_have(analysis: Analysis) -> None:
+    """One of three movements is far off: Student's interval alone would end nearer on its side."""
+    shares = (0.01, 0.011, 0.05)
+    both = agreement(with_differences(analysis, shares))
+    student = ttest_1samp(shares, 0.0).confidence_interval(0.90)
+    assert both.difference == mean_of(np.array([row.difference for row in both.movements]))
+    assert both.difference.low == pytest.approx(student.low)
+    assert both.difference.high > student.high + 0.01
+    assert both.spread == pytest.approx(np.std(shares, ddof=1))
+
+
+def test_movements_that_differ_alike_have_no_interval(analysis: Analysis) -> None:
+    both = agreement(with_differences(analysis, (0.02, 0.02, 0.02)))
+    assert np.isnan(both.difference.low)
+    assert both.sentence == "the indirect measurement of each of 3 movements is +2.0 % off the meter"
+
+
+def with_differences(analysis: Analysis, shares: Sequence[float]) -> Analysis:
+    """The analysis with movements whose indirect energy is so many shares above the direct one."""
+    moved = {
+        id(result): replace(result, indirect_energy=result.energy * (1.0 + share))
+        for result, share in zip(analysis.movements, shares, strict=True)
+    }
+    return replace(analysis, steps=tuple(moved.get(id(result), result) for result in analysis.steps))
 
 
 def test_a_recording_without_power_or_cell_gives_what_is_left(demo_file: Path) -> None:

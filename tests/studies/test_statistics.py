@@ -16,9 +16,9 @@ from scipy.stats import bootstrap, skew, t, ttest_1samp
 
 from ir_cli.main import main
 from ir_planner import Planner
+from ir_recorder.intervals import mean_of
 from ir_studies import FolderError, Means, SettingsError, read_study, study_of
 from ir_studies.statistics.figures import findings_of
-from ir_studies.statistics.intervals import mean_of
 from ir_studies.statistics.maker import maker
 from ir_studies.statistics.outputs import columns, page_html
 from ir_studies.statistics.places import NEAREST, pair_of, places_of

@@ -9,17 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.analysis.agreement import Mean
-from ir_studies.statistics.failures import Failure, failures_of
-from ir_studies.statistics.intervals import (
+from ir_recorder.intervals import (
     ALIKE,
+    Mean,
     alike,
     chance_of,
     mean_of,
     median_of,
     shown_together,
     skewed,
+    spread_of,
 )
+from ir_studies.statistics.failures import Failure, failures_of
 from ir_studies.statistics.sides import ASYNCHRONOUS, SYNCHRONOUS, distinct, number, solved
 from ir_studies.work import Row
 
@@ -166,23 +167,19 @@ def compared(
         of = np.asarray(own_pair, dtype=int)[kept]
         by_pair = np.array([values[of == pair].mean() for pair in dict.fromkeys(of.tolist())])
     mean = mean_of(by_pair)
-    deviation = math.nan if alike(by_pair) else _deviation(by_pair)
+    deviation = math.nan if alike(by_pair) else spread_of(by_pair)
     return Comparison(
         name,
         values,
         len(by_pair),
         mean,
         median_of(by_pair),
-        _deviation(values),
+        spread_of(values),
         mean.value / deviation,
         chance_of(by_pair),
         skewed(by_pair),
         levels,
     )
-
-
-def _deviation(values: FloatArray) -> float:
-    return float(values.std(ddof=1)) if len(values) > 1 else math.nan
 
 
 def _movements(row: Row, k: int) -> tuple[object, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ir_msgs_py.file_roots import ANYWHERE
-from ir_recorder.analysis.agreement import Mean
+from ir_recorder.intervals import Mean
 from ir_recorder.report.files import write_output
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.step_table import write_columns

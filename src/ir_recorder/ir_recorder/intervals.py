@@ -1,6 +1,6 @@
-"""What a sample of independent pairs says: intervals of mean and median, chance, and where they are too few.
+"""What a sample of independent values says: intervals of mean and median, chance, and where they are too few.
 
-A pair's differences are far from normal: most are near zero, a few large. Student's t then leaves out a mean
+Differences of pairs are far from normal: most are near zero, a few large. Student's t then leaves out a mean
 that few carry, Hall's transformation of t by the sample's skewness (J. R. Statist. Soc. B 54 (1992), 221)
 holds less often than t where the tails are heavy and even. The interval of a mean is the union of both, its
 chance the larger of both. That of the median is by order statistics and holds whatever the distribution. A
@@ -11,17 +11,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
-from scipy.stats import binom
+from scipy.special import bdtr, stdtr, stdtrit
 
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.analysis.agreement import LEVEL, Mean
 
-ALIKE = 1e-7  # of values in percent: below, two figures differ by rounding
-_COCHRAN = 25.0  # pairs per squared skewness from which the interval of a mean is near its level
+LEVEL = 0.90  # of all intervals
+ALIKE = 1e-7  # of shares and of values in percent: below, two figures differ by rounding
+_COCHRAN = 25.0  # values per squared skewness from which the interval of a mean is near its level
+
+
+@dataclass(frozen=True)
+class Mean:
+    """A mean or a median with its interval of LEVEL; NaN where there is none."""
+
+    value: float
+    low: float
+    high: float
 
 
 def alike(values: FloatArray) -> bool:
@@ -58,7 +67,7 @@ def _rank(count: int) -> int:
     """The largest k for which as many as k of `count` values lie below the median in at most half of
     1 - LEVEL; -1 where there is none.
     """
-    return int(np.searchsorted(binom.cdf(np.arange(count), count, 0.5), 0.5 * (1.0 - LEVEL), "right")) - 1
+    return int(np.searchsorted(bdtr(np.arange(count), count, 0.5), 0.5 * (1.0 - LEVEL), "right")) - 1
 
 
 def chance_of(values: FloatArray) -> float:
@@ -75,8 +84,13 @@ def skewed(values: FloatArray) -> bool:
     return not alike(values) and len(values) < _COCHRAN * _skewness(values) ** 2
 
 
+def spread_of(values: FloatArray) -> float:
+    """The standard deviation of the values (N,); NaN where there are fewer than two."""
+    return float(values.std(ddof=1)) if len(values) > 1 else math.nan
+
+
 def _error(values: FloatArray) -> float:
-    return float(values.std(ddof=1)) / math.sqrt(len(values))
+    return spread_of(values) / math.sqrt(len(values))
 
 
 def _skewness(values: FloatArray) -> float:
