@@ -20,7 +20,14 @@ from _truth_section import Asked, Found
 
 from ir_cli.excitation.programme import Asked as Excitation
 from ir_cli.excitation.programme import Programme, plan_programme
-from ir_description import Cell, Load, PowerParameters, data_sheet, load_power_data
+from ir_description import (
+    Cell,
+    Load,
+    PowerParameters,
+    data_sheet,
+    interval_over,
+    load_power_data,
+)
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
@@ -117,10 +124,9 @@ class _Rig:
             planned = planned_samples(test.trajectory, self.held[test.load], self.prior.modes)
             prepared = model.prepare(planned)
             for name, each in (("before", self.prior), ("after", found.parameters)):
-                drawn = [model.watts(draw, prepared).mean() for draw in each.draws(DRAWS, 0)]
+                drawn = np.array([model.watts(draw, prepared).mean() for draw in each.draws(DRAWS, 0)])
                 expected = float(model.watts(each.mean, prepared).mean())
-                low, high = np.percentile(drawn, [5.0, 95.0])
-                low, high = min(low, expected), max(high, expected)  # as answers show it
+                low, high = interval_over(expected, drawn - expected)
                 errors[name].append(expected / watts - 1.0)
                 covered[name].append(bool(low <= watts <= high))
             widths.append((high - low) / watts)

@@ -13,6 +13,7 @@ from ir_description import (
     InvalidValueError,
     PowerParameters,
     UnknownNameError,
+    interval_over,
     load_power_data,
     load_power_parameters,
     load_robot,
@@ -196,3 +197,10 @@ def test_a_covariance_that_is_none_is_refused(sheet: PowerParameters) -> None:
     covariance[0, 1] = 1.0
     with pytest.raises(InvalidValueError, match="symmetric"):
         replace(sheet, covariance=covariance)
+
+
+def test_an_interval_over_robots_leaves_out_a_twentieth_on_each_side_and_holds_the_nominal_figure() -> None:
+    added = np.arange(0.0, 101.0)
+    assert interval_over(1000.0, added - 50.0) == (955.0, 1045.0)
+    assert interval_over(1000.0, added) == (1000.0, 1095.0)
+    assert interval_over(1000.0, added - 200.0) == (805.0, 1000.0)

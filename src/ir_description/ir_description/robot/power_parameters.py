@@ -47,10 +47,21 @@ SCALARS = (
 IDLE = "idle_watts"
 """W that the inverters of all axes together take from the DC link while the motors are on, whatever moves."""
 
+LEVELS = (0.05, 0.95)
+"""Quantiles that are the ends of an interval over drawn robots."""
+
 _HIGHEST = {"gear": 0.9, "rectifier_efficiency": 1.0} | dict.fromkeys(SCALARS[:5], 10.0)
 _LOWEST = {"rectifier_efficiency": 0.5, "rotor_inertia": 0.1, "link_mass": 0.1}
 _MOST = 1e9
 _SYMMETRIC = 1e-9  # relative to the variances: rounding of a file's digits
+
+
+def interval_over(nominal: float, added: FloatArray) -> tuple[float, float]:
+    """Ends of the 90 % interval of a figure to which drawn robots add `added` (N,): it holds the nominal one,
+    which need not be near its middle.
+    """
+    low, high = np.quantile(added, LEVELS)
+    return nominal + min(float(low), 0.0), nominal + max(float(high), 0.0)
 
 
 def parameter_names(joints: Iterable[str], modes: Iterable[str]) -> tuple[str, ...]:

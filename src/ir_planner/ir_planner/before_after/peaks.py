@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ir_msgs_py.report import PlannedMovement
-from ir_planner.checks import LEVELS, Interval, movement_energy, robots
+from ir_planner.checks import Interval, interval, movement_energy, robots
 from ir_planner.program import ProgramRequest
 from ir_planner.scene import PlanningScene, scene_with
 
@@ -29,8 +29,7 @@ def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> 
         worst = np.maximum(worst, step.report.peak_power * np.array(drawn) / max(float(nominal), 1e-9))
     if not worst.any():
         return Interval(peak, peak)
-    low, high = np.quantile(worst, LEVELS)
-    return Interval(min(float(low), peak), max(float(high), peak))
+    return interval(peak, worst - peak)
 
 
 def _drawn(scene: PlanningScene) -> list[PlanningScene]:

@@ -12,7 +12,7 @@ from ir_planner.checks.evaluation import (
     total_report,
 )
 from ir_planner.checks.free_space import FreeSpace
-from ir_planner.checks.intervals import LEVELS, ROBOTS, Interval, interval, movement_spread, robots, spread
+from ir_planner.checks.intervals import ROBOTS, Interval, interval, movement_spread, robots, spread
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.peak_power import peak_power
 from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
@@ -29,7 +29,6 @@ from ir_planner.checks.verification import TorqueProof, Verification, torque_pro
 __all__ = [
     "AT_REST",
     "CLOSEST",
-    "LEVELS",
     "PATH",
     "ROBOTS",
     "SLACK",

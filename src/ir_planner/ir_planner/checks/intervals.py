@@ -10,9 +10,7 @@ energies has an interval of its own, mostly far narrower than theirs.
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-import numpy as np
-
-from ir_description import PowerParameters
+from ir_description import PowerParameters, interval_over
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy_slopes import Sampled, energy_and_slope, sampled_energy
@@ -20,7 +18,6 @@ from ir_planner.scene import PlanningScene
 
 ROBOTS = 1000  # drawn: the ends of a 90 % interval are then known to some 5 % of its width
 SEED = 90
-LEVELS = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,6 @@ def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatA
 
 def interval(nominal: float, added: FloatArray) -> Interval:
     """The 90 % interval of an energy [J] to which the drawn robots add `added` (ROBOTS,) J; it holds the
-    nominal one, which need not be near its middle.
+    nominal one.
     """
-    low, high = np.quantile(added, LEVELS)
-    return Interval(nominal + min(float(low), 0.0), nominal + max(float(high), 0.0))
+    return Interval(*interval_over(nominal, added))

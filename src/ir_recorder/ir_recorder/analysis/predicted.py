@@ -8,9 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from ir_description import Load, PowerParameters, RobotModel
+from ir_description import Load, PowerParameters, RobotModel, interval_over
 from ir_description.robot import DcLink
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
@@ -18,7 +16,6 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.measure import PowerModel, Samples, planned_samples, standing_sample
 
 _DRAWS = 400
-_LEVELS = (0.05, 0.95)
 
 
 class Predictor:
@@ -54,5 +51,4 @@ class Predictor:
         energy = samples.step * float(self._model.watts(self._parameters.mean, prepared).sum())
         watts, slopes = self._model.watts_and_slopes(expected, prepared)
         drawn = samples.step * (watts.sum() + (self._draws - expected) @ slopes.sum(axis=0))
-        low, high = np.quantile(drawn, _LEVELS)
-        return energy, min(float(low), energy), max(float(high), energy)
+        return energy, *interval_over(energy, drawn - energy)
