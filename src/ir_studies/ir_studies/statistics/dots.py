@@ -13,7 +13,7 @@ from ir_studies.statistics.figures import Comparison
 
 WIDTH, LINE = 720.0, 34.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 170.0, 20.0, 8.0, 48.0
-_INSIDE = (2.0, 98.0)  # percentiles that the axis holds; what lies outside is drawn at its edge
+_INSIDE = (2.0, 98.0)  # percentiles that the axis holds; dots outside are drawn at its edge
 _SPREAD = 9.0  # up and down that dots are moved apart
 
 
@@ -22,9 +22,8 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     kept = [each for each in comparisons if each.count]
     if not kept:
         return ""
-    every = np.concatenate([each.values for each in kept])
-    low, high = np.percentile(every, _INSIDE)
-    low, high = min(float(low), -1.0), max(float(high), 1.0)
+    first, last, step = _ticks(kept)
+    low, high = first * step, last * step
     height = _TOP + LINE * len(kept) + _BOTTOM
 
     def at(value: float) -> float:
@@ -35,16 +34,26 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     said = "; ".join(f"{each.name}: mean {each.mean.value:+.1f} %" for each in kept)
     return (
         f'<div class="figure scroll"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" role="img" '
-        f'aria-label="{text(title)}: {text(said)}">{_axis(low, high, height, at)}{lines}'
+        f'aria-label="{text(title)}: {text(said)}">{_axis(range(first, last + 1), step, height, at)}{lines}'
         f'<text x="{(_LEFT + WIDTH - _RIGHT) / 2:g}" y="{height - 12:g}" text-anchor="middle">'
         f"{text(title)}</text></svg></div>"
     )
 
 
-def _axis(low: float, high: float, height: float, at: Callable[[float], float]) -> str:
+def _ticks(kept: Sequence[Comparison]) -> tuple[int, int, float]:
+    """First and last tick of the axis in steps, and the step [%]: intervals lie between them whole, and dots
+    but for the outermost ones.
+    """
+    low, high = np.percentile(np.concatenate([each.values for each in kept]), _INSIDE)
+    bars = [end for each in kept for end in (each.mean.low, each.mean.high) if math.isfinite(end)]
+    low, high = min(float(low), -1.0, *bars), max(float(high), 1.0, *bars)
     step = tick_step(high - low)
+    return math.floor(low / step), math.ceil(high / step), step
+
+
+def _axis(ticks: range, step: float, height: float, at: Callable[[float], float]) -> str:
     found = []
-    for k in range(math.ceil(low / step), math.floor(high / step) + 1):
+    for k in ticks:
         x = at(k * step)
         kind = "zero" if k == 0 else "grid"
         bottom = height - _BOTTOM
