@@ -23,7 +23,7 @@ from ir_sim_driver.node import SimDriver
 
 NS = 1_000_000_000
 PERIOD = 2_000_000
-DEPTH = 20_000  # messages that wait for a listener which gets no processor
+DEPTH = 4_000  # messages that wait for a listener; beyond 5,000 within a process Fast DDS gives no more, ever
 TICK = 5_000_000  # ns of real time between two messages of the clock
 CREEP = (
     0.01  # of its speed, while the plant of a busy machine is a second behind; at five the grid begins anew

@@ -85,7 +85,7 @@ def test_two_seconds_without_a_processor_lose_nothing(
     )
     published = []
     ros_node.create_subscription(
-        JointState, names.JOINT_STATES, lambda msg: published.append(stamp_of(msg)), QoSProfile(depth=20_000)
+        JointState, names.JOINT_STATES, lambda msg: published.append(stamp_of(msg)), QoSProfile(depth=4000)
     )
     wait_for(lambda: published, what="the driver publishes")
     words = [sys.executable, "-c", LISTENER.replace("COUNT", str(COUNT))]
