@@ -327,6 +327,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(
     assert answer.status.code == StatusCode.FAILURE
     assert "No space left" in answer.status.message
     assert start(call, tmp_path / "next.mcap").status.code == StatusCode.SUCCESS
+    wait_for(lambda: node.failure)  # of this one too, or the end of the node would say it
 
 
 def test_the_planners_cell_is_attached(
